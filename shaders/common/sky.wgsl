@@ -1,0 +1,64 @@
+// Sky radiance from the look-up table of src/light/atmosphere [Hillaire 2020, 5.3], and the fog that fits it.
+#define_import_path canopy::sky
+
+#import canopy::frame::{frame, light, sky_texture, sky_sampler}
+
+const PI: f32 = 3.14159265;
+
+// Columns and rows of the table, and the row of the horizon: src/light/atmosphere/sky_view.rs.
+const SKY_SIZE: vec2<f32> = vec2(129.0, 97.0);
+const HORIZON_ROW: f32 = 72.0;
+
+// Radiance of the sky without sun and moon, exposed. `direction` has unit length.
+fn sky_radiance(direction: vec3<f32>) -> vec3<f32> {
+    let a = light.sky_frame.xy;
+    let h = direction.xz;
+    var phi = 0.0;
+    if dot(h, h) > 1e-12 {
+        phi = atan2(a.x * h.y - a.y * h.x, dot(h, a));
+    }
+    let u = sign(phi) * sqrt(min(abs(phi) / PI, 1.0));
+    let column = (0.5 + 0.5 * u) * (SKY_SIZE.x - 1.0);
+    let steepness = sqrt(min(abs(asin(clamp(direction.y, -1.0, 1.0))) / (0.5 * PI), 1.0));
+    let below = HORIZON_ROW + (SKY_SIZE.y - 1.0 - HORIZON_ROW) * steepness;
+    let row = select(below, HORIZON_ROW * (1.0 - steepness), direction.y >= 0.0);
+    return textureSampleLevel(sky_texture, sky_sampler, (vec2(column, row) + 0.5) / SKY_SIZE, 0.0).rgb;
+}
+
+// Optical depth of a haze whose density falls exponentially with height, along a straight ray.
+fn fog_optical_depth(relative: vec3<f32>) -> f32 {
+    let distance = length(relative);
+    let inverse_scale = light.fog.w;
+    let start = exp(-max(frame.camera.y, 0.0) * inverse_scale);
+    let rise = clamp(relative.y * inverse_scale, -20.0, 20.0);
+    // (1 - e^-x) / x, by its series where x vanishes.
+    let mean = select((1.0 - exp(-rise)) / rise, 1.0 - 0.5 * rise, abs(rise) < 1e-3);
+    return distance * start * min(mean, 50.0);
+}
+
+fn apply_fog(color: vec3<f32>, relative: vec3<f32>) -> vec3<f32> {
+    let transmittance = exp(-light.fog.rgb * fog_optical_depth(relative));
+    let distance = max(length(relative), 1e-3);
+    var direction = relative / distance;
+    // What lies behind the fog is the sky's rim, never the ground's own row of the table.
+    direction = normalize(vec3(direction.x, max(direction.y, 0.015), direction.z));
+    return color * transmittance + sky_radiance(direction) * (1.0 - transmittance);
+}
+
+// The eye's loss of colour in the dark and its shift to blue [Jensen et al. 2000, eq. 4; Larson et al. 1997, eq. 10]:
+// the twin of ScotopicTint::apply in src/light/exposure.rs. `color` is exposed.
+fn night_vision(color: vec3<f32>) -> vec3<f32> {
+    if light.night.w <= 0.0 {
+        return color;
+    }
+    let xyz = mat3x3<f32>(
+        vec3(0.4124564, 0.2126729, 0.0193339),
+        vec3(0.3575761, 0.7151522, 0.1191920),
+        vec3(0.1804375, 0.0721750, 0.9503041),
+    ) * color;
+    let v = max(xyz.y * (1.33 * (1.0 + (xyz.y + xyz.z) / max(xyz.x, 1e-12)) - 1.68) / 2.573, 0.0);
+    let nits = max(xyz.y / light.sky_frame.z, 1e-12);
+    let sigma = clamp((log2(nits) * 0.30103 + 2.0) / 2.6, 0.0, 1.0);
+    let rods = 1.0 - sigma * sigma * (3.0 - 2.0 * sigma);
+    return mix(color, light.night.rgb * v, min(light.night.w, light.sky_frame.w * rods));
+}

@@ -1,0 +1,55 @@
+// How much of the key light reaches a point: near, from the cascades of the sun_shadow pass; everywhere, from the
+// horizon that the terrain raises towards the light (src/terrain/sun_horizon.rs).
+#define_import_path canopy::sun_visibility
+
+#import canopy::frame::{frame, light, shadow, shadow_map, shadow_sampler, ground_texture, sky_sampler}
+
+// x: height above the ground that the light clears, y: share of ground under crowns.
+fn ground_map(relative: vec3<f32>) -> vec2<f32> {
+    let uv = (relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;
+    return textureSampleLevel(ground_texture, sky_sampler, uv, 0.0).xy;
+}
+
+// Light that clears the terrain: a penumbra that widens with the distance to the ridge is approximated by one of
+// fixed height, the sun's disc over a kilometre.
+fn terrain_visibility(map: vec2<f32>, height_above_ground: f32) -> f32 {
+    return smoothstep(-6.0, 6.0, height_above_ground + 0.5 - map.x);
+}
+
+fn cascade_visibility(index: i32, relative: vec3<f32>, normal: vec3<f32>) -> f32 {
+    let texel = shadow.cascades[index].size.x;
+    let slope = 1.0 - abs(dot(normal, light.key_direction.xyz));
+    // Offset along the normal by the reach of the filter, and along the ray by one texel.
+    let position = relative + normal * (texel * (0.6 + 1.6 * slope)) + light.key_direction.xyz * (texel * 1.2);
+    let map = shadow.cascades[index].map_from_relative * vec4(position, 1.0);
+    let uv = map.xy * vec2(0.5, -0.5) + 0.5;
+    let step = shadow.count.y;
+    // Five bilinear comparisons on a rotated cross: a soft edge about three texels wide.
+    var sum = textureSampleCompareLevel(shadow_map, shadow_sampler, uv, index, map.z) * 2.0;
+    sum += textureSampleCompareLevel(shadow_map, shadow_sampler, uv + vec2(0.9, 0.4) * step, index, map.z);
+    sum += textureSampleCompareLevel(shadow_map, shadow_sampler, uv + vec2(-0.4, 0.9) * step, index, map.z);
+    sum += textureSampleCompareLevel(shadow_map, shadow_sampler, uv + vec2(-0.9, -0.4) * step, index, map.z);
+    sum += textureSampleCompareLevel(shadow_map, shadow_sampler, uv + vec2(0.4, -0.9) * step, index, map.z);
+    return sum / 6.0;
+}
+
+// x: visibility from the cascades, y: weight of that knowledge (0 beyond the last cascade).
+fn cascaded_visibility(relative: vec3<f32>, normal: vec3<f32>) -> vec2<f32> {
+    let count = i32(shadow.count.x);
+    let distance = length(relative);
+    for (var i = 0; i < count; i += 1) {
+        let radius = shadow.cascades[i].size.y;
+        if distance < radius {
+            let near = cascade_visibility(i, relative, normal);
+            let blend = smoothstep(0.85 * radius, radius, distance);
+            if blend <= 0.0 {
+                return vec2(near, 1.0);
+            }
+            if i + 1 < count {
+                return vec2(mix(near, cascade_visibility(i + 1, relative, normal), blend), 1.0);
+            }
+            return vec2(near, 1.0 - blend);
+        }
+    }
+    return vec2(1.0, 0.0);
+}

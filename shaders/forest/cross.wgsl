@@ -1,0 +1,118 @@
+// Crossed billboards [Franzke 2005, 4.3]: two upright planes and a level one, eighteen pulled vertices a tree.
+#import canopy::frame::{frame, light}
+#import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, cross_threshold, tint_foliage, stand_ambient}
+#import canopy::lighting::{Surface, shade}
+#import canopy::sky::{apply_fog, night_vision}
+#import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
+
+@group(2) @binding(0) var color_pictures: texture_2d_array<f32>;
+@group(2) @binding(1) var property_pictures: texture_2d_array<f32>;
+@group(2) @binding(2) var picture_sampler: sampler;
+
+struct Varying {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) relative: vec3<f32>,
+    @location(1) uv: vec2<f32>,
+    @location(2) @interpolate(flat) layer: u32,
+    // The picture's right, up and front in world axes; the front turned towards the viewer.
+    @location(3) @interpolate(flat) right: vec3<f32>,
+    @location(4) @interpolate(flat) up: vec3<f32>,
+    @location(7) @interpolate(flat) front: vec3<f32>,
+    // Threshold, height above the foot in metres, relative height, tint.
+    @location(5) look: vec4<f32>,
+    @location(6) @interpolate(flat) transmission: vec3<f32>,
+}
+
+const VERTICES_A_TREE: u32 = 18u;
+
+@vertex
+fn vertex(@builtin(vertex_index) index: u32) -> Varying {
+    var corners = array<vec2<f32>, 6>(
+        vec2(-1.0, -1.0), vec2(1.0, -1.0), vec2(1.0, 1.0), vec2(-1.0, -1.0), vec2(1.0, 1.0), vec2(-1.0, 1.0),
+    );
+    let tree = unpack_tree(trees[visible[index / VERTICES_A_TREE]]);
+    let plane_index = (index % VERTICES_A_TREE) / 6u;
+    let corner = corners[index % 6u];
+    let plane = variants[tree.variant].planes[plane_index];
+    let height = max(variants[tree.variant].size.x * tree.scale, 0.01);
+
+    let center = tree.position + turn(plane.center.xyz, tree.yaw) * tree.scale;
+    let normal = turn(plane.normal.xyz, tree.yaw);
+    let toward = dot(normal, normalize(center));
+    // A plane goes as it is seen edge-on: its picture is nothing but a streak there.
+    let edge = 0.5 + 0.51 * (1.0 - smoothstep(0.10, 0.34, abs(toward)));
+    let threshold = max(cross_threshold(length(tree.position.xz)), edge);
+
+    var out: Varying;
+    let local = turn(plane.center.xyz + corner.x * plane.u.xyz + corner.y * plane.v.xyz, tree.yaw) * tree.scale;
+    out.relative = tree.position + local;
+    out.clip = frame.clip_from_relative * vec4(out.relative, 1.0);
+    if threshold >= 1.0 {
+        // Nothing would pass the test: no area, no fragments.
+        out.clip = vec4(2.0, 2.0, 2.0, 1.0);
+    }
+    out.uv = vec2(0.5 + 0.5 * corner.x, 0.5 - 0.5 * corner.y);
+    out.layer = u32(variants[tree.variant].size.z) + plane_index;
+    out.right = turn(plane.u.xyz, tree.yaw) / max(length(plane.u.xyz), 1e-6);
+    out.up = turn(plane.v.xyz, tree.yaw) / max(length(plane.v.xyz), 1e-6);
+    // Seen from behind, the crown's other half stands before the viewer: mirrored across the plane.
+    out.front = normal * select(1.0, -1.0, toward > 0.0);
+    out.look = vec4(threshold, local.y, local.y / height, tree.tint);
+    out.transmission = variants[tree.variant].transmission.rgb;
+    return out;
+}
+
+fn decode_octahedral(e: vec2<f32>) -> vec3<f32> {
+    let f = e * 2.0 - 1.0;
+    var n = vec3(f.x, f.y, 1.0 - abs(f.x) - abs(f.y));
+    let t = max(-n.z, 0.0);
+    n.x += select(t, -t, n.x >= 0.0);
+    n.y += select(t, -t, n.y >= 0.0);
+    return normalize(n);
+}
+
+@fragment
+fn fragment(in: Varying) -> @location(0) vec4<f32> {
+    let texel = textureSample(color_pictures, picture_sampler, in.uv, in.layer);
+    let level = picture_level(in.uv);
+    var coverage = 1.0;
+#ifdef ALPHA_TO_COVERAGE
+    coverage = clamp((texel.a - in.look.x) / max(fwidth(texel.a), 1e-4) + 0.5, 0.0, 1.0);
+    if coverage <= 0.0 {
+        discard;
+    }
+#else
+    if texel.a < in.look.x {
+        discard;
+    }
+#endif
+    let properties = textureSampleLevel(property_pictures, picture_sampler, in.uv, in.layer, level);
+    let local = decode_octahedral(properties.xy);
+    let normal = normalize(in.right * local.x + in.up * local.y + in.front * local.z);
+
+    let foliage = properties.a;
+    var surface: Surface;
+    surface.albedo = mix(texel.rgb, tint_foliage(texel.rgb, in.look.w), foliage);
+    surface.normal = normal;
+    surface.transmission = in.transmission * foliage;
+    let map = ground_map(in.relative);
+    surface.ambient = properties.b * stand_ambient(in.look.z, map.y);
+    var visibility = terrain_visibility(map, in.look.y);
+    if visibility > 0.0 {
+        let near = cascaded_visibility(in.relative, normal);
+        visibility *= mix(1.0, near.x, near.y);
+    }
+    var color = shade(surface, visibility);
+    if frame.flags.y > 0.5 {
+        color = mix(color, vec3(0.2, 0.35, 1.0) * dot(color, vec3(0.5)), 0.6);
+    }
+    return vec4(night_vision(apply_fog(color, in.relative)), coverage);
+}
+
+// Level of the property picture, taken before the test: derivatives after a discard are undefined on some devices.
+fn picture_level(uv: vec2<f32>) -> f32 {
+    let size = vec2<f32>(textureDimensions(property_pictures));
+    let dx = dpdx(uv * size);
+    let dy = dpdy(uv * size);
+    return 0.5 * log2(max(max(dot(dx, dx), dot(dy, dy)), 1e-8));
+}

@@ -1,0 +1,93 @@
+// Trees of 16 bytes: src/scatter/packed.rs packs what this unpacks.
+#define_import_path canopy::instance
+
+struct Tree {
+    xz: u32,
+    y: f32,
+    cell: u32,
+    look: u32,
+}
+
+// Where positions are relative to: the camera for the view, a box's centre for a cascade.
+struct ForestView {
+    anchor_cell: vec2<i32>,
+    // Metres of the anchor inside its cell (x, z).
+    anchor_offset: vec2<f32>,
+    // Anchor's height over the stand's datum in metres.
+    anchor_y: f32,
+    cell_size: f32,
+    // Distance in metres where the full model begins to give way, and where it is gone.
+    fade_start: f32,
+    fade_end: f32,
+}
+
+struct Plane {
+    center: vec4<f32>,
+    u: vec4<f32>,
+    v: vec4<f32>,
+    normal: vec4<f32>,
+}
+
+struct Variant {
+    planes: array<Plane, 3>,
+    // x: height in metres, y: crown radius, z: first layer of its pictures, w: 1 where it has a full model.
+    size: vec4<f32>,
+    // Transmission of its leaves.
+    transmission: vec4<f32>,
+}
+
+struct Instance {
+    // Foot relative to the anchor, metres.
+    position: vec3<f32>,
+    // Cosine and sine of the yaw, times nothing.
+    yaw: vec2<f32>,
+    scale: f32,
+    variant: u32,
+    // -1..1
+    tint: f32,
+}
+
+@group(1) @binding(0) var<uniform> view: ForestView;
+@group(1) @binding(1) var<storage, read> trees: array<Tree>;
+@group(1) @binding(2) var<storage, read> visible: array<u32>;
+@group(1) @binding(3) var<storage, read> variants: array<Variant>;
+
+fn unpack_tree(tree: Tree) -> Instance {
+    let cell = vec2(extractBits(bitcast<i32>(tree.cell), 0u, 16u), extractBits(bitcast<i32>(tree.cell), 16u, 16u));
+    let offset = vec2(f32(tree.xz & 0xffffu), f32(tree.xz >> 16u)) * (view.cell_size / 65535.0);
+    let xz = vec2<f32>(cell - view.anchor_cell) * view.cell_size + (offset - view.anchor_offset);
+    let yaw = f32(tree.look & 0xffu) * (6.28318531 / 256.0);
+    var instance: Instance;
+    instance.position = vec3(xz.x, tree.y - view.anchor_y, xz.y);
+    instance.yaw = vec2(cos(yaw), sin(yaw));
+    instance.scale = exp2(f32((tree.look >> 8u) & 0xfffu) * (8.0 / 4095.0) - 4.0);
+    instance.variant = (tree.look >> 20u) & 0x3fu;
+    instance.tint = max(f32(extractBits(bitcast<i32>(tree.look), 26u, 6u)) / 31.0, -1.0);
+    return instance;
+}
+
+// Plant frame to world axes: a turn about Y.
+fn turn(v: vec3<f32>, yaw: vec2<f32>) -> vec3<f32> {
+    return vec3(yaw.x * v.x + yaw.y * v.z, v.y, -yaw.y * v.x + yaw.x * v.z);
+}
+
+// Thresholds of the alpha test over the distance: the CPU twin is src/lod/mod.rs.
+fn model_threshold(distance: f32) -> f32 {
+    let middle = 0.5 * (view.fade_start + view.fade_end);
+    return 0.5 + 0.51 * clamp((distance - middle) / max(view.fade_end - middle, 1e-3), 0.0, 1.0);
+}
+
+fn cross_threshold(distance: f32) -> f32 {
+    let middle = 0.5 * (view.fade_start + view.fade_end);
+    return 0.5 + 0.51 * clamp((middle - distance) / max(middle - view.fade_start, 1e-3), 0.0, 1.0);
+}
+
+// Individual shift of the foliage's hue and brightness.
+fn tint_foliage(albedo: vec3<f32>, tint: f32) -> vec3<f32> {
+    return albedo * (1.0 + tint * vec3(0.22, 0.10, -0.06));
+}
+
+// Light that the neighbours' crowns leave: darkest at the forest's floor.
+fn stand_ambient(relative_height: f32, cover: f32) -> f32 {
+    return mix(1.0 - 0.72 * cover, 1.0, smoothstep(0.0, 0.95, relative_height));
+}

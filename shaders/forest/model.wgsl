@@ -1,0 +1,125 @@
+// The full model of a tree, near the camera.
+#import canopy::frame::{frame, light}
+#import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, model_threshold, tint_foliage, stand_ambient}
+#import canopy::lighting::{Surface, shade}
+#import canopy::sky::{apply_fog, night_vision}
+#import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
+
+struct Part {
+    base_color: vec4<f32>,
+    transmission: vec4<f32>,
+}
+
+@group(2) @binding(0) var color_texture: texture_2d<f32>;
+@group(2) @binding(1) var normal_texture: texture_2d<f32>;
+@group(2) @binding(2) var part_sampler: sampler;
+@group(2) @binding(3) var<uniform> part: Part;
+
+struct Vertex {
+    @location(0) position: vec3<f32>,
+    // Unit normal, and the ambient visibility in w.
+    @location(1) normal_ambient: vec4<f32>,
+    @location(2) uv: vec2<f32>,
+}
+
+struct Varying {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) relative: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+    @location(2) uv: vec2<f32>,
+    // Ambient visibility, height above the foot in metres, relative height in the crown, tint.
+    @location(3) look: vec4<f32>,
+    @location(4) threshold: f32,
+    @location(5) @interpolate(flat) variant: u32,
+}
+
+@vertex
+fn vertex(in: Vertex, @builtin(instance_index) index: u32) -> Varying {
+    let tree = unpack_tree(trees[visible[index]]);
+    let local = turn(in.position, tree.yaw) * tree.scale;
+    let relative = tree.position + local;
+    var out: Varying;
+    out.relative = relative;
+    out.clip = frame.clip_from_relative * vec4(relative, 1.0);
+    out.normal = turn(in.normal_ambient.xyz, tree.yaw);
+    out.uv = in.uv;
+    let height = max(variants[tree.variant].size.x * tree.scale, 0.01);
+    out.look = vec4(in.normal_ambient.w, local.y, local.y / height, tree.tint);
+    out.threshold = model_threshold(length(tree.position.xz));
+    out.variant = tree.variant;
+    return out;
+}
+
+// Noise in the plant's frame, so that wood dissolves in place.
+fn hash(p: vec3<f32>) -> f32 {
+    let q = vec3<u32>(vec3<i32>(floor(p)));
+    var h = q.x * 0x8da6b343u + q.y * 0xd8163841u + q.z * 0xcb1ab31fu;
+    h = (h ^ (h >> 15u)) * 0x2c1b3c6du;
+    h = (h ^ (h >> 12u)) * 0x297a2d39u;
+    return f32((h ^ (h >> 15u)) >> 8u) / 16777216.0;
+}
+
+// Tangent-space detail without stored tangents [Schüler 2013, "Normal Mapping Without Precomputed Tangents"].
+fn detail_normal(normal: vec3<f32>, relative: vec3<f32>, uv: vec2<f32>) -> vec3<f32> {
+    let texel = textureSample(normal_texture, part_sampler, uv).xyz * 2.0 - 1.0;
+    let dp1 = dpdx(relative);
+    let dp2 = dpdy(relative);
+    let duv1 = dpdx(uv);
+    let duv2 = dpdy(uv);
+    let p2 = cross(dp2, normal);
+    let p1 = cross(normal, dp1);
+    let t = p2 * duv1.x + p1 * duv2.x;
+    // The image's v runs down, the map's green runs up.
+    let b = -(p2 * duv1.y + p1 * duv2.y);
+    let scale = inverseSqrt(max(max(dot(t, t), dot(b, b)), 1e-30));
+    return normalize(normal * texel.z + (t * texel.x + b * texel.y) * scale);
+}
+
+@fragment
+fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
+    let texel = textureSample(color_texture, part_sampler, in.uv);
+    var normal = normalize(in.normal);
+    var coverage = 1.0;
+#ifdef FOLIAGE
+    let alpha = texel.a;
+#ifdef ALPHA_TO_COVERAGE
+    coverage = clamp((alpha - in.threshold) / max(fwidth(alpha), 1e-4) + 0.5, 0.0, 1.0);
+    if coverage <= 0.0 {
+        discard;
+    }
+#else
+    if alpha < in.threshold {
+        discard;
+    }
+#endif
+    // Leaves are lit from the side that is seen; their smoothed normals may point across the leaf.
+    if dot(normal, in.relative) > 0.0 {
+        normal = reflect(normal, normalize(in.relative));
+    }
+#else
+    normal = detail_normal(normal, in.relative, in.uv);
+    let keep = hash(vec3(in.uv * 97.0, in.look.y * 31.0));
+    if 0.5 + 0.5 * keep < in.threshold - 1e-4 {
+        discard;
+    }
+#endif
+    var surface: Surface;
+    surface.albedo = texel.rgb * part.base_color.rgb;
+#ifdef FOLIAGE
+    surface.albedo = tint_foliage(surface.albedo, in.look.w);
+#endif
+    surface.normal = normal;
+    surface.transmission = part.transmission.rgb;
+    let map = ground_map(in.relative);
+    surface.ambient = in.look.x * stand_ambient(in.look.z, map.y);
+    var visibility = terrain_visibility(map, in.look.y);
+    if visibility > 0.0 {
+        let near = cascaded_visibility(in.relative, normal);
+        visibility *= mix(1.0, near.x, near.y);
+    }
+    var color = shade(surface, visibility);
+    if frame.flags.y > 0.5 {
+        color = mix(color, vec3(0.15, 0.9, 0.2) * dot(color, vec3(0.5)), 0.6);
+    }
+    return vec4(night_vision(apply_fog(color, in.relative)), coverage);
+}

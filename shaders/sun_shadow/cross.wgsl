@@ -1,0 +1,49 @@
+// Depth from the key light: far trees as one upright picture that turns its face to the light's azimuth, so that the
+// shadow's area does not depend on it, and the level picture for a high light.
+#import canopy::instance::{trees, visible, variants, unpack_tree, turn}
+#import canopy::caster::{cascade, clamp_caster}
+
+@group(2) @binding(0) var color_pictures: texture_2d_array<f32>;
+@group(2) @binding(2) var picture_sampler: sampler;
+
+struct Varying {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) uv: vec2<f32>,
+    @location(1) @interpolate(flat) layer: u32,
+}
+
+const VERTICES_A_TREE: u32 = 12u;
+
+@vertex
+fn vertex(@builtin(vertex_index) index: u32) -> Varying {
+    var corners = array<vec2<f32>, 6>(
+        vec2(-1.0, -1.0), vec2(1.0, -1.0), vec2(1.0, 1.0), vec2(-1.0, -1.0), vec2(1.0, 1.0), vec2(-1.0, 1.0),
+    );
+    let tree = unpack_tree(trees[visible[index / VERTICES_A_TREE]]);
+    let upright = (index % VERTICES_A_TREE) < 6u;
+    let corner = corners[index % 6u];
+    let plane_index = select(2u, 0u, upright);
+    let plane = variants[tree.variant].planes[plane_index];
+    var u = turn(plane.u.xyz, tree.yaw);
+    let v = turn(plane.v.xyz, tree.yaw);
+    var center = turn(plane.center.xyz, tree.yaw);
+    if upright {
+        // Face the light's azimuth about the trunk's axis.
+        let across = cascade.direction.zx * vec2(1.0, -1.0);
+        let axis = across / max(length(across), 1e-6);
+        u = vec3(axis.x, 0.0, axis.y) * length(plane.u.xyz);
+        center = vec3(0.0, center.y, 0.0);
+    }
+    var out: Varying;
+    out.clip = clamp_caster(tree.position + (center + corner.x * u + corner.y * v) * tree.scale);
+    out.uv = vec2(0.5 + 0.5 * corner.x, 0.5 - 0.5 * corner.y);
+    out.layer = u32(variants[tree.variant].size.z) + plane_index;
+    return out;
+}
+
+@fragment
+fn fragment(in: Varying) {
+    if textureSample(color_pictures, picture_sampler, in.uv, in.layer).a < 0.5 {
+        discard;
+    }
+}

@@ -1,0 +1,135 @@
+// The ground: tiles that morph into each other (src/terrain/tiles), coloured by slope, height, canopy cover and noise.
+#import canopy::frame::{frame, light, shadow}
+#import canopy::lighting::{Surface, shade}
+#import canopy::sky::{apply_fog, night_vision}
+#import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
+
+struct TileVertex {
+    // Metres above the datum: own, and in the next coarser mesh.
+    height: f32,
+    parent_height: f32,
+    // Octahedral normals, two snorm16 each.
+    normal: u32,
+    parent_normal: u32,
+}
+
+struct Tile {
+    // North-western corner relative to the camera (x, z), metres.
+    origin: vec2<f32>,
+    spacing: f32,
+    // First vertex.
+    first: u32,
+    morph_start: f32,
+    morph_end: f32,
+    // Lower bound of the distance from the camera to the ground.
+    clearance: f32,
+    level: f32,
+}
+
+@group(1) @binding(0) var<storage, read> vertices: array<TileVertex>;
+@group(1) @binding(1) var<storage, read> tiles: array<Tile>;
+@group(1) @binding(2) var noise_texture: texture_2d<f32>;
+@group(1) @binding(3) var noise_sampler: sampler;
+
+const SIDE: u32 = 33u;
+
+struct Varying {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) relative: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+}
+
+fn decode_octahedral(packed: u32) -> vec3<f32> {
+    let e = unpack2x16snorm(packed);
+    var n = vec3(e.x, 1.0 - abs(e.x) - abs(e.y), e.y);
+    let t = max(-n.y, 0.0);
+    n.x += select(t, -t, n.x >= 0.0);
+    n.z += select(t, -t, n.z >= 0.0);
+    return normalize(n);
+}
+
+@vertex
+fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: u32) -> Varying {
+    let tile = tiles[instance];
+    let v = vertices[tile.first + index];
+    let grid = vec2(f32(index % SIDE), f32(index / SIDE));
+    let xz = tile.origin + grid * tile.spacing;
+    let distance = max(length(xz), tile.clearance);
+    let k = clamp((distance - tile.morph_start) / (tile.morph_end - tile.morph_start), 0.0, 1.0);
+    let height = mix(v.height, v.parent_height, k);
+    var out: Varying;
+    out.relative = vec3(xz.x, height - frame.camera.y, xz.y);
+    out.clip = frame.clip_from_relative * vec4(out.relative, 1.0);
+    out.normal = mix(decode_octahedral(v.normal), decode_octahedral(v.parent_normal), k);
+    return out;
+}
+
+// Noise of a period that divides NOISE_PERIOD: r smooth, g fine, b patchy, a ridged; each 0..1 around 0.5.
+fn noise(xz: vec2<f32>, period: f32) -> vec4<f32> {
+    return textureSample(noise_texture, noise_sampler, xz / period);
+}
+
+@fragment
+fn fragment(in: Varying) -> @location(0) vec4<f32> {
+    let smooth_normal = normalize(in.normal);
+    let xz = frame.camera.xz + in.relative.xz;
+    let distance = length(in.relative);
+    let wide = noise(xz, 512.0);
+    let middle = noise(xz, 64.0);
+    let fine = noise(xz, 8.0);
+    let grain = noise(xz, 2.0);
+
+    let map = ground_map(in.relative);
+    let uv = (in.relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;
+    let outside = max(max(-uv.x, uv.x - 1.0), max(-uv.y, uv.y - 1.0)) > 0.0;
+    var cover = map.y;
+    if outside {
+        cover = frame.flags.z;
+    }
+
+    // Detail in the normal, as far as it can be seen.
+    let detail = 1.0 - smoothstep(20.0, 120.0, distance);
+    let tilt = vec2(fine.r - fine.a, fine.g - fine.b) * 0.25 + vec2(grain.r - grain.g, grain.b - grain.a) * 0.35;
+    let normal = normalize(smooth_normal + vec3(tilt.x, 0.0, tilt.y) * detail);
+
+    let steepness = 1.0 - smooth_normal.y;
+    let litter = mix(vec3(0.075, 0.050, 0.030), vec3(0.135, 0.090, 0.050), clamp(fine.g * 1.4 - 0.2 + grain.g - 0.5, 0.0, 1.0));
+    let moss = mix(vec3(0.030, 0.048, 0.014), vec3(0.055, 0.080, 0.022), grain.b);
+    let floor_mix = smoothstep(0.45, 0.62, middle.b * 0.6 + fine.b * 0.4);
+    let forest_floor = mix(litter, moss, floor_mix * 0.75);
+    let lush = mix(vec3(0.050, 0.085, 0.020), vec3(0.095, 0.135, 0.035), fine.g);
+    let dry = mix(vec3(0.120, 0.115, 0.045), vec3(0.175, 0.155, 0.070), grain.g);
+    let meadow = mix(lush, dry, smoothstep(0.42, 0.68, wide.r * 0.5 + middle.r * 0.5)) * (0.8 + 0.4 * grain.r);
+    let rock = mix(vec3(0.13, 0.12, 0.105), vec3(0.26, 0.245, 0.22), fine.a * 0.6 + grain.a * 0.4);
+
+    let wooded = smoothstep(0.10, 0.45, cover + (middle.g - 0.5) * 0.25);
+    var albedo = mix(meadow, forest_floor, wooded);
+    // Wooded ground too far for its trees to be drawn is seen as crowns.
+    if outside {
+        let crowns = mix(vec3(0.028, 0.045, 0.013), vec3(0.050, 0.072, 0.022), middle.g);
+        albedo = mix(albedo, crowns, wooded);
+    }
+    let stony = smoothstep(0.30, 0.42, steepness + (middle.a - 0.5) * 0.15 + (fine.a - 0.5) * 0.08);
+    albedo = mix(albedo, rock, stony);
+    albedo *= 0.85 + 0.3 * middle.r;
+
+    var surface: Surface;
+    surface.albedo = albedo;
+    surface.normal = normal;
+    surface.transmission = vec3(0.0);
+    surface.ambient = (1.0 - 0.72 * cover) * (0.8 + 0.2 * grain.r);
+    if outside {
+        surface.ambient = 0.85;
+    }
+
+    var visibility = select(terrain_visibility(map, 0.0), 1.0, outside);
+    if visibility > 0.0 {
+        let near = cascaded_visibility(in.relative, smooth_normal);
+        // Beyond the maps: the share of light that finds its way between the crowns.
+        let sine = max(light.key_direction.w, 0.12);
+        let between = select(pow(max(1.0 - 0.92 * cover, 0.02), 1.0 / sine), 1.0, outside);
+        visibility *= mix(between, near.x, near.y);
+    }
+    let color = shade(surface, visibility);
+    return vec4(night_vision(apply_fog(color, in.relative)), 1.0);
+}

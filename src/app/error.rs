@@ -1,0 +1,115 @@
+//! What can stop the program: every cause in one type, each with its own place and remedy.
+
+use std::path::PathBuf;
+
+/// Why a scene cannot be shown.
+#[derive(Debug, thiserror::Error)]
+pub enum AppError {
+    /// The scene file.
+    #[error(transparent)]
+    Scene(#[from] crate::scene::SceneError),
+    /// The request.
+    #[error(transparent)]
+    Plan(#[from] crate::scene::PlanError),
+    /// The terrain.
+    #[error(transparent)]
+    Terrain(#[from] crate::terrain::TerrainError),
+    /// A plant's file.
+    #[error(transparent)]
+    Plant(#[from] crate::plant::gltf::PlantError),
+    /// A grown species.
+    #[error("{}: {source}", path.display())]
+    Grow {
+        /// The species file, or the preset's name.
+        path: PathBuf,
+        /// What is wrong.
+        source: crate::plant::grow::GrowError,
+    },
+    /// The stand.
+    #[error(transparent)]
+    Stand(#[from] crate::scatter::ScatterError),
+    /// Sun and sky.
+    #[error(transparent)]
+    Light(#[from] crate::light::LightError),
+    /// A file that cannot be read.
+    #[error("{}: {source}; check the path and its permissions", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// A picture that cannot be written.
+    #[error("{}: {source}; choose a folder that can be written, with --out", path.display())]
+    Write {
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// No graphics adapter.
+    #[error(
+        "no Vulkan driver was found{details}; install one for your graphics card, or the software driver (Debian, \
+         Ubuntu: apt-get install libvulkan1 mesa-vulkan-drivers)"
+    )]
+    NoAdapter {
+        /// What was looked for, with a leading comma or blank.
+        details: String,
+    },
+    /// The adapter that was asked for is not there.
+    #[error("no graphics adapter has a name with `{wanted}` in it; there are: {present} (see --list-adapters)")]
+    UnknownAdapter {
+        /// What was asked for.
+        wanted: String,
+        /// Names of those that are there.
+        present: String,
+    },
+    /// A picture that the device cannot hold.
+    #[error("a picture of {width}x{height} is beyond this device's limit of {limit} pixels a side; choose a smaller --size")]
+    TooLarge {
+        /// Width asked for.
+        width: u32,
+        /// Height asked for.
+        height: u32,
+        /// The device's limit.
+        limit: u32,
+    },
+    /// Rendering failed.
+    #[error("rendering failed: {0}")]
+    Render(String),
+    /// Too many plants for one forest.
+    #[error(
+        "the scene's species have {count} individuals together, but a forest holds at most {limit}; lower `individuals`"
+    )]
+    TooManyPlants {
+        /// Individuals.
+        count: usize,
+        /// Most there can be.
+        limit: usize,
+    },
+    /// Nobody knows where on earth the scene lies.
+    #[error("{}: the terrain does not say where on earth it lies; add `place: (latitude: ..., longitude: ...)`", path.display())]
+    NoPlace {
+        /// The scene file.
+        path: PathBuf,
+    },
+    /// An inventory whose coordinates say nothing about where it lies on the terrain.
+    #[error(
+        "{}: the terrain has no coordinate system of the kind that these positions are in; use a terrain file of the \
+         same system, or metres and `anchor: Middle`",
+        path.display()
+    )]
+    NoReference {
+        /// The inventory.
+        path: PathBuf,
+    },
+    /// A file of unknown kind.
+    #[error(
+        "{}: this is no plant (.glb, .gltf), terrain (.tif, .asc, .hgt, .png), inventory (.csv) or scene (.ron) file",
+        path.display()
+    )]
+    UnknownKind {
+        /// The file.
+        path: PathBuf,
+    },
+}

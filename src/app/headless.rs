@@ -1,0 +1,331 @@
+//! Pictures without a window: the frames of a plan, one after another, each a function of its own arguments.
+
+use std::{path::Path, sync::Arc, time::Instant};
+
+use bevy::{
+    app::{App, PluginGroup, PluginsState},
+    asset::{Assets, Handle, RenderAssetUsages},
+    camera::{Camera, Camera3d, PerspectiveProjection, Projection, RenderTarget},
+    core_pipeline::tonemapping::Tonemapping,
+    ecs::entity::Entity,
+    image::Image,
+    log::{Level, LogPlugin},
+    prelude::{DefaultPlugins, Transform},
+    render::{
+        RenderApp, RenderPlugin,
+        pipelined_rendering::PipelinedRenderingPlugin,
+        render_asset::RenderAssets,
+        render_resource::{
+            BufferDescriptor, BufferUsages, CommandEncoderDescriptor, Extent3d, MapMode, PollType,
+            TexelCopyBufferInfo, TexelCopyBufferLayout, TextureDimension, TextureFormat, TextureUsages,
+        },
+        renderer::{RenderDevice, RenderQueue},
+        settings::RenderCreation,
+        texture::GpuImage,
+        view::Msaa,
+    },
+    window::{ExitCondition, WindowPlugin},
+    winit::WinitPlugin,
+};
+use chrono::{DateTime, Utc};
+use glam::DVec3;
+
+use super::{adapter, error::AppError, picture::Picture, stage::Stage};
+use crate::{
+    CanopyPlugins,
+    render::{
+        components::{CanopyCamera, CanopyOrigin},
+        report::{FrameReport, PassOutcome},
+    },
+    scene::{Frame, Progress, RenderOptions, RenderPlan, RenderReport, Viewpoint},
+};
+
+/// Metres to which the Bevy world's origin is rounded near the camera.
+const ORIGIN_STEP: f64 = 1024.0;
+
+/// Draws the pictures that `options` ask for.
+///
+/// # Errors
+/// [`AppError`]; pictures that were finished before it stay, nothing half-written does.
+pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<RenderReport, AppError> {
+    let stage = Stage::build(&options.scene, options.seed, progress)?;
+    let plan = RenderPlan::new(options, &stage.scene, &|x, z| stage.terrain.height(x, z))?;
+    check_writable(&plan)?;
+    let started = Instant::now();
+    progress.begin("Renderer", 0);
+    let mut renderer = Renderer::new(options.size, options.adapter.as_deref(), stage.scene.quality.msaa)?;
+    renderer.show(&stage);
+    progress.end();
+    progress.note(&format!("renderer: {:.2} s", started.elapsed().as_secs_f64()));
+    let mut report = RenderReport::default();
+    progress.begin("Pictures", plan.frames.len() as u64);
+    for frame in &plan.frames {
+        let started = Instant::now();
+        let picture = renderer.draw(&stage, &frame.view, frame.instant)?;
+        let drawn = started.elapsed().as_secs_f64();
+        picture.save(&frame.file, &notes(&stage, frame, options))?;
+        progress.note(&format!(
+            "{}: drawn in {drawn:.2} s, written in {:.2} s",
+            frame.file.display(),
+            started.elapsed().as_secs_f64() - drawn
+        ));
+        if options.explain {
+            report.explanation.push(format!("{}:", frame.file.display()));
+            report.explanation.extend(renderer.explain());
+        }
+        report.files.push(frame.file.clone());
+        progress.advance(1);
+    }
+    progress.end();
+    Ok(report)
+}
+
+/// Finds out before the long work whether its results can be kept.
+fn check_writable(plan: &RenderPlan) -> Result<(), AppError> {
+    let Some(frame) = plan.frames.first() else { return Ok(()) };
+    let folder = match frame.file.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let failed = |source| AppError::Write { path: folder.to_owned(), source };
+    std::fs::create_dir_all(folder).map_err(failed)?;
+    tempfile::Builder::new().prefix(".canopy-").tempfile_in(folder).map_err(failed)?;
+    Ok(())
+}
+
+/// What a picture's text chunks say: enough to make it again.
+fn notes(stage: &Stage, frame: &Frame, options: &RenderOptions) -> Vec<(&'static str, String)> {
+    let view = &frame.view;
+    vec![
+        ("Software", format!("Canopy {}", env!("CARGO_PKG_VERSION"))),
+        ("Title", stage.scene.name.clone()),
+        ("Scene", options.scene.display().to_string()),
+        ("Instant", frame.instant.to_rfc3339()),
+        ("Place", format!("{:.6}, {:.6}", stage.observer.latitude_deg, stage.observer.longitude_deg)),
+        (
+            "Camera",
+            format!(
+                "position {:.3}, {:.3}, {:.3} m; yaw {:.4} rad; pitch {:.4} rad; field of view {:.4} rad",
+                view.position.x, view.position.y, view.position.z, view.yaw, view.pitch, view.field_of_view
+            ),
+        ),
+        ("Seed", stage.scene.seed.to_string()),
+        ("Quality", format!("{:?}", stage.scene.quality)),
+    ]
+}
+
+/// A renderer without a window, driven frame by frame.
+pub struct Renderer {
+    app: App,
+    camera: Entity,
+    target: Handle<Image>,
+    size: (u32, u32),
+    warm: bool,
+}
+
+impl Renderer {
+    /// A renderer for pictures of `size` pixels on the adapter whose name contains `adapter`, with `msaa` samples.
+    ///
+    /// # Errors
+    /// [`AppError::NoAdapter`], [`AppError::UnknownAdapter`], [`AppError::TooLarge`].
+    pub fn new(size: (u32, u32), adapter: Option<&str>, msaa: u32) -> Result<Self, AppError> {
+        let settings = adapter::settings(adapter)?;
+        let mut app = App::new();
+        app.add_plugins(
+            DefaultPlugins
+                .set(WindowPlugin {
+                    primary_window: None,
+                    exit_condition: ExitCondition::DontExit,
+                    ..WindowPlugin::default()
+                })
+                .set(RenderPlugin {
+                    render_creation: RenderCreation::Automatic(Box::new(settings)),
+                    synchronous_pipeline_compilation: true,
+                    ..RenderPlugin::default()
+                })
+                .set(LogPlugin { level: Level::WARN, ..LogPlugin::default() })
+                .disable::<WinitPlugin>()
+                .disable::<PipelinedRenderingPlugin>(),
+        );
+        app.add_plugins(CanopyPlugins);
+        while app.plugins_state() == PluginsState::Adding {
+            bevy::tasks::tick_global_task_pools_on_main_thread();
+        }
+        app.finish();
+        app.cleanup();
+        let limit = app.world().resource::<RenderDevice>().limits().max_texture_dimension_2d;
+        if size.0 > limit || size.1 > limit || size.0 == 0 || size.1 == 0 {
+            return Err(AppError::TooLarge { width: size.0, height: size.1, limit });
+        }
+        let target = render_target(&mut app, size);
+        let camera = app
+            .world_mut()
+            .spawn((
+                Camera3d::default(),
+                Camera { is_active: false, ..Camera::default() },
+                RenderTarget::from(target.clone()),
+                CanopyCamera,
+                Msaa::from_samples(msaa),
+                Tonemapping::TonyMcMapface,
+            ))
+            .id();
+        Ok(Self { app, camera, target, size, warm: false })
+    }
+
+    /// The Bevy app, to put further entities into its world.
+    pub fn app(&mut self) -> &mut App {
+        &mut self.app
+    }
+
+    /// Shows `stage`: its ground, its forest, its quality.
+    pub fn show(&mut self, stage: &Stage) {
+        let world = self.app.world_mut();
+        world.spawn(stage.ground());
+        if let Some(forest) = stage.forest() {
+            world.spawn(forest);
+        }
+        world.insert_resource(stage.shadow());
+    }
+
+    /// Sets the light's place and instant, as the scene has them.
+    pub fn set_instant(&mut self, stage: &Stage, instant: DateTime<Utc>) {
+        let sky = stage.sky(instant);
+        let world = self.app.world_mut();
+        if world.get_resource() != Some(&sky) {
+            world.insert_resource(sky);
+        }
+    }
+
+    /// Places the camera.
+    pub fn set_view(&mut self, view: &Viewpoint) {
+        let origin = (view.position / ORIGIN_STEP).round() * ORIGIN_STEP;
+        let world = self.app.world_mut();
+        world.insert_resource(CanopyOrigin(origin));
+        let transform = Transform {
+            translation: (view.position - origin).as_vec3(),
+            rotation: view.rotation().as_quat(),
+            ..Transform::default()
+        };
+        let projection = Projection::Perspective(PerspectiveProjection {
+            fov: view.field_of_view as f32,
+            near: 0.1,
+            ..PerspectiveProjection::default()
+        });
+        world.entity_mut(self.camera).insert((transform, projection));
+    }
+
+    /// Draws one frame and waits until the device has finished it.
+    pub fn update(&mut self) -> Result<(), AppError> {
+        if !self.warm {
+            // The first update brings meshes, textures and shaders to the device, and draws nothing yet.
+            self.app.update();
+            self.warm = true;
+            if let Some(mut camera) = self.app.world_mut().get_mut::<Camera>(self.camera) {
+                camera.is_active = true;
+            }
+        }
+        self.app.update();
+        let device = self.app.world().resource::<RenderDevice>();
+        let waited = device.wgpu_device().poll(PollType::Wait { submission_index: None, timeout: None });
+        waited.map_err(|error| AppError::Render(error.to_string()))?;
+        match self.app.should_exit() {
+            Some(exit) if exit.is_error() => {
+                Err(AppError::Render("the graphics device reported an error (see above)".to_owned()))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Draws `stage` from `view` at `instant`.
+    ///
+    /// # Errors
+    /// [`AppError::Render`].
+    pub fn draw(&mut self, stage: &Stage, view: &Viewpoint, instant: DateTime<Utc>) -> Result<Picture, AppError> {
+        self.set_instant(stage, instant);
+        self.set_view(view);
+        self.update()?;
+        self.read()
+    }
+
+    /// What the last frame ran and skipped, one line a pass.
+    pub fn explain(&self) -> Vec<String> {
+        let report = self.app.world().resource::<FrameReport>();
+        let line = |(pass, outcome)| match outcome {
+            PassOutcome::Ran(on) => format!("  {pass}: ran ({on})"),
+            PassOutcome::Skipped(why) => format!("  {pass}: skipped ({why})"),
+        };
+        report.outcomes().into_iter().map(line).collect()
+    }
+
+    /// Reads the last frame back.
+    ///
+    /// # Errors
+    /// [`AppError::Render`].
+    pub fn read(&self) -> Result<Picture, AppError> {
+        let failed = |what: &str| AppError::Render(format!("the picture could not be read back: {what}"));
+        let render_world = self.app.sub_app(RenderApp).world();
+        let device = render_world.resource::<RenderDevice>();
+        let queue = render_world.resource::<RenderQueue>();
+        let images = render_world.resource::<RenderAssets<GpuImage>>();
+        let image = images.get(&self.target).ok_or_else(|| failed("it was never drawn"))?;
+        let (width, height) = self.size;
+        let row = RenderDevice::align_copy_bytes_per_row(4 * width as usize);
+        let buffer = device.create_buffer(&BufferDescriptor {
+            label: Some("canopy_readback"),
+            size: row as u64 * u64::from(height),
+            usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor::default());
+        encoder.copy_texture_to_buffer(
+            image.texture.as_image_copy(),
+            TexelCopyBufferInfo {
+                buffer: &buffer,
+                layout: TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row as u32), rows_per_image: None },
+            },
+            Extent3d { width, height, depth_or_array_layers: 1 },
+        );
+        queue.submit([encoder.finish()]);
+        let outcome = Arc::new(std::sync::Mutex::new(None));
+        let told = outcome.clone();
+        let slice = buffer.slice(..);
+        slice.map_async(MapMode::Read, move |result| {
+            if let Ok(mut slot) = told.lock() {
+                *slot = Some(result);
+            }
+        });
+        device
+            .wgpu_device()
+            .poll(PollType::Wait { submission_index: None, timeout: None })
+            .map_err(|error| failed(&error.to_string()))?;
+        match outcome.lock().ok().and_then(|mut slot| slot.take()) {
+            Some(Ok(())) => {}
+            Some(Err(error)) => return Err(failed(&error.to_string())),
+            None => return Err(failed("the device did not answer")),
+        }
+        let mapped = slice.get_mapped_range();
+        let mut pixels = Vec::with_capacity(3 * (width * height) as usize);
+        for line in mapped.chunks_exact(row) {
+            for pixel in line[..4 * width as usize].chunks_exact(4) {
+                pixels.extend_from_slice(&pixel[..3]);
+            }
+        }
+        Ok(Picture { width, height, pixels })
+    }
+
+    /// Camera position of a viewpoint in scene metres, for tests that place things before it.
+    pub fn ahead(view: &Viewpoint, metres: f64) -> DVec3 {
+        view.position + view.forward() * metres
+    }
+}
+
+fn render_target(app: &mut App, (width, height): (u32, u32)) -> Handle<Image> {
+    let mut image = Image::new_uninit(
+        Extent3d { width, height, depth_or_array_layers: 1 },
+        TextureDimension::D2,
+        TextureFormat::Rgba8UnormSrgb,
+        RenderAssetUsages::RENDER_WORLD,
+    );
+    image.texture_descriptor.usage |= TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC;
+    app.world_mut().resource_mut::<Assets<Image>>().add(image)
+}

@@ -1,0 +1,251 @@
+//! From a validated scene to what the renderer shows: terrain, plants, stand, baked and packed.
+
+use std::{path::Path, sync::Arc, time::Instant};
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::{error::AppError, plants, trees};
+use crate::{
+    bake::{BakeSource, BakedPlant, bake_plant, cache::Cache},
+    light::{MoonSetting, sun::Observer},
+    lod::FadeBand,
+    render::{
+        components::{Forest, Ground, SunShadowSettings},
+        daylight::SkySettings,
+    },
+    scatter::{CoverMap, PackedStand, VariantBounds, cover_map, packed::DEFAULT_CELL_SIZE},
+    scene::{self, Progress, Quality, Scene},
+    terrain::{
+        HeightField, NoiseKind, NoiseTerrain, ReadOptions, Surroundings, Terrain,
+        read::{Crop, ImageScale},
+        read_terrain,
+    },
+};
+
+/// Metres a texel of the cover map.
+const COVER_TEXEL: f64 = 8.0;
+/// Share of a plant's half width that counts as its crown's radius.
+const CROWN_SHARE: f32 = 0.8;
+
+/// A scene, built.
+pub struct Stage {
+    /// The ground.
+    pub terrain: Arc<Terrain>,
+    /// The trees.
+    pub stand: Arc<PackedStand>,
+    /// Their plants, by variant.
+    pub plants: Arc<Vec<BakedPlant>>,
+    /// Share of ground under crowns; `None` without trees.
+    pub cover: Option<Arc<CoverMap>>,
+    /// Place on earth.
+    pub observer: Observer,
+    /// The scene as written.
+    pub scene: Scene,
+}
+
+impl Stage {
+    /// Builds the scene in `path`; `seed` replaces the scene's.
+    ///
+    /// # Errors
+    /// [`AppError`] for anything in the scene or its files that cannot be used.
+    pub fn build(path: &Path, seed: Option<u64>, progress: &mut dyn Progress) -> Result<Self, AppError> {
+        let mut scene = Scene::read(path)?;
+        if let Some(seed) = seed {
+            scene.seed = seed;
+        }
+        let started = Instant::now();
+        progress.begin("Terrain", 0);
+        let terrain = Arc::new(build_terrain(&scene.terrain, progress)?);
+        progress.end();
+        progress.note(&format!("terrain: {:.2} s", started.elapsed().as_secs_f64()));
+        let observer = observer(&scene, &terrain, path)?;
+
+        let has_trees = !matches!(scene.trees, scene::Trees::None);
+        let species = if has_trees { plants::plan(&scene)? } else { plants::PlantPlan::default() };
+        let baked = bake(&species, &scene.quality, progress)?;
+        let plants: Vec<BakedPlant> = baked;
+
+        let started = Instant::now();
+        progress.begin("Trees", 0);
+        let stand = trees::build_stand(&scene, &species, &plants, &terrain, progress)?;
+        let bounds: Vec<VariantBounds> = plants.iter().map(variant_bounds).collect();
+        let packed = PackedStand::new(&stand, DEFAULT_CELL_SIZE, &bounds)?;
+        let cover = if stand.trees.is_empty() {
+            None
+        } else {
+            let crowns: Vec<VariantBounds> = bounds
+                .iter()
+                .map(|bounds| VariantBounds { radius: bounds.radius * CROWN_SHARE, height: bounds.height })
+                .collect();
+            Some(Arc::new(cover_map(&packed, &crowns, COVER_TEXEL, None)?))
+        };
+        progress.end();
+        progress.note(&format!("{} trees: {:.2} s", stand.trees.len(), started.elapsed().as_secs_f64()));
+        if has_trees && stand.trees.is_empty() {
+            progress.warn("the scene's rules leave no place for any tree: only the ground is drawn");
+        }
+        Ok(Self { terrain, stand: Arc::new(packed), plants: Arc::new(plants), cover, observer, scene })
+    }
+
+    /// The forest of the scene, or `None` without trees.
+    pub fn forest(&self) -> Option<Forest> {
+        let quality = &self.scene.quality;
+        (!self.stand.trees.is_empty()).then(|| Forest {
+            stand: self.stand.clone(),
+            plants: self.plants.clone(),
+            origin: DVec3::ZERO,
+            fade: FadeBand::new(quality.near_distance as f32, quality.fade_band as f32),
+            view_distance: quality.view_distance as f32,
+        })
+    }
+
+    /// The ground of the scene.
+    pub fn ground(&self) -> Ground {
+        Ground {
+            terrain: self.terrain.clone(),
+            cover: self.cover.clone(),
+            error_pixels: self.scene.quality.terrain_error,
+            view_distance: self.scene.quality.view_distance,
+        }
+    }
+
+    /// Shadows as the scene's quality asks for them.
+    pub fn shadow(&self) -> SunShadowSettings {
+        let quality = &self.scene.quality;
+        SunShadowSettings {
+            map_size: quality.shadow_map_size,
+            cascades: quality.cascades as usize,
+            distance: quality.shadow_distance,
+            ..SunShadowSettings::default()
+        }
+    }
+
+    /// Sun, moon and air at an instant.
+    pub fn sky(&self, instant: chrono::DateTime<chrono::Utc>) -> SkySettings {
+        SkySettings {
+            observer: self.observer,
+            instant,
+            moon: match self.scene.place.moon {
+                scene::Moon::Full => MoonSetting::FullOpposite,
+                scene::Moon::Astronomical => MoonSetting::Astronomical,
+                scene::Moon::None => MoonSetting::None,
+            },
+            visibility_km: self.scene.place.visibility * 1e-3,
+        }
+    }
+}
+
+fn observer(scene: &Scene, terrain: &Terrain, path: &Path) -> Result<Observer, AppError> {
+    let known = terrain.reference().and_then(|reference| reference.latitude_longitude());
+    let latitude = scene.place.latitude.or(known.map(|place| place.0));
+    let longitude = scene.place.longitude.or(known.map(|place| place.1));
+    let (Some(latitude), Some(longitude)) = (latitude, longitude) else {
+        return Err(AppError::NoPlace { path: path.to_owned() });
+    };
+    let height = terrain.height(0.0, 0.0).clamp(-500.0, 9000.0);
+    Ok(Observer::new(latitude, longitude, height)?)
+}
+
+fn variant_bounds(plant: &BakedPlant) -> VariantBounds {
+    plant.plant.bounds().map_or(VariantBounds { radius: 0.1, height: 0.1 }, |bounds| {
+        let size = bounds.size();
+        VariantBounds { radius: (0.5 * size.x.max(size.z)).max(0.01), height: bounds.max.y.max(0.01) }
+    })
+}
+
+fn build_terrain(ground: &scene::Ground, progress: &mut dyn Progress) -> Result<Terrain, AppError> {
+    let surroundings = Surroundings::Mirror;
+    let read = |path: &Path, options: ReadOptions, progress: &mut dyn Progress| -> Result<Terrain, AppError> {
+        let (terrain, warnings) = read_terrain(path, &options)?;
+        for warning in warnings {
+            progress.warn(&format!("{}: {warning}", path.display()));
+        }
+        Ok(terrain)
+    };
+    Ok(match ground {
+        scene::Ground::File(file) => {
+            let crop =
+                file.crop.map(|c| Crop { west: c.west, south: c.south, east: c.east, north: c.north });
+            let terrain = read(&file.path, ReadOptions { crop, surroundings, ..ReadOptions::default() }, progress)?;
+            exaggerated(terrain, file.exaggeration)?
+        }
+        scene::Ground::Image(image) => {
+            let scale = ImageScale { spacing: image.spacing, lowest: image.low, highest: image.high };
+            let options = ReadOptions { image_scale: Some(scale), surroundings, ..ReadOptions::default() };
+            read(&image.path, options, progress)?
+        }
+        scene::Ground::Noise(noise) => {
+            let spacing = noise.spacing_m();
+            let samples = ((noise.size / spacing).round() as usize + 1).max(2);
+            let field = NoiseTerrain {
+                columns: samples,
+                rows: samples,
+                spacing: noise.size / (samples - 1) as f64,
+                seed: noise.seed,
+                kind: if noise.ridged { NoiseKind::Ridged } else { NoiseKind::Rolling },
+                octaves: noise.octaves as usize,
+                amplitude: noise.amplitude,
+                wavelength: noise.wavelength,
+                persistence: noise.roughness,
+                base: noise.base,
+            }
+            .height_field()?;
+            Terrain::new(field, None, surroundings)
+        }
+        scene::Ground::Flat(flat) => {
+            let field = HeightField::new(2, 2, DVec2::splat(flat.size), vec![0.0; 4])?;
+            Terrain::new(field, None, surroundings)
+        }
+    })
+}
+
+fn exaggerated(terrain: Terrain, factor: f64) -> Result<Terrain, AppError> {
+    if factor == 1.0 {
+        return Ok(terrain);
+    }
+    let field = terrain.field();
+    let heights = field.heights().iter().map(|height| (f64::from(*height) * factor) as f32).collect();
+    let field = HeightField::new(field.columns(), field.rows(), field.spacing(), heights)?;
+    Ok(Terrain::new(field, terrain.reference().cloned(), terrain.surroundings()))
+}
+
+fn bake(
+    species: &plants::PlantPlan,
+    quality: &Quality,
+    progress: &mut dyn Progress,
+) -> Result<Vec<BakedPlant>, AppError> {
+    let started = Instant::now();
+    progress.begin("Plants", species.sources.len() as u64);
+    let cache = Cache::of_user();
+    let settings = plants::bake_settings(quality);
+    let mut baked = Vec::with_capacity(species.sources.len());
+    let mut fresh = 0;
+    // A few at a time: in parallel, and still with progress.
+    for group in species.sources.chunks(rayon::current_num_threads().max(1)) {
+        let results: Vec<_> = group
+            .par_iter()
+            .map(|source| {
+                let (plant, warnings) = source.build()?;
+                Ok((bake_plant(Arc::new(plant), &settings, cache.as_ref()), warnings))
+            })
+            .collect::<Result<_, AppError>>()?;
+        for ((plant, source), warnings) in results {
+            for warning in warnings {
+                progress.warn(&warning);
+            }
+            if let BakeSource::Fresh { warning } = source {
+                fresh += 1;
+                if let Some(warning) = warning {
+                    progress.warn(&warning.to_string());
+                }
+            }
+            baked.push(plant);
+            progress.advance(1);
+        }
+    }
+    progress.end();
+    let seconds = started.elapsed().as_secs_f64();
+    progress.note(&format!("{} plants, {fresh} baked anew: {seconds:.2} s", baked.len()));
+    Ok(baked)
+}

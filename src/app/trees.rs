@@ -1,0 +1,220 @@
+//! The stand of a scene: scattered by rule or read from an inventory.
+
+use glam::{DVec2, DVec3};
+
+use super::{error::AppError, plants::PlantPlan};
+use crate::{
+    bake::BakedPlant,
+    scatter::{
+        Allometry, Area, ClearingNoise, Coordinates, Ground, Inventory, InventoryOptions, InventorySpecies, LengthUnit, PlacementRules,
+        Sequence, SizeRule, SpeciesRule, Stand, place, read_inventory, stand_from_inventory,
+    },
+    scene::{self, Anchor, InventoryTrees, Progress, ScatteredTrees, Scene, Species, Trees},
+    terrain::{CoordinateSystem, GeoReference, Terrain},
+};
+
+/// Trees stand on the terrain's own samples only, not on its mirrored surroundings.
+impl Ground for Terrain {
+    fn height(&self, x: f64, z: f64) -> f64 {
+        Terrain::height(self, x, z)
+    }
+
+    fn slope(&self, x: f64, z: f64) -> f32 {
+        Terrain::slope(self, x, z)
+    }
+
+    fn contains(&self, x: f64, z: f64) -> bool {
+        Terrain::contains(self, x, z)
+    }
+}
+
+/// Builds the stand of `scene` on `terrain`.
+///
+/// # Errors
+/// [`AppError`] for rules that cannot be met and inventories that cannot be read.
+pub fn build_stand(
+    scene: &Scene,
+    plan: &PlantPlan,
+    plants: &[BakedPlant],
+    terrain: &Terrain,
+    progress: &mut dyn Progress,
+) -> Result<Stand, AppError> {
+    match &scene.trees {
+        Trees::None => Ok(Stand::default()),
+        Trees::Scattered(rules) => scatter(scene, rules, plan, plants, terrain, progress),
+        Trees::Inventory(inventory) => from_inventory(scene, inventory, plan, plants, terrain, progress),
+    }
+}
+
+fn plant_heights(variants: &std::ops::Range<u16>, plants: &[BakedPlant]) -> Vec<f32> {
+    variants
+        .clone()
+        .map(|variant| plants.get(usize::from(variant)).map_or(1.0, |plant| plant.plant.height()).max(0.01))
+        .collect()
+}
+
+/// Trunk radius at scale 1, where a species states it for a tree of mean height.
+fn trunk_radius(species: &Species, heights: &[f32]) -> f32 {
+    let mean_plant = heights.iter().sum::<f32>() / heights.len().max(1) as f32;
+    species.trunk_radius_m() as f32 * mean_plant / species.mean_height() as f32
+}
+
+fn scatter(
+    scene: &Scene,
+    trees: &ScatteredTrees,
+    plan: &PlantPlan,
+    plants: &[BakedPlant],
+    terrain: &Terrain,
+    progress: &mut dyn Progress,
+) -> Result<Stand, AppError> {
+    let extent = terrain.extent();
+    let area = trees.area.map_or(Area::centered(DVec2::ZERO, extent), |area| Area {
+        min: DVec2::new(area.west, -area.north),
+        max: DVec2::new(area.east, -area.south),
+    });
+    let species = scene
+        .species
+        .iter()
+        .zip(&plan.variants)
+        .map(|(species, variants)| {
+            let heights = plant_heights(variants, plants);
+            let (low, high) = (species.height.0 as f32, species.height.1 as f32);
+            SpeciesRule {
+                weight: species.weight,
+                height_range_m: species.elevation,
+                slope_limit: Some((species.slope_limit as f32).to_radians()),
+                trunk_radius_m: trunk_radius(species, &heights),
+                size: SizeRule::Height {
+                    mean_m: 0.5 * (low + high),
+                    // The bell ends at 2 sqrt(3) deviations from its mean: at the range's ends.
+                    deviation_m: 0.5 * (high - low) / (2.0 * 3f32.sqrt()) * 0.999,
+                    plant_heights_m: heights,
+                },
+                variants: variants.clone(),
+            }
+        })
+        .collect();
+    let rules = PlacementRules {
+        stems_per_hectare: trees.stems_per_hectare,
+        sequence: match trees.sequence {
+            scene::Sequence::Halton => Sequence::Halton,
+            scene::Sequence::Hammersley => Sequence::Hammersley,
+            scene::Sequence::Random => Sequence::Random,
+        },
+        seed: scene.seed,
+        min_distance_m: trees.min_distance,
+        slope_limit: (trees.slope_limit as f32).to_radians(),
+        height_range_m: trees.elevation,
+        area,
+        clearings: trees.clearings.map(|clearings| ClearingNoise {
+            wavelength_m: clearings.wavelength,
+            cover: clearings.share,
+            edge: clearings.edge,
+        }),
+        species,
+    };
+    let placement = place(&rules, terrain)?;
+    let report = &placement.report;
+    if report.placed < report.wanted {
+        progress.warn(&format!(
+            "{} of {} trees found no place with a least distance of {} m; lower it or the density",
+            report.wanted - report.placed,
+            report.wanted,
+            rules.min_distance_m
+        ));
+    }
+    progress.note(&format!(
+        "{:.0} stems per hectare on {:.0} wooded hectares",
+        report.stems_per_hectare, report.allowed_hectares
+    ));
+    Ok(placement.stand)
+}
+
+fn from_inventory(
+    scene: &Scene,
+    trees: &InventoryTrees,
+    plan: &PlantPlan,
+    plants: &[BakedPlant],
+    terrain: &Terrain,
+    progress: &mut dyn Progress,
+) -> Result<Stand, AppError> {
+    let unit = |unit: scene::LengthUnit| match unit {
+        scene::LengthUnit::Metres => LengthUnit::Metre,
+        scene::LengthUnit::Centimetres => LengthUnit::Centimetre,
+        scene::LengthUnit::Millimetres => LengthUnit::Millimetre,
+    };
+    let options = InventoryOptions { dbh_unit: unit(trees.dbh_unit), height_unit: unit(trees.height_unit) };
+    let inventory = read_inventory(&trees.path, options)?;
+    let table = species_table(scene, trees, plan, plants);
+    let to_local = placement(trees, &inventory, terrain)?;
+    let result = stand_from_inventory(&inventory.rows, to_local, terrain, &table, scene.seed)?;
+    for line in result.warnings.to_string().lines() {
+        progress.warn(&format!("{}: {line}", trees.path.display()));
+    }
+    Ok(result.stand)
+}
+
+/// Where the coordinates of an inventory lie on the terrain.
+fn placement<'a>(
+    trees: &InventoryTrees,
+    inventory: &Inventory,
+    terrain: &'a Terrain,
+) -> Result<Box<dyn Fn(f64, f64) -> DVec3 + 'a>, AppError> {
+    let on_ground = |place: DVec2| DVec3::new(place.x, 0.0, place.y);
+    let reference = terrain.reference();
+    let unknown = || AppError::NoReference { path: trees.path.clone() };
+    let geographic = |reference: &GeoReference| reference.system() == CoordinateSystem::Geographic;
+    if inventory.coordinates == Coordinates::Geographic {
+        let reference = reference.filter(|reference| geographic(reference)).ok_or_else(unknown)?;
+        return Ok(Box::new(move |x, y| on_ground(reference.to_local(x, y))));
+    }
+    if trees.anchor == Anchor::Terrain {
+        let reference = reference.filter(|reference| !geographic(reference)).ok_or_else(unknown)?;
+        return Ok(Box::new(move |x, y| on_ground(reference.to_local(x, y))));
+    }
+    let all = |start: f64, fold: fn(f64, f64) -> f64| {
+        DVec2::new(
+            inventory.rows.iter().map(|row| row.x).fold(start, fold),
+            inventory.rows.iter().map(|row| row.y).fold(start, fold),
+        )
+    };
+    let span = (all(f64::INFINITY, f64::min), all(f64::NEG_INFINITY, f64::max));
+    let origin = trees.anchor.origin(span, terrain.extent()).ok_or_else(unknown)?;
+    // The file's y runs north, the scene's z south.
+    Ok(Box::new(move |x, y| on_ground(DVec2::new(x - origin.x, origin.y - y))))
+}
+
+/// The default species first: the table's first takes trees of unknown species.
+fn species_table(
+    scene: &Scene,
+    trees: &InventoryTrees,
+    plan: &PlantPlan,
+    plants: &[BakedPlant],
+) -> Vec<InventorySpecies> {
+    let entry = |name: &str, species: &Species, variants: &std::ops::Range<u16>| {
+        let heights = plant_heights(variants, plants);
+        InventorySpecies {
+            name: name.to_owned(),
+            variants: variants.clone(),
+            default_height_m: trees.default_height.unwrap_or(species.mean_height()) as f32,
+            allometry: Allometry::default(),
+            trunk_radius_m: trunk_radius(species, &heights),
+            plant_heights_m: heights,
+        }
+    };
+    let known: Vec<_> = scene.species.iter().zip(&plan.variants).collect();
+    let by_name = |name: &str| known.iter().find(|(species, _)| species.name == name);
+    let default = trees.default_species.as_deref().and_then(by_name).or(known.first());
+    let mut table: Vec<InventorySpecies> = default.iter().map(|(s, v)| entry(&s.name, s, v)).collect();
+    for (species, variants) in &known {
+        if table.iter().all(|row| row.name != species.name) {
+            table.push(entry(&species.name, species, variants));
+        }
+    }
+    for (alias, name) in &trees.species {
+        if let Some((species, variants)) = by_name(name) {
+            table.push(entry(alias, species, variants));
+        }
+    }
+    table
+}

@@ -1,0 +1,174 @@
+//! The property texture of a cross: normal, ambient visibility, share of foliage.
+
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+use super::Texel;
+use crate::bake::surface::unit_code;
+use crate::plant::texture::MipChain;
+
+/// What a texel of any level holds, weighted with its coverage.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sum {
+    normal: Vec3,
+    ambient: f32,
+    foliage: f32,
+    coverage: f32,
+}
+
+impl Sum {
+    /// Faces the viewer in the open: what a picture without a plant holds.
+    const OPEN: Self = Self { normal: Vec3::Z, ambient: 1.0, foliage: 1.0, coverage: 1.0 };
+
+    fn code(&self) -> [u8; 4] {
+        let [x, y] = octahedral(self.normal.try_normalize().unwrap_or(Vec3::Z)).to_array();
+        let mean = |value: f32| unit_code(value / self.coverage);
+        [unit_code(x), unit_code(y), mean(self.ambient), mean(self.foliage)]
+    }
+}
+
+/// Property mips of a picture of `resolution`² texels (a power of two). Means are weighted with the coverage, from
+/// level to level in floating point, so that air has no say; a texel of air continues what the coarser level holds.
+pub(super) fn mips(texels: &[Texel], resolution: usize, smoothing: f32) -> MipChain {
+    let normals = smoothed(texels, resolution, smoothing * resolution as f32);
+    let finest = texels.iter().zip(normals).map(|(texel, normal)| Sum {
+        normal: texel.coverage * normal,
+        ambient: texel.ambient,
+        foliage: texel.foliage,
+        coverage: texel.coverage,
+    });
+    let mut levels: Vec<Vec<Sum>> = vec![finest.collect()];
+    let mut size = resolution;
+    while size > 1 {
+        let halved = levels.last().map(|finer| halve(finer, size)).unwrap_or_default();
+        levels.push(halved);
+        size /= 2;
+    }
+    // From the coarsest level down: holes are filled from above.
+    let mut coded: Vec<Vec<u8>> = Vec::with_capacity(levels.len());
+    let mut above: Vec<Sum> = vec![Sum::OPEN];
+    for (depth, mut level) in levels.into_iter().rev().enumerate() {
+        let size = 1usize << depth;
+        for (at, sum) in level.iter_mut().enumerate().filter(|(_, sum)| sum.coverage <= 0.0) {
+            *sum = interpolated(&above, (size / 2).max(1), at % size, at / size);
+        }
+        coded.push(level.iter().flat_map(Sum::code).collect());
+        above = level;
+    }
+    coded.reverse();
+    MipChain { width: resolution as u32, height: resolution as u32, levels: coded }
+}
+
+/// What a level of `size`² texels holds at texel (`x`, `y`) of the next finer one, bilinearly, borders continued.
+fn interpolated(level: &[Sum], size: usize, x: usize, y: usize) -> Sum {
+    // The near texel with three quarters, the one beyond the closer edge with one quarter.
+    let axis = |at: usize| {
+        let near = (at / 2).min(size - 1);
+        let far = if at.is_multiple_of(2) { near.saturating_sub(1) } else { (near + 1).min(size - 1) };
+        [(near, 0.75f32), (far, 0.25)]
+    };
+    let mut sum = Sum::default();
+    for ((row, wy), (column, wx)) in axis(y).into_iter().flat_map(|row| axis(x).map(|column| (row, column))) {
+        let (weight, from) = (wx * wy, &level[row * size + column]);
+        sum.normal += weight * from.normal;
+        sum.ambient += weight * from.ambient;
+        sum.foliage += weight * from.foliage;
+        sum.coverage += weight * from.coverage;
+    }
+    sum
+}
+
+fn halve(finer: &[Sum], size: usize) -> Vec<Sum> {
+    let half = size / 2;
+    (0..half * half)
+        .map(|at| {
+            let corner = 2 * (at / half) * size + 2 * (at % half);
+            [corner, corner + 1, corner + size, corner + size + 1].iter().fold(Sum::default(), |sum, &i| Sum {
+                normal: sum.normal + finer[i].normal,
+                ambient: sum.ambient + finer[i].ambient,
+                foliage: sum.foliage + finer[i].foliage,
+                coverage: sum.coverage + finer[i].coverage,
+            })
+        })
+        .collect()
+}
+
+/// Unit normals, smoothed by a Gaussian of `deviation` texels over what is covered; straight ahead where nothing is.
+fn smoothed(texels: &[Texel], resolution: usize, deviation: f32) -> Vec<Vec3> {
+    let radius = (3.0 * deviation).ceil() as isize;
+    let kernel: Vec<f32> = (-radius..=radius)
+        .map(|offset| if radius == 0 { 1.0 } else { (-0.5 * (offset as f32 / deviation).powi(2)).exp() })
+        .collect();
+    // A pass along rows that writes columns: two of them are the two-dimensional filter.
+    let pass = |source: &[Vec3]| -> Vec<Vec3> {
+        (0..resolution * resolution)
+            .into_par_iter()
+            .map(|at| {
+                let (x, y) = ((at / resolution) as isize, at % resolution);
+                let row = &source[y * resolution..][..resolution];
+                let first = (x - radius).max(0);
+                let last = (x + radius).min(resolution as isize - 1);
+                let weights = &kernel[(first - x + radius) as usize..];
+                row[first as usize..=last as usize].iter().zip(weights).map(|(normal, weight)| *weight * *normal).sum()
+            })
+            .collect()
+    };
+    let normals: Vec<Vec3> = texels.iter().map(|texel| texel.normal).collect();
+    pass(&pass(&normals)).into_iter().map(|sum| sum.try_normalize().unwrap_or(Vec3::Z)).collect()
+}
+
+/// Octahedral encoding of a unit vector into 0..1 x 0..1, +Z in the middle [Cigolle et al. 2014, "A Survey of
+/// Efficient Representations for Independent Unit Vectors", 3.1].
+fn octahedral(unit: Vec3) -> Vec2 {
+    let flat = unit.truncate() / unit.abs().element_sum();
+    let sign = |value: f32| if value < 0.0 { -1.0 } else { 1.0 };
+    let folded = Vec2::new((1.0 - flat.y.abs()) * sign(flat.x), (1.0 - flat.x.abs()) * sign(flat.y));
+    0.5 + 0.5 * if unit.z < 0.0 { folded } else { flat }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn decode(code: [u8; 4]) -> Vec3 {
+        let f = Vec2::new(f32::from(code[0]), f32::from(code[1])) / 255.0 * 2.0 - 1.0;
+        let z = 1.0 - f.x.abs() - f.y.abs();
+        let t = (-z).max(0.0);
+        Vec3::new(f.x - t * f.x.signum(), f.y - t * f.y.signum(), z).normalize()
+    }
+
+    #[test]
+    fn normals_survive_eight_bits() {
+        for i in 0..500 {
+            let z = 1.0 - 2.0 * (i as f32 + 0.5) / 500.0;
+            let (sin, cos) = (2.399_963 * i as f32).sin_cos();
+            let normal = Vec3::new(cos * (1.0 - z * z).sqrt(), sin * (1.0 - z * z).sqrt(), z);
+            let code = Sum { normal, ..Sum::OPEN }.code();
+            assert!(decode(code).angle_between(normal) < 0.0175, "{normal}");
+        }
+    }
+
+    #[test]
+    fn mips_average_vectors_and_air_has_no_say() {
+        let mut texels = vec![Texel::default(); 64 * 64];
+        // One covered column at the left leans left, one beside it leans right, half as dense.
+        for y in 0..64 {
+            let left = Vec3::new(-0.6, 0.0, 0.8);
+            let right = Vec3::new(0.6, 0.0, 0.8);
+            texels[y * 64] = Texel { coverage: 1.0, normal: left, ambient: 0.2, foliage: 1.0, ..Default::default() };
+            texels[y * 64 + 1] =
+                Texel { coverage: 0.5, normal: 0.5 * right, ambient: 0.4, foliage: 0.0, ..Default::default() };
+        }
+        let chain = mips(&texels, 64, 0.0);
+        assert_eq!(chain.levels.len(), 7);
+        let texel = |level: usize, at: usize| -> [u8; 4] { std::array::from_fn(|c| chain.levels[level][4 * at + c]) };
+        let mean = Vec3::new(-0.6 + 0.3, 0.0, 0.8 + 0.4).normalize();
+        for level in 1..7 {
+            assert!(decode(texel(level, 0)).angle_between(mean) < 0.015, "level {level}");
+            assert_eq!(texel(level, 0)[2], unit_code(0.6 / 1.5));
+            assert_eq!(texel(level, 0)[3], unit_code(1.0 / 1.5));
+        }
+        // Air continues the coarser means.
+        assert!(decode(texel(0, 63)).angle_between(mean) < 0.03);
+    }
+}

@@ -1,0 +1,265 @@
+//! The file format of a baked plant. All numbers are little-endian.
+//!
+//! ```text
+//!   offset  size  content
+//!        0     8  magic "CANOPYBK"
+//!        8     4  version
+//!       12    32  key: hash of what it was made from
+//!       44     8  length of the payload
+//!       52    32  BLAKE3 of bytes 0..52 and the payload
+//!       84        payload: ambient, shadow proxy, planes, textures, transmission; lists go with their length (u32)
+//! ```
+
+use std::sync::Arc;
+
+use glam::{Vec2, Vec3};
+
+use crate::bake::BakedPlant;
+use crate::bake::billboard::{Cross, CrossPlane, CrossTextures};
+use crate::plant::texture::MipChain;
+use crate::plant::{Plant, PlantMesh};
+
+/// Version of the format *and* of the bakes: to be raised whenever either gives other bytes for the same input.
+pub(super) const VERSION: u32 = 1;
+
+const MAGIC: [u8; 8] = *b"CANOPYBK";
+const HEAD: usize = 52;
+const PAYLOAD: usize = HEAD + 32;
+
+/// The file of a baked plant; the plant itself is not in it.
+pub(super) fn encode(baked: &BakedPlant, key: &[u8; 32]) -> Vec<u8> {
+    let mut out = Writer(Vec::new());
+    out.list(&baked.ambient, |out, values| out.list(values, |out, value| out.float(*value)));
+    out.list(&baked.shadow_proxy, |out, mesh| {
+        out.list(&mesh.positions, |out, p| out.vector(*p));
+        out.list(&mesh.normals, |out, n| out.vector(*n));
+        out.list(&mesh.uvs, |out, uv| uv.to_array().into_iter().for_each(|value| out.float(value)));
+        out.list(&mesh.triangles, |out, triangle| triangle.iter().for_each(|corner| out.count(*corner)));
+    });
+    out.list(&baked.cross.planes, |out, plane| {
+        [plane.center, plane.u, plane.v, plane.normal].iter().for_each(|vector| out.vector(*vector));
+    });
+    for chains in [&baked.cross.textures.color, &baked.cross.textures.properties] {
+        out.list(chains, |out, chain| {
+            out.count(chain.width);
+            out.count(chain.height);
+            out.list(&chain.levels, |out, level| {
+                out.count(level.len() as u32);
+                out.0.extend_from_slice(level);
+            });
+        });
+    }
+    out.vector(baked.cross.transmission);
+
+    let payload = out.0;
+    let mut file = Vec::with_capacity(PAYLOAD + payload.len());
+    file.extend_from_slice(&MAGIC);
+    file.extend_from_slice(&VERSION.to_le_bytes());
+    file.extend_from_slice(key);
+    file.extend_from_slice(&(payload.len() as u64).to_le_bytes());
+    let checksum = checksum(&file, &payload);
+    file.extend_from_slice(&checksum);
+    file.extend_from_slice(&payload);
+    file
+}
+
+/// Reads a file that should hold `plant` baked under `key`. `None` where anything at all is not as it must be.
+pub(super) fn decode(file: &[u8], key: &[u8; 32], plant: &Arc<Plant>) -> Option<BakedPlant> {
+    let (head, rest) = file.split_at_checked(HEAD)?;
+    let (sum, payload) = rest.split_at_checked(PAYLOAD - HEAD)?;
+    let agrees = head[..8] == MAGIC
+        && head[8..12] == VERSION.to_le_bytes()
+        && head[12..44] == *key
+        && head[44..] == (payload.len() as u64).to_le_bytes()
+        && *sum == checksum(head, payload);
+    if !agrees {
+        return None;
+    }
+    let mut reader = Reader(payload);
+    let ambient = reader.list(|r| r.list(|r| r.float().filter(|k| (0.0..=1.0).contains(k))))?;
+    let shadow_proxy = reader.list(Reader::mesh)?;
+    let planes = reader
+        .list(|r| Some(CrossPlane { center: r.vector()?, u: r.vector()?, v: r.vector()?, normal: r.vector()? }))?;
+    let textures = CrossTextures { color: reader.list(Reader::chain)?, properties: reader.list(Reader::chain)? };
+    let transmission = reader.vector()?;
+    let fits = reader.0.is_empty()
+        && ambient.iter().map(Vec::len).eq(plant.parts.iter().map(|part| part.mesh.positions.len()))
+        && shadow_proxy.len() == plant.parts.len()
+        && textures.color.len() == planes.len()
+        && textures.properties.len() == planes.len();
+    let cross = Cross { planes, textures, transmission };
+    fits.then(|| BakedPlant { plant: Arc::clone(plant), ambient, shadow_proxy, cross })
+}
+
+fn checksum(head: &[u8], payload: &[u8]) -> [u8; 32] {
+    *blake3::Hasher::new().update(head).update(payload).finalize().as_bytes()
+}
+
+struct Writer(Vec<u8>);
+
+impl Writer {
+    fn count(&mut self, value: u32) {
+        self.0.extend_from_slice(&value.to_le_bytes());
+    }
+
+    fn float(&mut self, value: f32) {
+        self.0.extend_from_slice(&value.to_le_bytes());
+    }
+
+    fn vector(&mut self, vector: Vec3) {
+        vector.to_array().into_iter().for_each(|value| self.float(value));
+    }
+
+    fn list<T>(&mut self, items: &[T], mut write: impl FnMut(&mut Self, &T)) {
+        self.count(items.len() as u32);
+        items.iter().for_each(|item| write(self, item));
+    }
+}
+
+struct Reader<'a>(&'a [u8]);
+
+impl Reader<'_> {
+    fn bytes(&mut self, count: usize) -> Option<&[u8]> {
+        let (taken, rest) = self.0.split_at_checked(count)?;
+        self.0 = rest;
+        Some(taken)
+    }
+
+    fn count(&mut self) -> Option<u32> {
+        self.bytes(4)?.try_into().ok().map(u32::from_le_bytes)
+    }
+
+    /// A finite number.
+    fn float(&mut self) -> Option<f32> {
+        self.bytes(4)?.try_into().ok().map(f32::from_le_bytes).filter(|value| value.is_finite())
+    }
+
+    fn vector(&mut self) -> Option<Vec3> {
+        Some(Vec3::new(self.float()?, self.float()?, self.float()?))
+    }
+
+    fn list<T>(&mut self, mut read: impl FnMut(&mut Self) -> Option<T>) -> Option<Vec<T>> {
+        let count = self.count()? as usize;
+        // An item takes four bytes at least, so a wrong length cannot ask for more memory than the file justifies.
+        let mut items = Vec::with_capacity(count.min(self.0.len() / 4));
+        for _ in 0..count {
+            items.push(read(self)?);
+        }
+        Some(items)
+    }
+
+    fn mesh(&mut self) -> Option<PlantMesh> {
+        let mesh = PlantMesh {
+            positions: self.list(Self::vector)?,
+            normals: self.list(Self::vector)?,
+            uvs: self.list(|r| Some(Vec2::new(r.float()?, r.float()?)))?,
+            triangles: self.list(|r| Some([r.count()?, r.count()?, r.count()?]))?,
+        };
+        let vertices = mesh.positions.len();
+        let whole = mesh.normals.len() == vertices
+            && mesh.uvs.len() == vertices
+            && mesh.triangles.iter().flatten().all(|&corner| (corner as usize) < vertices);
+        whole.then_some(mesh)
+    }
+
+    fn chain(&mut self) -> Option<MipChain> {
+        let (width, height) = (self.count()?, self.count()?);
+        let levels = self.list(|r| {
+            let length = r.count()? as usize;
+            r.bytes(length).map(<[u8]>::to_vec)
+        })?;
+        let chain = MipChain { width, height, levels };
+        let whole = chain.levels.iter().enumerate().all(|(index, level)| {
+            let (width, height) = chain.level_size(index);
+            level.len() as u64 == u64::from(width) * u64::from(height) * 4
+        });
+        whole.then_some(chain)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::{PartKind, PlantMaterial, PlantPart};
+
+    fn small() -> BakedPlant {
+        let mesh = PlantMesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+            normals: vec![Vec3::Z; 3],
+            uvs: vec![Vec2::ZERO, Vec2::X, Vec2::Y],
+            triangles: vec![[0, 1, 2]],
+        };
+        let part = PlantPart { kind: PartKind::Foliage, mesh: mesh.clone(), material: PlantMaterial::default() };
+        let chain = MipChain { width: 2, height: 2, levels: vec![(0..16).collect(), vec![1, 2, 3, 4]] };
+        let plane = CrossPlane { center: Vec3::ONE, u: Vec3::X, v: Vec3::Y, normal: Vec3::Z };
+        BakedPlant {
+            plant: Arc::new(Plant { name: "small".into(), parts: vec![part] }),
+            ambient: vec![vec![0.0, 0.5, 1.0]],
+            shadow_proxy: vec![mesh],
+            cross: Cross {
+                planes: vec![plane],
+                textures: CrossTextures { color: vec![chain.clone()], properties: vec![chain] },
+                transmission: Vec3::new(0.1, 0.2, 0.3),
+            },
+        }
+    }
+
+    const KEY: [u8; 32] = [7; 32];
+
+    #[test]
+    fn what_is_written_is_read() {
+        let baked = small();
+        let read = decode(&encode(&baked, &KEY), &KEY, &baked.plant).unwrap();
+        assert_eq!(read.ambient, baked.ambient);
+        assert_eq!(read.shadow_proxy, baked.shadow_proxy);
+        assert_eq!(read.cross, baked.cross);
+    }
+
+    #[test]
+    fn a_file_cut_or_changed_at_any_byte_counts_as_absent() {
+        let baked = small();
+        let file = encode(&baked, &KEY);
+        for length in 0..file.len() {
+            assert!(decode(&file[..length], &KEY, &baked.plant).is_none(), "cut at {length}");
+        }
+        let mut longer = file.clone();
+        longer.push(0);
+        assert!(decode(&longer, &KEY, &baked.plant).is_none());
+        for at in 0..file.len() {
+            let mut changed = file.clone();
+            changed[at] ^= 0x10;
+            assert!(decode(&changed, &KEY, &baked.plant).is_none(), "changed at {at}");
+        }
+        assert!(decode(&file, &[8; 32], &baked.plant).is_none(), "another key");
+    }
+
+    /// A payload that was damaged before its checksum was made must not panic or ask for absurd memory either.
+    #[test]
+    fn a_broken_payload_with_a_good_checksum_is_survived() {
+        let baked = small();
+        let file = encode(&baked, &KEY);
+        let sealed = |payload: &[u8]| {
+            let mut head = file[..44].to_vec();
+            head.extend((payload.len() as u64).to_le_bytes());
+            let sum = checksum(&head, payload);
+            [&head, &sum[..], payload].concat()
+        };
+        let payload = &file[PAYLOAD..];
+        assert!(decode(&sealed(payload), &KEY, &baked.plant).is_some());
+        for at in 0..payload.len() {
+            assert!(decode(&sealed(&payload[..at]), &KEY, &baked.plant).is_none());
+            let mut changed = payload.to_vec();
+            changed[at] = 0xff;
+            if let Some(read) = decode(&sealed(&changed), &KEY, &baked.plant) {
+                assert!(read.ambient.iter().flatten().all(|k| k.is_finite()));
+            }
+        }
+    }
+
+    #[test]
+    fn another_plants_file_does_not_fit() {
+        let baked = small();
+        let other = Arc::new(Plant::default());
+        assert!(decode(&encode(&baked, &KEY), &KEY, &other).is_none());
+    }
+}

@@ -1,0 +1,155 @@
+//! What can be written behind `canopy`.
+
+use std::path::PathBuf;
+
+use canopy::scene::{LocalTime, Pose, parse_pose, parse_positive, parse_seconds, parse_size};
+use clap::{Args, Parser, Subcommand};
+
+/// Width and height of pictures and windows unless stated.
+const DEFAULT_SIZE: &str = "1280x720";
+
+/// A real-time forest renderer and landscape simulator.
+#[derive(Debug, Parser)]
+#[command(
+    name = "canopy",
+    version,
+    arg_required_else_help = true,
+    after_help = "Examples:
+  canopy fly                                          the demo forest in a window
+  canopy fly my-valley.ron --at 2026-10-03T18:05+02:00
+  canopy render my-valley.ron --out noon.png
+  canopy info stand.csv
+
+`canopy help render` shows how to render pictures, sequences and time-lapses."
+)]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// List the graphics adapters that --adapter can name, and stop.
+    #[arg(long)]
+    pub list_adapters: bool,
+    /// What all commands understand.
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// Options of all commands.
+#[derive(Clone, Debug, Args)]
+pub struct Common {
+    /// No progress bars and no notes; warnings and errors only.
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
+    /// Replaces the scene's seed: other places, sizes and turns of the trees.
+    #[arg(long, global = true, value_name = "NUMBER")]
+    pub seed: Option<u64>,
+    /// Part of the name of the graphics adapter to use (see --list-adapters).
+    #[arg(long, global = true, value_name = "NAME")]
+    pub adapter: Option<String>,
+    /// Say which passes ran, which were skipped, and why.
+    #[arg(long, global = true)]
+    pub explain: bool,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Fly through a scene in a window.
+    Fly(Fly),
+    /// Render a scene to PNG files, without a window.
+    Render(Render),
+    /// Say what a plant, terrain, inventory or scene file holds.
+    Info(Info),
+}
+
+/// Where the camera is.
+#[derive(Clone, Debug, Args)]
+pub struct CameraArguments {
+    /// Camera: metres east, above the ground and south of the terrain's centre; compass bearing and degrees upward.
+    #[arg(long, value_name = "X,Y,Z,YAW,PITCH", value_parser = parse_pose, allow_hyphen_values = true, conflicts_with = "along")]
+    pub camera: Option<Pose>,
+    /// Time on the scene's camera path, as in 12.5s; a sequence starts there.
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
+    pub along: Option<f64>,
+}
+
+/// Arguments of `canopy fly`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Keys: W A S D Q E move, mouse looks, wheel sets the speed, Shift hurries, F flies the scene's \
+                        path, H shows all keys.
+
+Examples:
+  canopy fly
+  canopy fly my-valley.ron --at 2026-10-03T18:05+02:00 --clock 60
+  canopy fly my-valley.ron --camera 0,30,200,0,-10 --size 1920x1080"
+)]
+pub struct Fly {
+    /// Scene file [default: the demo that comes with the program].
+    pub scene: Option<PathBuf>,
+    /// Size of the window in pixels.
+    #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = DEFAULT_SIZE)]
+    pub size: (u32, u32),
+    /// Date and time with the offset from UTC, as in 2026-06-21T15:30+02:00 [default: the scene's].
+    #[arg(long, value_name = "TIME")]
+    pub at: Option<LocalTime>,
+    /// Where to start [default: the scene's].
+    #[command(flatten)]
+    pub view: CameraArguments,
+    /// Simulated seconds per second at the start [default: 0, the clock stands].
+    #[arg(long, value_name = "FACTOR", value_parser = parse_positive)]
+    pub clock: Option<f64>,
+    /// Let the camera go under the ground.
+    #[arg(long)]
+    pub underground: bool,
+}
+
+/// Arguments of `canopy render`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  One picture:
+    canopy render demo.ron --out noon.png --at 2026-06-21T13:30-04:00 --camera 0,20,0,90,-5
+  Several hours from one camera (as many --out as --at):
+    canopy render demo.ron --at 2026-06-21T06:30-04:00 --out dawn.png --at 2026-06-21T23:00-04:00 --out night.png
+  A flight along the scene's path, flight/0000.png and on:
+    canopy render demo.ron --out flight --along 10s --frames 250 --fps 25
+  A day from a standing camera:
+    canopy render demo.ron --out day.png --frames 96 --from 2026-06-21T04:00-04:00 --to 2026-06-21T22:00-04:00")]
+pub struct Render {
+    /// Scene file.
+    pub scene: PathBuf,
+    /// PNG to write; for a sequence, a PNG into whose name the numbers go, or a folder.
+    #[arg(long, value_name = "FILE", required = true)]
+    pub out: Vec<PathBuf>,
+    /// Size of a picture in pixels.
+    #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = DEFAULT_SIZE)]
+    pub size: (u32, u32),
+    /// Date and time with the offset from UTC, as in 2026-06-21T15:30+02:00 [default: the scene's].
+    #[arg(long, value_name = "TIME", conflicts_with_all = ["from", "to"])]
+    pub at: Vec<LocalTime>,
+    /// Where the camera is [default: the scene's start; its path for a sequence].
+    #[command(flatten)]
+    pub view: CameraArguments,
+    /// Number of pictures of a sequence.
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..))]
+    pub frames: Option<u32>,
+    /// Pictures per second of flight along the path [default: 25; in a time-lapse the camera stands still].
+    #[arg(long, value_name = "RATE", value_parser = parse_positive, requires = "frames")]
+    pub fps: Option<f64>,
+    /// First instant of a time-lapse.
+    #[arg(long, value_name = "TIME", requires = "frames", requires = "to")]
+    pub from: Option<LocalTime>,
+    /// Last instant of a time-lapse.
+    #[arg(long, value_name = "TIME", requires = "from")]
+    pub to: Option<LocalTime>,
+}
+
+/// Arguments of `canopy info`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  canopy info oak.glb
+  canopy info assets/scenes/demo.ron")]
+pub struct Info {
+    /// A plant (.glb, .gltf), a terrain (.tif, .asc, .hgt, .png), an inventory (.csv) or a scene (.ron).
+    pub file: PathBuf,
+}

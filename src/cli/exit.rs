@@ -1,0 +1,57 @@
+//! How the program ends: 0 for success, 1 for an error, 2 for wrong usage.
+
+use std::io::Write;
+use std::process::ExitCode;
+
+/// What a command came to.
+pub enum Outcome {
+    /// All done.
+    Done,
+    /// The arguments do not fit together.
+    Usage(clap::Error),
+    /// Something went wrong.
+    Failed(anyhow::Error),
+}
+
+impl From<anyhow::Result<()>> for Outcome {
+    fn from(result: anyhow::Result<()>) -> Self {
+        match result {
+            Ok(()) => Self::Done,
+            Err(error) => Self::Failed(error),
+        }
+    }
+}
+
+/// Prints what there is to say and gives the exit code.
+pub fn finish(outcome: Outcome) -> ExitCode {
+    match outcome {
+        Outcome::Done => ExitCode::SUCCESS,
+        Outcome::Usage(error) => {
+            // A closed terminal does not change the outcome.
+            let _ = error.print();
+            ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
+        }
+        Outcome::Failed(error) => {
+            let _ = writeln!(std::io::stderr(), "error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Prints lines on the standard output. A reader that left early (`canopy info oak.glb | head -1`) is no error.
+///
+/// # Errors
+/// The output cannot be written for another reason, such as a full disk.
+pub fn print_lines<T: std::fmt::Display>(lines: impl IntoIterator<Item = T>) -> anyhow::Result<()> {
+    let mut output = std::io::stdout().lock();
+    for line in lines {
+        match writeln!(output, "{line}") {
+            Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => return Ok(()),
+            result => result?,
+        }
+    }
+    match output.flush() {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(()),
+    }
+}

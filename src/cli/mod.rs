@@ -1,0 +1,11 @@
+//! The command line: its arguments, its progress bars, its exit codes. What the arguments ask for is done by the library.
+
+mod arguments;
+mod exit;
+mod progress;
+mod request;
+
+pub use arguments::{Arguments, Command};
+pub use exit::{Outcome, finish, print_lines};
+pub use progress::Bars;
+pub use request::{fly_options, no_command, render_options};

@@ -1,0 +1,180 @@
+//! From arguments to what the library is asked.
+
+use std::path::{Path, PathBuf};
+
+use canopy::scene::{Clock, FlyOptions, Pictures, RenderOptions, Still, View};
+use clap::CommandFactory;
+use clap::error::ErrorKind;
+
+use super::arguments::{Arguments, CameraArguments, Common, Fly, Render};
+
+/// The scene of `canopy fly` without a name.
+const DEMO: &str = "scenes/demo.ron";
+
+/// The options of a flight.
+pub fn fly_options(fly: Fly, common: &Common) -> FlyOptions {
+    FlyOptions {
+        scene: fly.scene.unwrap_or_else(demo_scene),
+        size: fly.size,
+        at: fly.at,
+        view: view(&fly.view),
+        clock: fly.clock.unwrap_or(0.0),
+        underground: fly.underground,
+        seed: common.seed,
+        adapter: common.adapter.clone(),
+        quiet: common.quiet,
+        explain: common.explain,
+    }
+}
+
+/// The options of a render.
+///
+/// # Errors
+/// A usage error where the arguments, each fine alone, do not fit together.
+pub fn render_options(render: Render, common: &Common) -> Result<RenderOptions, clap::Error> {
+    Ok(RenderOptions {
+        view: view(&render.view),
+        size: render.size,
+        seed: common.seed,
+        adapter: common.adapter.clone(),
+        quiet: common.quiet,
+        explain: common.explain,
+        scene: render.scene,
+        pictures: pictures(render.out, &render.at, render.frames, render.fps, render.from.zip(render.to))?,
+    })
+}
+
+fn pictures(
+    mut out: Vec<PathBuf>,
+    at: &[canopy::scene::LocalTime],
+    frames: Option<u32>,
+    fps: Option<f64>,
+    span: Option<(canopy::scene::LocalTime, canopy::scene::LocalTime)>,
+) -> Result<Pictures, clap::Error> {
+    let Some(frames) = frames else {
+        if out.len() != at.len().max(1) {
+            return Err(usage(format!(
+                "{} --out and {} --at: give one --out for each --at (or --frames for a sequence)",
+                out.len(),
+                at.len()
+            )));
+        }
+        if let Some(wrong) = out.iter().find(|file| !ends_in_png(file)) {
+            return Err(usage(format!("--out {}: pictures are PNG files, end the name in .png", wrong.display())));
+        }
+        let times = at.iter().copied().map(Some).chain(std::iter::repeat(None));
+        return Ok(Pictures::Stills(out.into_iter().zip(times).map(|(out, at)| Still { out, at }).collect()));
+    };
+    if at.len() > 1 {
+        return Err(usage("a sequence (--frames) has one --at, or --from and --to".to_owned()));
+    }
+    match (out.pop(), out.is_empty()) {
+        (Some(out), true) => Ok(Pictures::Sequence {
+            out,
+            frames,
+            fps,
+            clock: match span {
+                Some((from, to)) => Clock::Lapse { from, to },
+                None => Clock::Standing(at.first().copied()),
+            },
+        }),
+        _ => Err(usage("a sequence (--frames) has one --out".to_owned())),
+    }
+}
+
+fn ends_in_png(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"))
+}
+
+fn usage(message: String) -> clap::Error {
+    Arguments::command().error(ErrorKind::ArgumentConflict, message)
+}
+
+/// The usage error of a command line that names no command.
+pub fn no_command() -> clap::Error {
+    Arguments::command().error(ErrorKind::MissingSubcommand, "name a command: fly, render or info")
+}
+
+fn view(camera: &CameraArguments) -> View {
+    match (camera.camera, camera.along) {
+        (Some(pose), _) => View::Pose(pose),
+        (None, Some(seconds)) => View::Along(seconds),
+        (None, None) => View::Scene,
+    }
+}
+
+/// The demo scene: of the folder `assets` in the working directory, beside the program, or where the program was built.
+fn demo_scene() -> PathBuf {
+    let beside = std::env::current_exe().ok().and_then(|program| Some(program.parent()?.join("assets").join(DEMO)));
+    let built = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets").join(DEMO);
+    let here = Path::new("assets").join(DEMO);
+    [Some(here.clone()), beside, Some(built)].into_iter().flatten().find(|scene| scene.is_file()).unwrap_or(here)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::super::arguments::Command;
+    use super::*;
+
+    fn render(arguments: &str) -> Result<RenderOptions, clap::Error> {
+        let words = ["canopy", "render", "s.ron"].into_iter().chain(arguments.split_whitespace());
+        let arguments = Arguments::try_parse_from(words)?;
+        match arguments.command {
+            Some(Command::Render(render)) => render_options(render, &arguments.common),
+            _ => Err(usage("no render".to_owned())),
+        }
+    }
+
+    #[test]
+    fn the_definition_is_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn stills_pair_files_with_instants() -> Result<(), Box<dyn std::error::Error>> {
+        let options = render("--at 2026-06-21T06:00Z --out a.png --at 2026-06-21T12:00Z --out b.PNG --quiet")?;
+        let Pictures::Stills(stills) = options.pictures else { return Err("no stills".into()) };
+        assert_eq!(stills[1], Still { out: "b.PNG".into(), at: Some("2026-06-21T12:00Z".parse()?) });
+        assert!(options.quiet && options.size == (1280, 720) && options.view == View::Scene);
+        Ok(())
+    }
+
+    #[test]
+    fn sequences_and_lapses() -> Result<(), Box<dyn std::error::Error>> {
+        let flight = render("--out f --frames 10 --fps 5 --along 12.5s")?;
+        let clock = Clock::Standing(None);
+        let expected = Pictures::Sequence { out: "f".into(), frames: 10, fps: Some(5.0), clock };
+        assert_eq!((flight.pictures, flight.view), (expected, View::Along(12.5)));
+        let lapse = render("--out d.png --frames 3 --from 2026-06-21T04:00Z --to 2026-06-21T20:00Z")?;
+        assert!(matches!(lapse.pictures, Pictures::Sequence { clock: Clock::Lapse { .. }, fps: None, .. }));
+        let west = render("--out a.png --camera -10,2,-30,270,-5")?;
+        assert!(matches!(west.view, View::Pose(pose) if pose.position == (-10.0, 2.0, -30.0)));
+        Ok(())
+    }
+
+    #[test]
+    fn arguments_that_do_not_fit_are_usage_errors() {
+        for wrong in [
+            "",
+            "--out a.png --size 0x0",
+            "--out a.jpg",
+            "--out a.png --out b.png",
+            "--out a.png --at 2026-06-21T06:00Z --at 2026-06-21T07:00Z",
+            "--out a.png --at 2026-06-21T06:00",
+            "--out a.png --camera 1,2,3",
+            "--out a.png --camera 0,1,0,0,0 --along 1s",
+            "--out a --frames 0",
+            "--out a --out b --frames 2",
+            "--out a.png --fps 25",
+            "--out a --frames 2 --fps 0",
+            "--out a --frames 2 --from 2026-06-21T06:00Z",
+            "--out a --frames 2 --at 2026-06-21T06:00Z --from 2026-06-21T06:00Z --to 2026-06-21T07:00Z",
+            "--out a.png --seed -1",
+            "--out a.png --unknown",
+        ] {
+            assert_eq!(render(wrong).map(|_| ()).map_err(|error| error.exit_code()), Err(2), "{wrong}");
+        }
+    }
+}

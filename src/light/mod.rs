@@ -1,0 +1,30 @@
+//! The light room: where sun and moon stand, what the sky sends, and how a camera should be exposed to it.
+//!
+//! ```text
+//! instant, place -> SunPosition, Moon --.
+//!                                        +-> LightState: sky picture, SH of the surroundings, key light,
+//! AtmosphereParams -> Atmosphere -------'               exposure, night sight, fog, moon and stars
+//! ```
+//!
+//! [`Atmosphere`] is built once (a quarter of a second), [`LightState`] when the sun has moved (some 25 ms); a frame
+//! only reads it. Nothing here knows of an App or a GPU. Units are lux and nits, colours linear Rec. 709, +X east, +Y
+//! up, -Z north.
+
+pub mod atmosphere;
+mod error;
+pub mod exposure;
+pub mod moon;
+pub mod night;
+pub mod quadrature;
+pub mod sh;
+mod state;
+pub mod sun;
+
+pub use atmosphere::{Atmosphere, AtmosphereParams, SkyView};
+pub use error::LightError;
+pub use exposure::{ExposureSettings, ScotopicTint, exposure_from_ev100};
+pub use moon::{Moon, MoonSetting};
+pub use night::{NightSky, StarField};
+pub use sh::Sh9Rgb;
+pub use state::{FogParams, KeyLight, LightSettings, LightState, MoonDisc, NightTerms};
+pub use sun::{Observer, SunPosition};

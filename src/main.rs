@@ -1,0 +1,57 @@
+//! The command line of Canopy: parses, calls the library, prints.
+
+mod cli;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use cli::{Arguments, Bars, Command, Outcome};
+
+fn main() -> ExitCode {
+    let outcome = match Arguments::try_parse() {
+        Ok(arguments) => run(arguments),
+        Err(error) => Outcome::Usage(error),
+    };
+    cli::finish(outcome)
+}
+
+fn run(arguments: Arguments) -> Outcome {
+    let common = arguments.common;
+    if arguments.list_adapters {
+        return list_adapters().into();
+    }
+    match arguments.command {
+        Some(Command::Fly(fly)) => fly_through(cli::fly_options(fly, &common)).into(),
+        Some(Command::Render(render)) => match cli::render_options(render, &common) {
+            Ok(options) => render_pictures(&options).into(),
+            Err(error) => Outcome::Usage(error),
+        },
+        Some(Command::Info(info)) => describe(&info.file).into(),
+        None => Outcome::Usage(cli::no_command()),
+    }
+}
+
+fn list_adapters() -> anyhow::Result<()> {
+    cli::print_lines(canopy::app::list_adapters()?)
+}
+
+fn fly_through(options: canopy::scene::FlyOptions) -> anyhow::Result<()> {
+    canopy::app::fly(options)?;
+    Ok(())
+}
+
+fn render_pictures(options: &canopy::scene::RenderOptions) -> anyhow::Result<()> {
+    let mut bars = Bars::new(options.quiet);
+    let report = canopy::app::render(options, &mut bars)?;
+    drop(bars);
+    cli::print_lines(&report.explanation)?;
+    if options.quiet {
+        return Ok(());
+    }
+    cli::print_lines(report.files.iter().map(|file| file.display()))
+}
+
+fn describe(file: &std::path::Path) -> anyhow::Result<()> {
+    cli::print_lines([canopy::app::info(file)?.trim_end()])
+}

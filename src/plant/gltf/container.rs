@@ -1,0 +1,333 @@
+//! The containers of glTF: GLB chunks, JSON, data URIs, files beside the file.
+//!
+//! [glTF 2.0 specification, section 4 "GLB File Format Specification"]. The `gltf` crate's own GLB reader is
+//! not used: it subtracts the header size from an unchecked length.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use gltf::json;
+
+use super::error::{EXPORT_AGAIN, Fault, PlantError, WarningKind, Warnings};
+
+/// A parsed file: the JSON part and access to its bytes.
+pub(super) struct Document {
+    pub path: PathBuf,
+    pub root: json::Root,
+    blob: Option<Vec<u8>>,
+    /// The buffers that have been asked for.
+    buffers: Vec<Option<Vec<u8>>>,
+}
+
+/// Reads and parses `path` (.gltf or .glb, told apart by content).
+pub(super) fn open(path: &Path, warnings: &mut Warnings) -> Result<Document, PlantError> {
+    let bytes = std::fs::read(path).map_err(|source| PlantError::Io { path: path.to_path_buf(), source })?;
+    let (text, blob) = if looks_binary(&bytes, path) {
+        let (text, blob) = split_glb(&bytes, path, warnings)?;
+        (text, blob.map(<[u8]>::to_vec))
+    } else {
+        (bytes.as_slice(), None)
+    };
+    let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
+    let root = parse(text, path)?;
+    let buffers = vec![None; root.buffers.len()];
+    Ok(Document { path: path.to_path_buf(), root, blob, buffers })
+}
+
+/// GLB by its magic number; a file of that name without it is damaged GLB rather than JSON.
+fn looks_binary(bytes: &[u8], path: &Path) -> bool {
+    bytes.starts_with(b"glTF") || path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("glb"))
+}
+
+/// The little-endian word at `at`, if the slice reaches that far.
+fn word(bytes: &[u8], at: usize) -> Option<usize> {
+    let word: [u8; 4] = bytes.get(at..at.checked_add(4)?)?.try_into().ok()?;
+    usize::try_from(u32::from_le_bytes(word)).ok()
+}
+
+/// The JSON chunk and the BIN chunk of a GLB file.
+fn split_glb<'a>(
+    bytes: &'a [u8],
+    path: &Path,
+    warnings: &mut Warnings,
+) -> Result<(&'a [u8], Option<&'a [u8]>), PlantError> {
+    let damage = |offset: usize, what: String, remedy: &'static str| PlantError::Container {
+        path: path.to_path_buf(),
+        offset,
+        what,
+        remedy,
+    };
+    if !bytes.starts_with(b"glTF") {
+        let what = if bytes.is_empty() { "the file is empty" } else { "the GLB magic number 'glTF' is missing" };
+        return Err(damage(0, what.into(), "give a .glb or .gltf file; export or download it again"));
+    }
+    let (Some(version), Some(length)) = (word(bytes, 4), word(bytes, 8)) else {
+        return Err(damage(bytes.len(), "the GLB header of 12 bytes is cut off".into(), EXPORT_AGAIN));
+    };
+    if version != 2 {
+        return Err(damage(4, format!("GLB version {version} instead of 2"), "convert the file to glTF 2.0"));
+    }
+    if length > bytes.len() {
+        let what = format!("the header promises {length} bytes, the file has {}", bytes.len());
+        return Err(damage(bytes.len(), what, EXPORT_AGAIN));
+    }
+    if length != bytes.len() {
+        let message = format!("the header gives {length} bytes, the file has {}; the file's chunks count", bytes.len());
+        warnings.push(WarningKind::Repaired, "", message);
+    }
+
+    let (mut json, mut blob, mut at) = (None, None, 12);
+    while at < bytes.len() {
+        let (Some(size), Some(kind)) = (word(bytes, at), bytes.get(at + 4..at + 8)) else {
+            if json.is_some() {
+                warnings.push(WarningKind::Ignored, "", format!("{} bytes after the last chunk", bytes.len() - at));
+                break;
+            }
+            return Err(damage(at, "a chunk header of 8 bytes is cut off".into(), EXPORT_AGAIN));
+        };
+        let chunk = bytes.get(at + 8..).and_then(|rest| rest.get(..size));
+        let Some(chunk) = chunk else {
+            let what = format!("a chunk of {size} bytes does not fit into the {} that follow", bytes.len() - at - 8);
+            return Err(damage(at, what, EXPORT_AGAIN));
+        };
+        match (kind, json, blob) {
+            (b"JSON", None, _) => json = Some(chunk),
+            (_, None, _) => return Err(damage(at, "the first chunk is not the JSON chunk".into(), EXPORT_AGAIN)),
+            (b"BIN\0", _, None) => blob = Some(chunk),
+            _ => warnings.push(WarningKind::Ignored, "", format!("a surplus GLB chunk at byte {at}")),
+        }
+        at += 8 + size;
+    }
+    match json {
+        Some(json) => Ok((json, blob)),
+        None => Err(damage(12, "there is no JSON chunk".into(), EXPORT_AGAIN)),
+    }
+}
+
+/// Parses the JSON part. Whole numbers written as 1.0 and scenes without a node list, which glTF allows and the
+/// `gltf` crate does not, are put right in a second attempt.
+fn parse(text: &[u8], path: &Path) -> Result<json::Root, PlantError> {
+    let failed = |error: json::Error| PlantError::Json {
+        path: path.to_path_buf(),
+        line: error.line().max(1),
+        column: error.column().max(1),
+        what: without_position(&error.to_string()).to_owned(),
+    };
+    let root = json::deserialize::from_slice::<json::Root>(text).or_else(|error| {
+        let mut value = json::deserialize::from_slice::<json::Value>(text).map_err(failed)?;
+        normalize(&mut value);
+        json::deserialize::from_value::<json::Root>(value).map_err(|_| failed(error))
+    })?;
+    let version = root.asset.min_version.as_deref().unwrap_or(&root.asset.version);
+    if version.split('.').next() != Some("2") {
+        return Err(PlantError::Unsupported {
+            path: path.to_path_buf(),
+            what: format!("glTF version {version}"),
+            remedy: "convert the file to glTF 2.0",
+        });
+    }
+    Ok(root)
+}
+
+/// The message of a JSON error without its own "at line ... column ...".
+fn without_position(message: &str) -> &str {
+    message.rsplit_once(" at line ").map_or(message, |(text, _)| text)
+}
+
+/// Integral floats become integers, scenes get a node list.
+fn normalize(value: &mut json::Value) {
+    if let Some(scenes) = value.get_mut("scenes").and_then(json::Value::as_array_mut) {
+        for scene in scenes.iter_mut().filter_map(json::Value::as_object_mut) {
+            scene.entry("nodes").or_insert_with(|| json::Value::Array(Vec::new()));
+        }
+    }
+    integers(value);
+}
+
+fn integers(value: &mut json::Value) {
+    // Above 2^53 a float is no longer an exact count.
+    const EXACT: f64 = 9_007_199_254_740_992.0;
+    let whole = value.as_f64().filter(|v| value.is_f64() && v.fract() == 0.0 && (0.0..EXACT).contains(v));
+    match (whole, &mut *value) {
+        (Some(whole), _) => *value = json::Value::from(whole as u64),
+        (None, json::Value::Array(items)) => items.iter_mut().for_each(integers),
+        (None, json::Value::Object(fields)) => fields.iter_mut().for_each(|(_, field)| integers(field)),
+        _ => {}
+    }
+}
+
+impl Document {
+    /// The bytes of buffer view `index`.
+    pub fn view(&mut self, index: usize) -> Result<&[u8], Fault> {
+        let place = format!("/bufferViews/{index}");
+        let views = self.root.buffer_views.len();
+        let Some(view) = self.root.buffer_views.get(index) else {
+            return Err(Fault::new(place, format!("does not exist, there are {views}"), EXPORT_AGAIN));
+        };
+        let buffer = view.buffer.value();
+        let (offset, length) = (view.byte_offset.map_or(0, |offset| offset.0), view.byte_length.0);
+        let bytes = self.buffer(buffer)?;
+        let range =
+            usize::try_from(offset).ok().zip(offset.checked_add(length).and_then(|end| usize::try_from(end).ok()));
+        range.and_then(|(begin, end)| bytes.get(begin..end)).ok_or_else(|| {
+            let what = format!("bytes {offset} to +{length} leave buffer {buffer} of {} bytes", bytes.len());
+            Fault::new(place, what, EXPORT_AGAIN)
+        })
+    }
+
+    /// The bytes of buffer `index`, read on the first call.
+    fn buffer(&mut self, index: usize) -> Result<&[u8], Fault> {
+        let place = format!("/buffers/{index}");
+        let Some(slot) = self.buffers.get_mut(index) else {
+            return Err(Fault::new(
+                place,
+                format!("does not exist, there are {}", self.root.buffers.len()),
+                EXPORT_AGAIN,
+            ));
+        };
+        if slot.is_none() {
+            let buffer = &self.root.buffers[index];
+            let length = buffer.byte_length.0;
+            let bytes = match (&buffer.uri, &self.blob) {
+                (Some(uri), _) => read_uri(uri, &self.path, &place, Some(length))?,
+                (None, Some(blob)) if index == 0 => blob.clone(),
+                (None, _) => {
+                    let what = "has neither a uri nor the binary chunk of a GLB file";
+                    return Err(Fault::new(place, what, "keep the .bin file and its uri, or export as .glb"));
+                }
+            };
+            if (bytes.len() as u64) < length {
+                let what = format!("has {} bytes instead of the {length} that byteLength promises", bytes.len());
+                return Err(Fault::new(place, what, EXPORT_AGAIN));
+            }
+            *slot = Some(bytes);
+        }
+        Ok(slot.as_deref().unwrap_or_default())
+    }
+
+    /// The bytes of image `index` as they are encoded.
+    pub fn image(&mut self, index: usize) -> Result<Vec<u8>, Fault> {
+        let place = format!("/images/{index}");
+        let Some(image) = self.root.images.get(index) else {
+            return Err(Fault::new(place, "does not exist", "save the texture as PNG or JPEG and export again"));
+        };
+        match (image.buffer_view.map(|view| view.value()), image.uri.clone()) {
+            (Some(view), _) => self.view(view).map(<[u8]>::to_vec),
+            (None, Some(uri)) => read_uri(&uri, &self.path, &place, None),
+            (None, None) => Err(Fault::new(place, "has neither a uri nor a bufferView", EXPORT_AGAIN)),
+        }
+    }
+}
+
+/// The bytes behind `uri`: a data URI or a path relative to the file `base`. At most `limit` bytes are read.
+fn read_uri(uri: &str, base: &Path, place: &str, limit: Option<u64>) -> Result<Vec<u8>, Fault> {
+    if let Some(data) = uri.strip_prefix("data:") {
+        let Some((kind, payload)) = data.split_once(',') else {
+            return Err(Fault::new(place, "the data URI has no comma", EXPORT_AGAIN));
+        };
+        return if kind.ends_with(";base64") {
+            decode_base64(payload)
+                .ok_or_else(|| Fault::new(place, "the base64 of its data URI is damaged", EXPORT_AGAIN))
+        } else {
+            Ok(decode_percent(payload))
+        };
+    }
+    let relative = String::from_utf8_lossy(&decode_percent(uri)).into_owned();
+    let scheme = relative.split_once(':').is_some_and(|(scheme, _)| scheme.len() > 1 && !scheme.contains(['/', '\\']));
+    if scheme || Path::new(&relative).has_root() {
+        let what = format!("the uri '{}' is not a path beside the file", shortened(&relative));
+        return Err(Fault::new(place, what, "copy the data beside the .gltf file and name it by a relative path"));
+    }
+    let file = base.parent().unwrap_or(Path::new("")).join(&relative);
+    let unreadable = |reason: String| {
+        let what = format!("the file '{}' cannot be read: {reason}", shortened(&relative));
+        Fault::new(place, what, "put the file beside the .gltf file, or export as .glb, which holds everything")
+    };
+    let is_file = std::fs::metadata(&file).map_err(|error| unreadable(error.to_string()))?.is_file();
+    if !is_file {
+        return Err(unreadable("it is not a file".into()));
+    }
+    let mut bytes = Vec::new();
+    File::open(&file)
+        .and_then(|opened| opened.take(limit.unwrap_or(u64::MAX)).read_to_end(&mut bytes))
+        .map_err(|error| unreadable(error.to_string()))?;
+    Ok(bytes)
+}
+
+/// At most 80 characters of a text from a file, for messages.
+fn shortened(text: &str) -> String {
+    match text.char_indices().nth(80) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text.to_owned(),
+    }
+}
+
+/// Decodes `%20` and the like (RFC 3986, section 2.1); what is not an escape stays.
+fn decode_percent(text: &str) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(text.len());
+    let mut rest = text.as_bytes();
+    while let [first, tail @ ..] = rest {
+        let digit = |byte: Option<&u8>| byte.and_then(|&byte| char::from(byte).to_digit(16));
+        let escape = if *first == b'%' { digit(tail.first()).zip(digit(tail.get(1))) } else { None };
+        if let Some((high, low)) = escape {
+            bytes.push((high * 16 + low) as u8);
+            rest = &tail[2..];
+        } else {
+            bytes.push(*first);
+            rest = tail;
+        }
+    }
+    bytes
+}
+
+/// Decodes base64 (RFC 4648, section 4), padded or not; `None` where a character does not belong.
+fn decode_base64(text: &str) -> Option<Vec<u8>> {
+    let digits = text.trim_end_matches('=').as_bytes();
+    let mut bytes = Vec::with_capacity(digits.len() / 4 * 3 + 2);
+    for group in digits.chunks(4) {
+        let mut bits = 0u32;
+        for &digit in group {
+            let value = match digit {
+                b'A'..=b'Z' => digit - b'A',
+                b'a'..=b'z' => digit - b'a' + 26,
+                b'0'..=b'9' => digit - b'0' + 52,
+                b'+' | b'-' => 62,
+                b'/' | b'_' => 63,
+                _ => return None,
+            };
+            bits = bits << 6 | u32::from(value);
+        }
+        let count = match group.len() {
+            4 => 3,
+            3 => 2,
+            2 => 1,
+            _ => return None,
+        };
+        bits <<= 6 * (4 - group.len());
+        bytes.extend_from_slice(&bits.to_be_bytes()[1..1 + count]);
+    }
+    Some(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn base64_of_the_rfc() {
+        for (plain, encoded) in
+            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foob", "Zm9vYg=="), ("fooba", "Zm9vYmE=")]
+        {
+            assert_eq!(decode_base64(encoded).as_deref(), Some(plain.as_bytes()));
+        }
+        assert_eq!(decode_base64("Zm9v!a=="), None);
+        assert_eq!(decode_base64("Zm9vY"), None);
+    }
+
+    #[test]
+    fn percent_escapes() {
+        assert_eq!(decode_percent("a%20b%2"), b"a b%2");
+        assert_eq!(decode_percent("%zz%"), b"%zz%");
+    }
+}

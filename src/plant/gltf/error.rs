@@ -1,0 +1,192 @@
+//! What can go wrong, and what was wrong but could be lived with.
+
+use std::collections::hash_map::Entry;
+use std::collections::{HashMap, HashSet};
+use std::fmt;
+use std::path::PathBuf;
+
+/// Why a plant could not be read. Every message names the file, the place in it and a remedy.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlantError {
+    /// A file cannot be read.
+    #[error("{path}: cannot be read: {source}; check the path and its permissions", path = path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The binary container (GLB) is damaged or is no glTF.
+    #[error("{path}: byte {offset}: {what}; {remedy}", path = path.display())]
+    Container {
+        /// The file.
+        path: PathBuf,
+        /// Position of the damage in bytes.
+        offset: usize,
+        /// What is wrong.
+        what: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// The JSON part cannot be parsed, or misses something that glTF demands.
+    #[error("{path}: JSON line {line}, column {column}: {what}; export the file again or correct it in a text editor", path = path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// Line within the JSON part, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+        /// What is wrong.
+        what: String,
+    },
+    /// The file demands a version or an extension that is not understood.
+    #[error("{path}: needs {what}, which is not supported; {remedy}", path = path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// The version or extension.
+        what: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// Geometry cannot be used.
+    #[error("{path}: {place}: {what}; {remedy}", path = path.display())]
+    Data {
+        /// The file.
+        path: PathBuf,
+        /// JSON pointer to the object at fault, such as `/accessors/3`.
+        place: String,
+        /// What is wrong.
+        what: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// There is not a single triangle to draw.
+    #[error(
+        "{path}: contains no triangles to draw ({scanned}); export the tree as a mesh, in the default scene, with its triangles",
+        path = path.display()
+    )]
+    Empty {
+        /// The file.
+        path: PathBuf,
+        /// What was found instead.
+        scanned: String,
+    },
+    /// An option of the caller is out of range.
+    #[error("{path}: {what}", path = path.display())]
+    Option {
+        /// The file.
+        path: PathBuf,
+        /// Which option, its value and its range.
+        what: String,
+    },
+}
+
+/// What kind of a [`Warning`] this is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum WarningKind {
+    /// Something in the file is valid and is not used.
+    Ignored,
+    /// Something was wrong and has been put right.
+    Repaired,
+    /// Something is absent and the plant looks different for it.
+    Missing,
+}
+
+/// Something about a file that its user should know, though the plant can be drawn.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Warning {
+    /// What kind of a warning this is.
+    pub kind: WarningKind,
+    /// JSON pointer to the object (`/materials/2`), or empty for the file as a whole.
+    pub place: String,
+    /// What, and where it helps what to do.
+    pub message: String,
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let kind = match self.kind {
+            WarningKind::Ignored => "ignored",
+            WarningKind::Repaired => "repaired",
+            WarningKind::Missing => "missing",
+        };
+        match self.place.as_str() {
+            "" => write!(f, "{kind}: {}", self.message),
+            place => write!(f, "{kind}: {place}: {}", self.message),
+        }
+    }
+}
+
+/// Distinct warnings that one import keeps; what comes after them is counted.
+const MOST_WARNINGS: usize = 200;
+
+/// The warnings of one import. Those that differ in place only are kept once, with the number of places.
+#[derive(Debug, Default)]
+pub(super) struct Warnings {
+    kept: Vec<(Warning, HashSet<String>)>,
+    by_message: HashMap<(WarningKind, String), usize>,
+    surplus: usize,
+}
+
+impl Warnings {
+    pub fn push(&mut self, kind: WarningKind, place: impl Into<String>, message: impl Into<String>) {
+        let (place, message) = (place.into(), message.into());
+        let next = self.kept.len();
+        match self.by_message.entry((kind, message.clone())) {
+            Entry::Occupied(known) => {
+                let (warning, places) = &mut self.kept[*known.get()];
+                if warning.place != place {
+                    places.insert(place);
+                }
+            }
+            Entry::Vacant(_) if next >= MOST_WARNINGS => self.surplus += 1,
+            Entry::Vacant(vacant) => {
+                vacant.insert(next);
+                self.kept.push((Warning { kind, place, message }, HashSet::new()));
+            }
+        }
+    }
+
+    /// The warnings in the order in which they came up.
+    pub fn finish(self) -> Vec<Warning> {
+        let mut warnings: Vec<Warning> = self
+            .kept
+            .into_iter()
+            .map(|(mut warning, places)| {
+                if !places.is_empty() {
+                    warning.message.push_str(&format!(" (likewise in {} other places)", places.len()));
+                }
+                warning
+            })
+            .collect();
+        if self.surplus > 0 {
+            let message = format!("{} further warnings", self.surplus);
+            warnings.push(Warning { kind: WarningKind::Ignored, place: String::new(), message });
+        }
+        warnings
+    }
+}
+
+/// Trouble with an object of the file, before it is known whether it is an error or a warning.
+#[derive(Debug)]
+pub(super) struct Fault {
+    pub place: String,
+    pub what: String,
+    pub remedy: &'static str,
+}
+
+impl Fault {
+    pub fn new(place: impl Into<String>, what: impl Into<String>, remedy: &'static str) -> Self {
+        Self { place: place.into(), what: what.into(), remedy }
+    }
+
+    pub fn into_error(self, path: &std::path::Path) -> PlantError {
+        PlantError::Data { path: path.to_path_buf(), place: self.place, what: self.what, remedy: self.remedy }
+    }
+}
+
+/// The remedy for damage that only the program which wrote the file can undo.
+pub(super) const EXPORT_AGAIN: &str = "the file is damaged: export or download it again";

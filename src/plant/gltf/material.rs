@@ -1,0 +1,217 @@
+//! Materials and their textures.
+
+use std::sync::Arc;
+
+use glam::{Affine2, Mat2, Vec2, Vec3};
+use gltf::json::material::{AlphaMode, Material};
+use gltf::json::texture::Info;
+use gltf::json::validation::Checked;
+use image::{ImageReader, Limits, RgbaImage};
+
+use super::container::Document;
+use super::error::{WarningKind, Warnings};
+use super::{GltfOptions, LEAF_TRANSMISSION};
+use crate::plant::{PartKind, PlantMaterial};
+
+/// Longest side of an image in texels that is decoded.
+const LONGEST_SIDE: u32 = 16_384;
+
+/// A material with what its vertices need to know.
+pub(super) struct Surface {
+    pub name: String,
+    pub kind: PartKind,
+    pub material: PlantMaterial,
+    /// The set of texture coordinates that the textures read.
+    pub uv_set: u32,
+    /// What is done to those coordinates (KHR_texture_transform).
+    pub uv_transform: Affine2,
+}
+
+impl Surface {
+    /// Whether texture coordinates matter.
+    pub fn is_textured(&self) -> bool {
+        self.material.base_color_texture.is_some() || self.material.normal_texture.is_some()
+    }
+}
+
+/// Decoded images by index: each is decoded once, however many materials use it.
+#[derive(Default)]
+pub(super) struct Images(Vec<Option<Option<Arc<RgbaImage>>>>);
+
+/// A texture reference in either of its two shapes.
+struct Reference {
+    texture: usize,
+    uv_set: u32,
+    transform: Affine2,
+}
+
+impl Reference {
+    fn new(info: &Info) -> Self {
+        let extension = info.extensions.as_ref().and_then(|extensions| extensions.texture_transform.as_ref());
+        let transform = extension.map_or(Affine2::IDENTITY, |t| {
+            // Counter-clockwise in a frame whose v points down, as the extension's reference viewers have it.
+            let (sine, cosine) = t.rotation.0.sin_cos();
+            let rotation = Mat2::from_cols(Vec2::new(cosine, -sine), Vec2::new(sine, cosine));
+            let matrix = rotation * Mat2::from_diagonal(Vec2::from(t.scale.0));
+            Affine2::from_mat2_translation(matrix, Vec2::from(t.offset.0))
+        });
+        let uv_set = extension.and_then(|extension| extension.tex_coord).unwrap_or(info.tex_coord);
+        Self { texture: info.index.value(), uv_set, transform }
+    }
+}
+
+/// Reads material `index` (`None`: the default material of glTF).
+pub(super) fn read(
+    document: &mut Document,
+    index: Option<usize>,
+    options: &GltfOptions,
+    images: &mut Images,
+    warnings: &mut Warnings,
+) -> Surface {
+    let default = Material::default();
+    let given = index.and_then(|index| document.root.materials.get(index).cloned());
+    if let (Some(index), None) = (index, &given) {
+        let message = "does not exist; the default material (white, opaque) is used";
+        warnings.push(WarningKind::Missing, format!("/materials/{index}"), message);
+    }
+    let place = index.map_or_else(String::new, |index| format!("/materials/{index}"));
+    let source = given.as_ref().unwrap_or(&default);
+    let name =
+        source.name.clone().unwrap_or_else(|| index.map_or("default".into(), |index| format!("material {index}")));
+
+    let legacy = source.extensions.as_ref().and_then(|extensions| extensions.pbr_specular_glossiness.as_ref());
+    let (factor, base) = match legacy {
+        Some(legacy) => (legacy.diffuse_factor.0, legacy.diffuse_texture.as_ref()),
+        None => {
+            let metallic = &source.pbr_metallic_roughness;
+            (metallic.base_color_factor.0, metallic.base_color_texture.as_ref())
+        }
+    };
+    let base = base.map(Reference::new);
+    let texture = base.as_ref().and_then(|base| load(document, base.texture, &place, "base colour", images, warnings));
+
+    let kind = kind_of(source, &name, options, &place, warnings);
+    let opacity = unit(factor[3]);
+    let mut material = PlantMaterial {
+        base_color: Vec3::new(unit(factor[0]), unit(factor[1]), unit(factor[2])),
+        base_color_texture: texture,
+        normal_texture: None,
+        alpha_cutoff: 0.5,
+        transmission: Vec3::ZERO,
+    };
+    if kind == PartKind::Foliage {
+        material.transmission = options.transmission.map_or(LEAF_TRANSMISSION, |t| t.map(unit));
+        let cutoff = unit(source.alpha_cutoff.as_ref().map_or(0.5, |cutoff| cutoff.0));
+        // The factor's alpha scales the texture's; the threshold is scaled instead, to the same effect.
+        let masked = source.alpha_mode == Checked::Valid(AlphaMode::Mask);
+        if masked && opacity < cutoff {
+            let message =
+                format!("its alpha of {opacity} stays below its cutoff {cutoff}: glTF hides it, here it is drawn");
+            warnings.push(WarningKind::Repaired, &place, message);
+            material.alpha_cutoff = cutoff;
+        } else {
+            material.alpha_cutoff = if masked && opacity > 0.0 { unit(cutoff / opacity) } else { cutoff };
+        }
+    }
+
+    let mut surface = Surface {
+        name,
+        kind,
+        material,
+        uv_set: base.as_ref().map_or(0, |base| base.uv_set),
+        uv_transform: base.as_ref().map_or(Affine2::IDENTITY, |base| base.transform),
+    };
+    if let Some(normal) = &source.normal_texture {
+        if base.is_some() && (surface.uv_set != normal.tex_coord || surface.uv_transform != Affine2::IDENTITY) {
+            let message = "its normal map has texture coordinates of its own; a part has one set, the map is left out";
+            warnings.push(WarningKind::Ignored, &place, message);
+        } else {
+            surface.uv_set = normal.tex_coord;
+            surface.material.normal_texture = load(document, normal.index.value(), &place, "normal", images, warnings);
+        }
+    }
+    surface
+}
+
+/// Wood or foliage: by the caller's lists, else by the alpha mode.
+fn kind_of(source: &Material, name: &str, options: &GltfOptions, place: &str, warnings: &mut Warnings) -> PartKind {
+    let listed = |names: &[String]| names.iter().any(|listed| listed == name);
+    if listed(&options.foliage_materials) {
+        return PartKind::Foliage;
+    }
+    if listed(&options.wood_materials) {
+        return PartKind::Wood;
+    }
+    match source.alpha_mode {
+        Checked::Valid(AlphaMode::Mask) => PartKind::Foliage,
+        Checked::Valid(AlphaMode::Blend) => {
+            let message = format!("'{name}' is alpha blended; it is drawn as foliage with an alpha test at 0.5");
+            warnings.push(WarningKind::Repaired, place, message);
+            PartKind::Foliage
+        }
+        Checked::Valid(AlphaMode::Opaque) | Checked::Invalid => PartKind::Wood,
+    }
+}
+
+/// The decoded image of texture `index`, or a warning and `None`.
+fn load(
+    document: &mut Document,
+    index: usize,
+    place: &str,
+    role: &str,
+    images: &mut Images,
+    warnings: &mut Warnings,
+) -> Option<Arc<RgbaImage>> {
+    let Some(texture) = document.root.textures.get(index) else {
+        let message = format!("its {role} texture {index} does not exist; drawn untextured");
+        warnings.push(WarningKind::Missing, place, message);
+        return None;
+    };
+    let image = texture.source.value();
+    if image >= document.root.images.len() {
+        let message = format!(
+            "its {role} texture {index} has no PNG or JPEG image{}; drawn untextured: save the image as PNG",
+            texture_extensions(document)
+        );
+        warnings.push(WarningKind::Missing, place, message);
+        return None;
+    }
+    if images.0.len() <= image {
+        images.0.resize(image + 1, None);
+    }
+    if images.0[image].is_none() {
+        let decoded = document.image(image).map_err(|fault| fault.what).and_then(decode);
+        let kept = decoded.map_err(|reason| {
+            let message = format!("{reason}; what it is on is drawn untextured");
+            warnings.push(WarningKind::Missing, format!("/images/{image}"), message);
+        });
+        images.0[image] = Some(kept.ok().map(Arc::new));
+    }
+    images.0[image].clone().flatten()
+}
+
+/// The texture formats that the file uses beyond PNG and JPEG, in brackets.
+fn texture_extensions(document: &Document) -> String {
+    let used: Vec<&str> =
+        document.root.extensions_used.iter().map(String::as_str).filter(|name| name.contains("_texture_")).collect();
+    if used.is_empty() { String::new() } else { format!(" (the file uses {})", used.join(", ")) }
+}
+
+/// Decodes a PNG or JPEG, whatever its declared type.
+fn decode(bytes: Vec<u8>) -> Result<RgbaImage, String> {
+    let mut reader = ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
+    if reader.format().is_none() {
+        return Err("is neither a PNG nor a JPEG".into());
+    }
+    let mut limits = Limits::default();
+    limits.max_image_width = Some(LONGEST_SIDE);
+    limits.max_image_height = Some(LONGEST_SIDE);
+    reader.limits(limits);
+    let image = reader.decode().map_err(|error| format!("cannot be decoded: {error}"))?;
+    Ok(image.into_rgba8())
+}
+
+/// A factor of 0..1; what is not a number becomes 1.
+fn unit(value: f32) -> f32 {
+    if value.is_nan() { 1.0 } else { value.clamp(0.0, 1.0) }
+}

@@ -1,0 +1,262 @@
+//! glTF and GLB to [`Plant`](super::Plant).
+//!
+//! Reads glTF 2.0 [Khronos 2021] as JSON or GLB, with buffers and images in the file, in data URIs or in files beside
+//! it. What is used of it: the default scene's triangles with position, normal and one set of texture coordinates;
+//! base colour (factor, texture), normal texture, alpha mode and cutoff; KHR_texture_transform,
+//! KHR_materials_pbrSpecularGlossiness (its diffuse part) and KHR_mesh_quantization. Everything else is named in a
+//! [`Warning`].
+//!
+//! Files come from anywhere, so nothing in them is believed: every index, length and count is checked before it is
+//! used, and no file makes this module panic or allocate beyond its own size and fixed limits. Damage that touches
+//! geometry is a [`PlantError`]; anything else (a missing texture, a broken normal) is repaired or left out, with a
+//! warning.
+
+mod accessor;
+mod container;
+mod error;
+mod material;
+mod nodes;
+mod primitive;
+mod report;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use glam::Vec3;
+
+pub use error::{PlantError, Warning, WarningKind};
+pub use report::{PartReport, PlantReport};
+
+use super::{PartKind, Plant, PlantMesh, PlantPart};
+use error::{EXPORT_AGAIN, Fault, Warnings};
+use material::{Images, Surface};
+
+/// The default of [`super::PlantMaterial::transmission`] for foliage: greenish yellow.
+///
+/// A leaf's transmittance over its reflectance, band by band. In the plate model of a leaf [Jacquemoud & Baret
+/// 1990, "PROSPECT"] both come from the same scattering inside, so they are nearly equal where the leaf absorbs little
+/// (green). Where chlorophyll absorbs (red, and more so blue) reflectance keeps what the surface reflects, about 4 %,
+/// and transmittance all but vanishes. The three numbers round the ratios of a typical green leaf over the bands of
+/// the primaries; glTF has no field for them that is in wide use.
+pub const LEAF_TRANSMISSION: Vec3 = Vec3::new(0.6, 0.95, 0.2);
+
+/// A plant that stands farther off than this share of its height is moved to the origin.
+const FAR_OFF: f32 = 0.1;
+/// The part of the wood, from its lowest point, whose mean is the foot.
+const FOOT_SHARE: f32 = 0.02;
+/// Heights in metres outside of which a plant is probably in other units.
+const PLAUSIBLE_HEIGHTS: std::ops::RangeInclusive<f32> = 0.02..=130.0;
+
+/// How a file becomes a plant.
+#[derive(Clone, Debug, Default)]
+pub struct GltfOptions {
+    /// Height in metres to which the plant is scaled about its foot (> 0); `None` keeps the file's.
+    pub height: Option<f32>,
+    /// Names of materials that are foliage whatever their alpha mode.
+    pub foliage_materials: Vec<String>,
+    /// Names of materials that are wood whatever their alpha mode.
+    pub wood_materials: Vec<String>,
+    /// Light through leaves as a linear factor on the base colour, 0..1 each; `None` takes [`LEAF_TRANSMISSION`].
+    pub transmission: Option<Vec3>,
+    /// Name of the plant; `None` takes the file's name without its ending.
+    pub name: Option<String>,
+}
+
+/// Reads the plant in `path` (.gltf or .glb).
+///
+/// - Materials with alpha mode MASK or BLEND are [`PartKind::Foliage`], others [`PartKind::Wood`], unless `options`
+///   names them. All primitives with the same material become one part; wood comes first.
+/// - The plant's foot is the middle of the lowest 2 % of its wood (of all of it where there is no wood). Where the
+///   foot is farther than 10 % of the height from the origin, sideways or in height, the plant is moved there; nearer
+///   it is left as modelled, so that roots stay below the ground.
+/// - With [`GltfOptions::height`] it is then scaled to that height.
+///
+/// # Errors
+/// [`PlantError`] if the file cannot be read, is no glTF 2.0, demands an unknown extension, has geometry that cannot
+/// be used or has no triangles, or if an option is out of range.
+pub fn load_plant(path: &Path, options: &GltfOptions) -> Result<(Plant, Vec<Warning>), PlantError> {
+    if let Some(height) = options.height.filter(|height| !(height.is_finite() && *height > 0.0)) {
+        let what = format!("height = {height} m cannot be; give a height above 0 or leave it out");
+        return Err(PlantError::Option { path: path.to_path_buf(), what });
+    }
+    let mut warnings = Warnings::default();
+    let mut document = container::open(path, &mut warnings)?;
+    check_extensions(&document.root, path, &mut warnings)?;
+    let mut gathered = gather(&mut document, options, &mut warnings).map_err(|fault| fault.into_error(path))?;
+    gathered.retain(|(_, mesh)| !mesh.triangles.is_empty());
+    if gathered.is_empty() {
+        let root = &document.root;
+        let scanned = format!("{} scenes, {} nodes, {} meshes", root.scenes.len(), root.nodes.len(), root.meshes.len());
+        return Err(PlantError::Empty { path: path.to_path_buf(), scanned });
+    }
+    mention_unused(&document.root, options, &mut warnings);
+
+    let stem = path.file_stem().map_or_else(|| "plant".into(), |stem| stem.to_string_lossy().into_owned());
+    let mut plant = Plant { name: options.name.clone().unwrap_or(stem), parts: Vec::new() };
+    gathered.sort_by_key(|(surface, _)| surface.kind == PartKind::Foliage);
+    for (surface, mesh) in gathered {
+        plant.parts.push(PlantPart { kind: surface.kind, mesh, material: surface.material });
+    }
+    mention_absent_kind(&plant, &mut warnings);
+    stand(&mut plant, options, &mut warnings).map_err(|fault| fault.into_error(path))?;
+    Ok((plant, warnings.finish()))
+}
+
+/// Extensions whose absence changes looks at most.
+fn is_harmless(extension: &str) -> bool {
+    const PREFIXES: [&str; 7] =
+        ["KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_", "KHR_xmp", "KHR_animation_"];
+    extension == "KHR_mesh_quantization" || PREFIXES.iter().any(|prefix| extension.starts_with(prefix))
+}
+
+/// Extensions that are understood.
+fn is_understood(extension: &str) -> bool {
+    ["KHR_texture_transform", "KHR_materials_pbrSpecularGlossiness", "KHR_mesh_quantization"].contains(&extension)
+}
+
+fn check_extensions(root: &gltf::json::Root, path: &Path, warnings: &mut Warnings) -> Result<(), PlantError> {
+    if let Some(required) = root.extensions_required.iter().find(|name| !is_harmless(name)) {
+        return Err(PlantError::Unsupported {
+            path: path.to_path_buf(),
+            what: format!("the extension {required}"),
+            remedy: "export without it (compression and instancing off)",
+        });
+    }
+    for name in root.extensions_used.iter().filter(|name| !is_understood(name)) {
+        warnings.push(WarningKind::Ignored, "/extensionsUsed", format!("the extension {name}"));
+    }
+    Ok(())
+}
+
+/// Reads all meshes of the scene, one mesh per material, in the order of the materials.
+fn gather(
+    document: &mut container::Document,
+    options: &GltfOptions,
+    warnings: &mut Warnings,
+) -> Result<Vec<(Surface, PlantMesh)>, Fault> {
+    let mut placements = nodes::placements(&document.root, warnings)?;
+    if document.root.nodes.is_empty() && !document.root.meshes.is_empty() {
+        // A file that is a collection of meshes without a scene: they are the plant.
+        warnings.push(WarningKind::Repaired, "/nodes", "there are no nodes; all meshes are used as they are");
+        let meshes = 0..document.root.meshes.len();
+        placements.extend(meshes.map(|mesh| nodes::Placement { node: mesh, mesh, transform: glam::DMat4::IDENTITY }));
+    }
+
+    let mut images = Images::default();
+    let mut parts: BTreeMap<Option<usize>, (Surface, PlantMesh)> = BTreeMap::new();
+    let mut total = 0u64;
+    for placement in placements {
+        let place = format!("/meshes/{}", placement.mesh);
+        let Some(mesh) = document.root.meshes.get(placement.mesh).cloned() else {
+            return Err(Fault::new(place, format!("does not exist, node {} uses it", placement.node), EXPORT_AGAIN));
+        };
+        for (index, primitive) in mesh.primitives.iter().enumerate() {
+            let place = format!("{place}/primitives/{index}");
+            total = total.saturating_add(primitive::claimed_size(document, primitive));
+            primitive::check_budget(total, &place)?;
+            let material = primitive.material.map(|material| material.value());
+            let (surface, merged) = parts.entry(material).or_insert_with(|| {
+                (material::read(document, material, options, &mut images, warnings), PlantMesh::default())
+            });
+            let Some(mut mesh) = primitive::read(document, primitive, &place, surface, warnings)? else {
+                continue;
+            };
+            let flattened = nodes::apply(&mut mesh, &placement.transform, &format!("/nodes/{}", placement.node))?;
+            if flattened > 0 {
+                let message = format!("its transform flattens {flattened} triangles; left out");
+                warnings.push(WarningKind::Repaired, format!("/nodes/{}", placement.node), message);
+            }
+            append(merged, mesh);
+        }
+    }
+    Ok(parts.into_values().collect())
+}
+
+/// Appends `mesh` to `merged`.
+fn append(merged: &mut PlantMesh, mesh: PlantMesh) {
+    let first = merged.positions.len() as u32;
+    merged.positions.extend(mesh.positions);
+    merged.normals.extend(mesh.normals);
+    merged.uvs.extend(mesh.uvs);
+    merged.triangles.extend(mesh.triangles.into_iter().map(|triangle| triangle.map(|index| index + first)));
+}
+
+/// Names what the file has and a plant does not use, and options that fit nothing.
+fn mention_unused(root: &gltf::json::Root, options: &GltfOptions, warnings: &mut Warnings) {
+    let unused = [("animations", root.animations.len()), ("skins", root.skins.len()), ("cameras", root.cameras.len())];
+    for (name, count) in unused.into_iter().filter(|(_, count)| *count > 0) {
+        warnings.push(WarningKind::Ignored, format!("/{name}"), format!("{count} {name}; the plant stands still"));
+    }
+    for name in options.foliage_materials.iter().chain(&options.wood_materials) {
+        if !root.materials.iter().any(|material| material.name.as_ref() == Some(name)) {
+            let known: Vec<&str> = root.materials.iter().filter_map(|material| material.name.as_deref()).collect();
+            let message = format!("the options name a material '{name}'; the file has: {}", known.join(", "));
+            warnings.push(WarningKind::Missing, "/materials", message);
+        }
+    }
+}
+
+fn mention_absent_kind(plant: &Plant, warnings: &mut Warnings) {
+    if plant.triangle_count(PartKind::Foliage) == 0 {
+        let message =
+            "no foliage: no used material has alpha mode MASK or BLEND; name the leaves' materials as foliage";
+        warnings.push(WarningKind::Missing, "/materials", message);
+    }
+    if plant.triangle_count(PartKind::Wood) == 0 {
+        let message = "no wood: all used materials are alpha tested; name the bark's materials as wood if there is any";
+        warnings.push(WarningKind::Missing, "/materials", message);
+    }
+}
+
+/// Puts the plant's foot to the origin if it is far off, and scales it.
+fn stand(plant: &mut Plant, options: &GltfOptions, warnings: &mut Warnings) -> Result<(), Fault> {
+    let Some(bounds) = plant.bounds() else {
+        return Ok(());
+    };
+    let tall = bounds.size().y;
+    let foot = foot(plant);
+    let sideways = Vec3::new(foot.x, 0.0, foot.z).length();
+    let limit = FAR_OFF * tall.max(f32::MIN_POSITIVE);
+    if sideways > limit || foot.y.abs() > limit {
+        for position in plant.parts.iter_mut().flat_map(|part| part.mesh.positions.iter_mut()) {
+            *position -= foot;
+        }
+        let message = format!("its foot stood at ({:.2}, {:.2}, {:.2}) m; moved to the origin", foot.x, foot.y, foot.z);
+        warnings.push(WarningKind::Repaired, "", message);
+    }
+    let height = plant.height();
+    match options.height {
+        Some(wanted) => {
+            let factor = wanted / height;
+            if !(factor.is_finite() && factor > 0.0) {
+                let what = format!("a plant {height} m high cannot be scaled to {wanted} m");
+                return Err(Fault::new("", what, "leave its height out, or correct the model"));
+            }
+            plant.scale(factor);
+        }
+        None if !PLAUSIBLE_HEIGHTS.contains(&height) => {
+            let message = format!("the plant is {height} m high; if the file is not in metres, give its height");
+            warnings.push(WarningKind::Missing, "", message);
+        }
+        None => {}
+    }
+    let finite = plant.parts.iter().flat_map(|part| &part.mesh.positions).all(|position| position.is_finite());
+    if finite { Ok(()) } else { Err(Fault::new("", "positions leave the range of numbers", EXPORT_AGAIN)) }
+}
+
+/// The middle of the lowest 2 % of the wood (of the plant where there is none), at the height of its lowest point.
+fn foot(plant: &Plant) -> Vec3 {
+    let has_wood = plant.triangle_count(PartKind::Wood) > 0;
+    let counts = |kind: PartKind| !has_wood || kind == PartKind::Wood;
+    let Some(bounds) = plant.bounds_of(counts) else {
+        return Vec3::ZERO;
+    };
+    let limit = bounds.min.y + FOOT_SHARE * bounds.size().y;
+    let parts = plant.parts.iter().filter(|part| counts(part.kind));
+    let low = parts.flat_map(|part| &part.mesh.positions).filter(|position| position.y <= limit);
+    let (sum, count) = low.fold((glam::DVec2::ZERO, 0.0), |(sum, count), p| {
+        (sum + p.as_dvec3().truncate().with_y(f64::from(p.z)), count + 1.0)
+    });
+    let middle = if count > 0.0 { (sum / count).as_vec2() } else { glam::Vec2::ZERO };
+    Vec3::new(middle.x, bounds.min.y, middle.y)
+}

@@ -1,0 +1,73 @@
+//! A small counter-free random stream, fixed for all time.
+//!
+//! `SplitMix64` (Steele, Lea & Flood 2014, "Fast splittable pseudorandom number generators", OOPSLA): 64 bits of
+//! state, splittable by a key. The generators of the `rand` crate may change their streams from one version to the
+//! next; a tree that is named by its seed in a scene file must not.
+
+/// A stream of random numbers.
+#[derive(Clone, Debug)]
+pub(super) struct Random {
+    state: u64,
+}
+
+impl Random {
+    /// A stream for `seed`. Neighbouring seeds give unrelated streams.
+    pub fn new(seed: u64) -> Self {
+        Self { state: mix(seed ^ 0x5851_f42d_4c95_7f2d) }
+    }
+
+    /// An independent stream for the part `key` of what this stream describes; this stream does not advance.
+    pub fn split(&self, key: u64) -> Self {
+        Self { state: mix(self.state ^ mix(key.wrapping_add(0x9e37_79b9_7f4a_7c15))) }
+    }
+
+    /// The next number, evenly in `0.0..1.0`.
+    pub fn unit(&mut self) -> f32 {
+        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        (mix(self.state) >> 40) as f32 / (1u64 << 24) as f32
+    }
+
+    /// The next number, evenly in `-1.0..1.0`.
+    pub fn signed(&mut self) -> f32 {
+        2.0 * self.unit() - 1.0
+    }
+
+    /// The next number, evenly in `low..high`.
+    pub fn range(&mut self, low: f32, high: f32) -> f32 {
+        low + (high - low) * self.unit()
+    }
+}
+
+/// The finaliser of `SplitMix64`.
+pub(super) fn mix(mut z: u64) -> u64 {
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Random;
+
+    #[test]
+    fn numbers_fill_the_unit_interval_evenly() {
+        let mut random = Random::new(7);
+        let mut bins = [0u32; 10];
+        for _ in 0..10_000 {
+            let x = random.unit();
+            assert!((0.0..1.0).contains(&x));
+            bins[(x * 10.0) as usize] += 1;
+        }
+        // Binomial: 1000 with a standard deviation of 30.
+        assert!(bins.iter().all(|&n| (850..1150).contains(&n)), "{bins:?}");
+    }
+
+    #[test]
+    fn parts_have_streams_of_their_own() {
+        let whole = Random::new(1);
+        let (mut a, mut b, mut again) = (whole.split(1), whole.split(2), whole.split(1));
+        let first = a.unit();
+        assert_ne!(first, b.unit());
+        assert_eq!(first, again.unit());
+    }
+}

@@ -1,0 +1,147 @@
+//! What a tree is: wood and foliage as triangle meshes with materials.
+//!
+//! A [`Plant`] comes from a glTF file ([`gltf`]) or is grown by rule ([`grow`]). It stands with its trunk's
+//! foot at the origin, Y up, in metres. Everything downstream (bakes, levels of detail, passes) reads this type.
+
+pub mod gltf;
+pub mod grow;
+pub mod texture;
+
+use std::sync::Arc;
+
+use glam::{Vec2, Vec3};
+use image::RgbaImage;
+
+/// One individual plant in its own frame: metres, Y up, the trunk's foot at the origin.
+#[derive(Clone, Debug, Default)]
+pub struct Plant {
+    /// Name for messages and reports.
+    pub name: String,
+    /// The parts, each with one material. May be empty (a plant of nothing is drawn as nothing).
+    pub parts: Vec<PlantPart>,
+}
+
+/// A part of a plant that is drawn with one material.
+#[derive(Clone, Debug)]
+pub struct PlantPart {
+    /// Wood is opaque, foliage is alpha tested and lit on both sides.
+    pub kind: PartKind,
+    /// The triangles.
+    pub mesh: PlantMesh,
+    /// Colour, textures, transmission.
+    pub material: PlantMaterial,
+}
+
+/// Whether a part is wood or foliage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PartKind {
+    /// Trunk and branches: opaque, single sided, no transmission.
+    Wood,
+    /// Leaves, needles, blossoms: alpha tested, double sided, transmits light.
+    Foliage,
+}
+
+/// An indexed triangle mesh. `positions`, `normals` and `uvs` have the same length;
+/// every index in `triangles` is below it; all values are finite and normals have unit length.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PlantMesh {
+    /// Vertex positions in metres.
+    pub positions: Vec<Vec3>,
+    /// Unit vertex normals.
+    pub normals: Vec<Vec3>,
+    /// Texture coordinates, origin at the image's upper left; may leave 0..1 (textures repeat).
+    pub uvs: Vec<Vec2>,
+    /// Counter-clockwise triangles (front side), as vertex indices.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// The material of one part.
+#[derive(Clone, Debug)]
+pub struct PlantMaterial {
+    /// Linear factor on the base colour, 0..1.
+    pub base_color: Vec3,
+    /// Base colour: sRGB-encoded RGB, linear straight alpha. `None` is white and opaque.
+    pub base_color_texture: Option<Arc<RgbaImage>>,
+    /// Tangent-space normals as RGB8, OpenGL convention (+Y up). `None` is flat.
+    pub normal_texture: Option<Arc<RgbaImage>>,
+    /// Threshold of the alpha test, 0..1; foliage only.
+    pub alpha_cutoff: f32,
+    /// Linear colour of the light that passes diffusely through a leaf, as a factor on the base colour, 0..1 each;
+    /// zero for wood.
+    pub transmission: Vec3,
+}
+
+impl Default for PlantMaterial {
+    fn default() -> Self {
+        Self {
+            base_color: Vec3::ONE,
+            base_color_texture: None,
+            normal_texture: None,
+            alpha_cutoff: 0.5,
+            transmission: Vec3::ZERO,
+        }
+    }
+}
+
+/// An axis-aligned box in metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Smallest corner.
+    pub min: Vec3,
+    /// Largest corner.
+    pub max: Vec3,
+}
+
+impl Bounds {
+    /// Extent along each axis, metres.
+    pub fn size(&self) -> Vec3 {
+        self.max - self.min
+    }
+
+    /// Middle of the box.
+    pub fn center(&self) -> Vec3 {
+        0.5 * (self.min + self.max)
+    }
+}
+
+impl Plant {
+    /// The box around all vertices, or `None` for a plant without any.
+    pub fn bounds(&self) -> Option<Bounds> {
+        self.bounds_of(|_| true)
+    }
+
+    /// The box around the vertices of the parts that `select` accepts, or `None` where there are none.
+    pub fn bounds_of(&self, select: impl Fn(PartKind) -> bool) -> Option<Bounds> {
+        let mut points = self
+            .parts
+            .iter()
+            .filter(|part| select(part.kind))
+            .flat_map(|part| part.mesh.positions.iter().copied());
+        let first = points.next()?;
+        Some(points.fold(Bounds { min: first, max: first }, |b, p| Bounds {
+            min: b.min.min(p),
+            max: b.max.max(p),
+        }))
+    }
+
+    /// Height above the foot in metres (0 for an empty plant).
+    pub fn height(&self) -> f32 {
+        self.bounds().map_or(0.0, |b| b.max.y.max(0.0))
+    }
+
+    /// Number of triangles of the parts of `kind`.
+    pub fn triangle_count(&self, kind: PartKind) -> usize {
+        self.parts
+            .iter()
+            .filter(|part| part.kind == kind)
+            .map(|part| part.mesh.triangles.len())
+            .sum()
+    }
+
+    /// Scales the plant about its foot by `factor` (> 0), in place.
+    pub fn scale(&mut self, factor: f32) {
+        for position in self.parts.iter_mut().flat_map(|part| part.mesh.positions.iter_mut()) {
+            *position *= factor;
+        }
+    }
+}

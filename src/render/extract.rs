@@ -1,0 +1,59 @@
+//! What the render world learns of the main world each frame: shared pointers and a few numbers, nothing copied.
+
+use bevy::{
+    asset::AssetId,
+    ecs::{entity::Entity, query::With, resource::Resource, system::Query, system::Res, system::ResMut},
+    math::Affine3A,
+    mesh::{Mesh, Mesh3d},
+    render::Extract,
+    transform::components::GlobalTransform,
+};
+use glam::DVec3;
+
+use super::components::{
+    CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, SunShadowSettings, ViewOptions,
+};
+
+/// The main world's side of a frame.
+#[derive(Resource, Default)]
+pub struct ExtractedScene {
+    /// Scene position of the Bevy world's origin, metres.
+    pub origin: DVec3,
+    /// Forests by main-world entity, in the entities' order.
+    pub forests: Vec<(Entity, Forest)>,
+    /// The first ground, if any.
+    pub ground: Option<(Entity, Ground)>,
+    /// The light, if it has been set.
+    pub daylight: Option<Daylight>,
+    /// Meshes that cast onto Canopy's passes, with their place in the Bevy world.
+    pub casters: Vec<(AssetId<Mesh>, Affine3A)>,
+    /// Shadow settings.
+    pub shadow: SunShadowSettings,
+    /// View options.
+    pub options: ViewOptions,
+}
+
+/// Fills [`ExtractedScene`].
+pub fn extract_scene(
+    mut scene: ResMut<ExtractedScene>,
+    origin: Extract<Res<CanopyOrigin>>,
+    forests: Extract<Query<(Entity, &Forest)>>,
+    grounds: Extract<Query<(Entity, &Ground)>>,
+    casters: Extract<Query<(Entity, &Mesh3d, &GlobalTransform), With<CastsCanopyShadow>>>,
+    daylight: Extract<Option<Res<Daylight>>>,
+    shadow: Extract<Res<SunShadowSettings>>,
+    options: Extract<Res<ViewOptions>>,
+) {
+    scene.origin = origin.0;
+    scene.forests.clear();
+    scene.forests.extend(forests.iter().map(|(entity, forest)| (entity, forest.clone())));
+    scene.forests.sort_by_key(|(entity, _)| *entity);
+    scene.ground = grounds.iter().min_by_key(|(entity, _)| *entity).map(|(entity, ground)| (entity, ground.clone()));
+    scene.daylight = daylight.as_ref().map(|light| Daylight(light.0.clone()));
+    let mut meshes: Vec<_> = casters.iter().collect();
+    meshes.sort_by_key(|(entity, ..)| *entity);
+    scene.casters.clear();
+    scene.casters.extend(meshes.into_iter().map(|(_, mesh, place)| (mesh.0.id(), place.affine())));
+    scene.shadow = **shadow;
+    scene.options = **options;
+}

@@ -1,0 +1,82 @@
+//! The forest pass of a view.
+
+use bevy::{
+    ecs::system::Res,
+    render::{
+        diagnostic::RecordDiagnostics,
+        render_resource::{IndexFormat, PipelineCache, RenderPassDescriptor, StoreOp},
+        renderer::{RenderContext, ViewQuery},
+        view::{ViewDepthTexture, ViewTarget},
+    },
+};
+
+use super::{ForestPipelines, GpuForests, PreparedForests};
+use crate::{
+    plant::PartKind,
+    render::{components::CanopyCamera, frame::FrameBindGroup},
+};
+
+/// Vertices that the cross shader pulls for one tree.
+const VERTICES_A_CROSS: u32 = 18;
+
+/// Draws every forest into the camera's colour and depth.
+pub fn forest_pass(
+    view: ViewQuery<(&ViewTarget, &ViewDepthTexture, &CanopyCamera)>,
+    frame: Res<FrameBindGroup>,
+    forests: Res<GpuForests>,
+    prepared: Res<PreparedForests>,
+    pipelines: Res<ForestPipelines>,
+    cache: Res<PipelineCache>,
+    mut ctx: RenderContext,
+) {
+    let (target, depth, _) = view.into_inner();
+    let (Some(frame), Some([wood, foliage, crosses])) = (&frame.0, pipelines.current) else { return };
+    let something = forests.iter().any(|(entity, _)| {
+        prepared.get(entity).is_some_and(|forest| forest.lists.model_count() + forest.lists.cross_count() > 0)
+    });
+    let (Some(wood), Some(foliage), Some(crosses)) =
+        (cache.get_render_pipeline(wood), cache.get_render_pipeline(foliage), cache.get_render_pipeline(crosses))
+    else {
+        return;
+    };
+    if !something {
+        return;
+    }
+    let diagnostics = ctx.diagnostic_recorder();
+    let diagnostics = diagnostics.as_deref();
+    let mut pass = ctx.begin_tracked_render_pass(RenderPassDescriptor {
+        label: Some("canopy_forest"),
+        color_attachments: &[Some(target.get_color_attachment())],
+        depth_stencil_attachment: Some(depth.get_attachment(StoreOp::Store)),
+        timestamp_writes: None,
+        occlusion_query_set: None,
+        multiview_mask: None,
+    });
+    let span = diagnostics.pass_span(&mut pass, "canopy_forest");
+    for (entity, forest) in forests.iter() {
+        let Some(lists) = prepared.get(entity) else { continue };
+        pass.set_bind_group(0, frame, &[]);
+        pass.set_bind_group(1, &lists.bind_group, &[0]);
+        for (kind, pipeline) in [(PartKind::Wood, wood), (PartKind::Foliage, foliage)] {
+            pass.set_render_pipeline(pipeline);
+            for (range, parts) in lists.lists.models.iter().zip(&forest.parts) {
+                if range.is_empty() {
+                    continue;
+                }
+                for part in parts.iter().filter(|part| part.kind == kind && part.model.index_count > 0) {
+                    pass.set_bind_group(2, &part.bind_group, &[]);
+                    pass.set_vertex_buffer(0, part.model.vertices.slice(..));
+                    pass.set_index_buffer(part.model.indices.slice(..), IndexFormat::Uint32);
+                    pass.draw_indexed(0..part.model.index_count, 0, range.clone());
+                }
+            }
+        }
+        let range = &lists.lists.crosses;
+        if !range.is_empty() {
+            pass.set_render_pipeline(crosses);
+            pass.set_bind_group(2, &forest.cross_bind_group, &[]);
+            pass.draw(range.start * VERTICES_A_CROSS..range.end * VERTICES_A_CROSS, 0..1);
+        }
+    }
+    span.end(&mut pass);
+}

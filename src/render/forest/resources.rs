@@ -1,0 +1,433 @@
+//! A forest on the GPU: made when the entity appears or changes, dropped when it is gone.
+
+use std::sync::Arc;
+
+use bevy::{
+    ecs::{
+        entity::Entity,
+        resource::Resource,
+        system::{Res, ResMut},
+        world::{FromWorld, World},
+    },
+    platform::collections::HashMap,
+    render::{
+        render_resource::{
+            AddressMode, BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer,
+            BufferUsages, FilterMode, MipmapFilterMode, PipelineCache, Sampler, SamplerBindingType, SamplerDescriptor,
+            ShaderStages, TextureFormat, TextureSampleType, TextureView,
+            binding_types::{
+                sampler, storage_buffer_read_only_sized, texture_2d, texture_2d_array, uniform_buffer_sized,
+            },
+        },
+        renderer::{RenderDevice, RenderQueue},
+    },
+};
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use super::vertex::PlantVertex;
+use crate::{
+    bake::BakedPlant,
+    plant::{
+        PartKind, PlantMaterial, PlantMesh,
+        texture::{MipChain, alpha_tested_mips, color_mips, fade_alpha, normal_mips},
+    },
+    render::{components::Forest, cull::VariantSize, extract::ExtractedScene, gpu},
+    scatter::{PackedStand, PackedTree},
+};
+
+/// `ForestView` of `shaders/forest/instance.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct ForestViewUniform {
+    /// Cell of the anchor.
+    pub anchor_cell: [i32; 2],
+    /// Metres of the anchor inside its cell.
+    pub anchor_offset: [f32; 2],
+    /// Anchor's height over the stand's datum.
+    pub anchor_y: f32,
+    /// Metres along a cell's side.
+    pub cell_size: f32,
+    /// Where the full model begins to give way, metres.
+    pub fade_start: f32,
+    /// Where it is gone, metres.
+    pub fade_end: f32,
+}
+
+/// `Plane` of `shaders/forest/instance.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct PlaneUniform {
+    /// Middle of the picture, metres in the plant's frame.
+    pub center: [f32; 4],
+    /// Half extent to the picture's right.
+    pub u: [f32; 4],
+    /// Half extent upwards.
+    pub v: [f32; 4],
+    /// Unit normal towards the side that the picture was taken from.
+    pub normal: [f32; 4],
+}
+
+/// Planes of a cross.
+pub const PLANES: usize = 3;
+
+/// `Variant` of `shaders/forest/instance.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct VariantUniform {
+    /// Two upright planes and a level one.
+    pub planes: [PlaneUniform; PLANES],
+    /// Height, crown radius, first layer of its pictures, 1 where it has a full model.
+    pub size: [f32; 4],
+    /// Transmission of its leaves.
+    pub transmission: [f32; 4],
+}
+
+/// `Part` of `shaders/forest/model.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct PartUniform {
+    /// Linear factor on the texture.
+    pub base_color: [f32; 4],
+    /// Transmission factor.
+    pub transmission: [f32; 4],
+}
+
+/// Bind group layouts of everything that draws trees.
+#[derive(Resource)]
+pub struct ForestLayouts {
+    /// Group 1: instances.
+    pub instances: BindGroupLayoutDescriptor,
+    /// Group 2 of full models.
+    pub part: BindGroupLayoutDescriptor,
+    /// Group 2 of crosses.
+    pub cross: BindGroupLayoutDescriptor,
+    part_sampler: Sampler,
+    cross_sampler: Sampler,
+}
+
+impl FromWorld for ForestLayouts {
+    fn from_world(world: &mut World) -> Self {
+        let device = world.resource::<RenderDevice>();
+        let float = TextureSampleType::Float { filterable: true };
+        let part_sampler = |address| {
+            device.create_sampler(&SamplerDescriptor {
+                label: Some("canopy_plant"),
+                address_mode_u: address,
+                address_mode_v: address,
+                mag_filter: FilterMode::Linear,
+                min_filter: FilterMode::Linear,
+                mipmap_filter: MipmapFilterMode::Linear,
+                ..Default::default()
+            })
+        };
+        Self {
+            instances: BindGroupLayoutDescriptor::new(
+                "canopy_instances",
+                &BindGroupLayoutEntries::sequential(
+                    ShaderStages::VERTEX,
+                    (
+                        uniform_buffer_sized(true, std::num::NonZeroU64::new(size_of::<ForestViewUniform>() as u64)),
+                        storage_buffer_read_only_sized(false, None),
+                        storage_buffer_read_only_sized(false, None),
+                        storage_buffer_read_only_sized(false, None),
+                    ),
+                ),
+            ),
+            part: BindGroupLayoutDescriptor::new(
+                "canopy_plant_part",
+                &BindGroupLayoutEntries::sequential(
+                    ShaderStages::FRAGMENT,
+                    (
+                        texture_2d(float),
+                        texture_2d(float),
+                        sampler(SamplerBindingType::Filtering),
+                        uniform_buffer_sized(false, std::num::NonZeroU64::new(size_of::<PartUniform>() as u64)),
+                    ),
+                ),
+            ),
+            cross: BindGroupLayoutDescriptor::new(
+                "canopy_cross",
+                &BindGroupLayoutEntries::sequential(
+                    ShaderStages::FRAGMENT,
+                    (texture_2d_array(float), texture_2d_array(float), sampler(SamplerBindingType::Filtering)),
+                ),
+            ),
+            part_sampler: part_sampler(AddressMode::Repeat),
+            cross_sampler: part_sampler(AddressMode::ClampToEdge),
+        }
+    }
+}
+
+/// Vertices and indices of one part, full or proxy.
+pub struct GpuMesh {
+    /// [`PlantVertex`]es.
+    pub vertices: Buffer,
+    /// 32-bit indices.
+    pub indices: Buffer,
+    /// Number of indices; 0 draws nothing.
+    pub index_count: u32,
+}
+
+/// One part of a plant.
+pub struct GpuPart {
+    /// Wood or foliage.
+    pub kind: PartKind,
+    /// The full model.
+    pub model: GpuMesh,
+    /// What casts the near shadow.
+    pub proxy: GpuMesh,
+    /// Group 2.
+    pub bind_group: BindGroup,
+}
+
+/// A forest's GPU side.
+pub struct GpuForest {
+    stand: Arc<PackedStand>,
+    plants: Arc<Vec<BakedPlant>>,
+    /// What the entity asks for now.
+    pub forest: Forest,
+    /// [`PackedTree`]s.
+    pub trees: Buffer,
+    /// [`VariantUniform`]s.
+    pub variants: Buffer,
+    /// Size of each variant, for culling.
+    pub sizes: Vec<VariantSize>,
+    /// Parts by variant.
+    pub parts: Vec<Vec<GpuPart>>,
+    /// Group 2 of the crosses.
+    pub cross_bind_group: BindGroup,
+    /// Counts up with every change of content, so that shadows know.
+    pub generation: u64,
+}
+
+/// All forests of the world by their main-world entity.
+#[derive(Resource, Default)]
+pub struct GpuForests {
+    forests: HashMap<Entity, GpuForest>,
+    /// Entities in a fixed order.
+    pub order: Vec<Entity>,
+    generations: u64,
+}
+
+impl GpuForests {
+    /// Forests in a fixed order.
+    pub fn iter(&self) -> impl Iterator<Item = (Entity, &GpuForest)> {
+        self.order.iter().filter_map(|entity| self.forests.get(entity).map(|forest| (*entity, forest)))
+    }
+
+    /// One forest.
+    pub fn get(&self, entity: Entity) -> Option<&GpuForest> {
+        self.forests.get(&entity)
+    }
+}
+
+/// Uploads new and changed forests, forgets despawned ones.
+pub fn prepare_forests(
+    scene: Res<ExtractedScene>,
+    layouts: Res<ForestLayouts>,
+    device: Res<RenderDevice>,
+    queue: Res<RenderQueue>,
+    pipelines: Res<PipelineCache>,
+    mut forests: ResMut<GpuForests>,
+) {
+    let forests = &mut *forests;
+    forests.order = scene.forests.iter().map(|(entity, _)| *entity).collect();
+    let alive: Vec<Entity> = forests.order.clone();
+    forests.forests.retain(|entity, _| alive.contains(entity));
+    for (entity, forest) in &scene.forests {
+        if let Some(known) = forests.forests.get_mut(entity)
+            && Arc::ptr_eq(&known.stand, &forest.stand)
+            && Arc::ptr_eq(&known.plants, &forest.plants)
+        {
+            if known.forest.origin != forest.origin {
+                forests.generations += 1;
+                known.generation = forests.generations;
+            }
+            known.forest = forest.clone();
+            continue;
+        }
+        forests.generations += 1;
+        let made = upload(forest, forests.generations, &layouts, &device, &queue, &pipelines);
+        forests.forests.insert(*entity, made);
+    }
+}
+
+fn upload(
+    forest: &Forest,
+    generation: u64,
+    layouts: &ForestLayouts,
+    device: &RenderDevice,
+    queue: &RenderQueue,
+    pipelines: &PipelineCache,
+) -> GpuForest {
+    let storage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
+    let mut textures = TextureShelf::default();
+    let parts = forest
+        .plants
+        .iter()
+        .map(|plant| upload_parts(plant, layouts, &mut textures, device, queue, pipelines))
+        .collect();
+    let sizes: Vec<VariantSize> = forest.plants.iter().map(variant_size).collect();
+    let variants: Vec<VariantUniform> =
+        forest.plants.iter().zip(&sizes).enumerate().map(|(i, (plant, size))| variant(i, plant, size)).collect();
+    GpuForest {
+        stand: forest.stand.clone(),
+        plants: forest.plants.clone(),
+        forest: forest.clone(),
+        trees: gpu::buffer_with::<PackedTree>(device, "canopy_trees", storage, &forest.stand.trees),
+        variants: gpu::buffer_with(device, "canopy_variants", storage, &variants),
+        sizes,
+        parts,
+        cross_bind_group: upload_crosses(&forest.plants, layouts, device, queue, pipelines),
+        generation,
+    }
+}
+
+fn variant_size(plant: &BakedPlant) -> VariantSize {
+    plant.plant.bounds().map_or(VariantSize { height: 0.0, radius: 0.0 }, |bounds| VariantSize {
+        height: bounds.max.y.max(0.0),
+        radius: Vec3::new(bounds.min.x.abs().max(bounds.max.x.abs()), 0.0, bounds.min.z.abs().max(bounds.max.z.abs()))
+            .length(),
+    })
+}
+
+fn variant(index: usize, plant: &BakedPlant, size: &VariantSize) -> VariantUniform {
+    let mut planes = [PlaneUniform::default(); PLANES];
+    for (slot, plane) in planes.iter_mut().zip(&plant.cross.planes) {
+        *slot = PlaneUniform {
+            center: plane.center.extend(0.0).to_array(),
+            u: plane.u.extend(0.0).to_array(),
+            v: plane.v.extend(0.0).to_array(),
+            normal: plane.normal.extend(0.0).to_array(),
+        };
+    }
+    VariantUniform {
+        planes,
+        size: [size.height, size.radius, (index * PLANES) as f32, 1.0],
+        transmission: plant.cross.transmission.extend(0.0).to_array(),
+    }
+}
+
+/// Textures that several parts share are uploaded once.
+#[derive(Default)]
+struct TextureShelf {
+    views: HashMap<(usize, bool), TextureView>,
+}
+
+impl TextureShelf {
+    fn color(
+        &mut self,
+        material: &PlantMaterial,
+        kind: PartKind,
+        device: &RenderDevice,
+        queue: &RenderQueue,
+    ) -> TextureView {
+        let format = TextureFormat::Rgba8UnormSrgb;
+        let Some(image) = &material.base_color_texture else {
+            return gpu::texture(device, queue, "canopy_white", format, &plain([255; 4]));
+        };
+        let foliage = kind == PartKind::Foliage;
+        self.views
+            .entry((Arc::as_ptr(image) as usize, foliage))
+            .or_insert_with(|| {
+                let chain = if foliage {
+                    alpha_tested_mips(&fade_alpha(image, material.alpha_cutoff))
+                } else {
+                    color_mips(image)
+                };
+                gpu::texture(device, queue, "canopy_base_color", format, &chain)
+            })
+            .clone()
+    }
+
+    fn normal(&mut self, material: &PlantMaterial, device: &RenderDevice, queue: &RenderQueue) -> TextureView {
+        let format = TextureFormat::Rgba8Unorm;
+        let Some(image) = &material.normal_texture else {
+            return gpu::texture(device, queue, "canopy_flat", format, &plain([128, 128, 255, 255]));
+        };
+        self.views
+            .entry((Arc::as_ptr(image) as usize, false))
+            .or_insert_with(|| gpu::texture(device, queue, "canopy_normal", format, &normal_mips(image)))
+            .clone()
+    }
+}
+
+fn plain(texel: [u8; 4]) -> MipChain {
+    MipChain { width: 1, height: 1, levels: vec![texel.to_vec()] }
+}
+
+fn upload_parts(
+    plant: &BakedPlant,
+    layouts: &ForestLayouts,
+    textures: &mut TextureShelf,
+    device: &RenderDevice,
+    queue: &RenderQueue,
+    pipelines: &PipelineCache,
+) -> Vec<GpuPart> {
+    let layout = pipelines.get_bind_group_layout(&layouts.part);
+    let mut parts = Vec::new();
+    for (index, part) in plant.plant.parts.iter().enumerate() {
+        let ambient = plant.ambient.get(index).map_or(&[][..], Vec::as_slice);
+        let empty = PlantMesh::default();
+        let proxy = plant.shadow_proxy.get(index).unwrap_or(&empty);
+        let material = &part.material;
+        let uniform = PartUniform {
+            base_color: material.base_color.extend(1.0).to_array(),
+            transmission: material.transmission.extend(0.0).to_array(),
+        };
+        let uniform = gpu::buffer_with(device, "canopy_plant_part", BufferUsages::UNIFORM, &[uniform]);
+        let color = textures.color(material, part.kind, device, queue);
+        let normal = textures.normal(material, device, queue);
+        let bind_group = device.create_bind_group(
+            "canopy_plant_part",
+            &layout,
+            &BindGroupEntries::sequential((&color, &normal, &layouts.part_sampler, uniform.as_entire_binding())),
+        );
+        parts.push(GpuPart {
+            kind: part.kind,
+            model: upload_mesh(&part.mesh, ambient, device),
+            proxy: upload_mesh(proxy, &[], device),
+            bind_group,
+        });
+    }
+    parts
+}
+
+fn upload_mesh(mesh: &PlantMesh, ambient: &[f32], device: &RenderDevice) -> GpuMesh {
+    let vertices: Vec<PlantVertex> = mesh
+        .positions
+        .iter()
+        .enumerate()
+        .map(|(i, &position)| {
+            let normal = mesh.normals.get(i).copied().unwrap_or(Vec3::Y);
+            let uv = mesh.uvs.get(i).copied().unwrap_or_default();
+            PlantVertex::new(position, normal, ambient.get(i).copied().unwrap_or(1.0), uv)
+        })
+        .collect();
+    let indices: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
+    GpuMesh {
+        vertices: gpu::buffer_with(device, "canopy_plant_vertices", BufferUsages::VERTEX, &vertices),
+        indices: gpu::buffer_with(device, "canopy_plant_indices", BufferUsages::INDEX, &indices),
+        index_count: indices.len() as u32,
+    }
+}
+
+fn upload_crosses(
+    plants: &[BakedPlant],
+    layouts: &ForestLayouts,
+    device: &RenderDevice,
+    queue: &RenderQueue,
+    pipelines: &PipelineCache,
+) -> BindGroup {
+    let colors: Vec<&MipChain> = plants.iter().flat_map(|plant| &plant.cross.textures.color).collect();
+    let properties: Vec<&MipChain> = plants.iter().flat_map(|plant| &plant.cross.textures.properties).collect();
+    let (_, colors) = gpu::texture_array(device, queue, "canopy_cross_color", TextureFormat::Rgba8UnormSrgb, &colors);
+    let (_, properties) =
+        gpu::texture_array(device, queue, "canopy_cross_properties", TextureFormat::Rgba8Unorm, &properties);
+    device.create_bind_group(
+        "canopy_cross",
+        &pipelines.get_bind_group_layout(&layouts.cross),
+        &BindGroupEntries::sequential((&colors, &properties, &layouts.cross_sampler)),
+    )
+}

@@ -1,0 +1,155 @@
+//! Small helpers over wgpu: buffers that grow, textures with ready-made mip chains.
+
+use bevy::render::{
+    render_resource::{
+        Buffer, BufferDescriptor, BufferInitDescriptor, BufferUsages, Extent3d, Origin3d, TexelCopyBufferLayout,
+        TexelCopyTextureInfo, Texture, TextureAspect, TextureDescriptor, TextureDimension, TextureFormat,
+        TextureUsages, TextureView, TextureViewDescriptor, TextureViewDimension,
+    },
+    renderer::{RenderDevice, RenderQueue},
+};
+use bytemuck::Pod;
+
+use crate::plant::texture::MipChain;
+
+/// Bytes between dynamic offsets of uniform buffers that every device allows.
+pub const UNIFORM_STRIDE: u64 = 256;
+
+/// A buffer with `data`; never empty, as empty buffers cannot be bound.
+pub fn buffer_with<T: Pod>(device: &RenderDevice, label: &str, usage: BufferUsages, data: &[T]) -> Buffer {
+    let bytes: &[u8] = bytemuck::cast_slice(data);
+    let filled = if bytes.is_empty() { &[0; 64] } else { bytes };
+    device.create_buffer_with_data(&BufferInitDescriptor { label: Some(label), usage, contents: filled })
+}
+
+/// A uniform buffer of `slots` entries at [`UNIFORM_STRIDE`].
+pub fn uniform_slots(device: &RenderDevice, label: &str, slots: u64) -> Buffer {
+    device.create_buffer(&BufferDescriptor {
+        label: Some(label),
+        size: UNIFORM_STRIDE * slots,
+        usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
+}
+
+/// A storage buffer that is made anew, larger, when a write does not fit.
+#[derive(Debug)]
+pub struct GrowingBuffer {
+    label: &'static str,
+    buffer: Buffer,
+}
+
+impl GrowingBuffer {
+    /// A small buffer under `label`.
+    pub fn new(device: &RenderDevice, label: &'static str) -> Self {
+        Self { label, buffer: Self::create(device, label, 4096) }
+    }
+
+    fn create(device: &RenderDevice, label: &'static str, size: u64) -> Buffer {
+        device.create_buffer(&BufferDescriptor {
+            label: Some(label),
+            size,
+            usage: BufferUsages::STORAGE | BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })
+    }
+
+    /// The buffer to bind; another one after a [`write`](Self::write) that returned `true`.
+    pub fn buffer(&self) -> &Buffer {
+        &self.buffer
+    }
+
+    /// Makes room for `size` bytes; `true` where the buffer is a new one (and empty).
+    pub fn reserve(&mut self, device: &RenderDevice, size: u64) -> bool {
+        let grow = size > self.buffer.size();
+        if grow {
+            self.buffer = Self::create(device, self.label, size.next_power_of_two());
+        }
+        grow
+    }
+
+    /// Writes `data` from the start; `true` where the buffer had to be replaced.
+    pub fn write<T: Pod>(&mut self, device: &RenderDevice, queue: &RenderQueue, data: &[T]) -> bool {
+        let bytes: &[u8] = bytemuck::cast_slice(data);
+        let grown = self.reserve(device, bytes.len() as u64);
+        if !bytes.is_empty() {
+            queue.write_buffer(&self.buffer, 0, bytes);
+        }
+        grown
+    }
+}
+
+/// A texture array of RGBA8 layers with their mip chains; all chains have the size of the first.
+pub fn texture_array(
+    device: &RenderDevice,
+    queue: &RenderQueue,
+    label: &str,
+    format: TextureFormat,
+    layers: &[&MipChain],
+) -> (Texture, TextureView) {
+    let (width, height, levels) = layers
+        .first()
+        .map_or((1, 1, 1), |chain| (chain.width.max(1), chain.height.max(1), chain.levels.len().max(1)));
+    let texture = device.create_texture(&TextureDescriptor {
+        label: Some(label),
+        size: Extent3d { width, height, depth_or_array_layers: layers.len().max(1) as u32 },
+        mip_level_count: levels as u32,
+        sample_count: 1,
+        dimension: TextureDimension::D2,
+        format,
+        usage: TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST,
+        view_formats: &[],
+    });
+    for (layer, chain) in layers.iter().enumerate() {
+        for (level, texels) in chain.levels.iter().take(levels).enumerate() {
+            let (level_width, level_height) = ((width >> level).max(1), (height >> level).max(1));
+            if texels.len() == (level_width * level_height * 4) as usize {
+                write_level(queue, &texture, layer as u32, level as u32, level_width, level_height, 4, texels);
+            }
+        }
+    }
+    let view = texture.create_view(&TextureViewDescriptor {
+        dimension: Some(TextureViewDimension::D2Array),
+        ..Default::default()
+    });
+    (texture, view)
+}
+
+/// A plain texture with one mip chain.
+pub fn texture(
+    device: &RenderDevice,
+    queue: &RenderQueue,
+    label: &str,
+    format: TextureFormat,
+    chain: &MipChain,
+) -> TextureView {
+    let (texture, _) = texture_array(device, queue, label, format, &[chain]);
+    texture.create_view(&TextureViewDescriptor {
+        dimension: Some(TextureViewDimension::D2),
+        ..Default::default()
+    })
+}
+
+/// Writes one mip level of one layer; `texels` holds `width * height * texel_bytes` bytes.
+pub fn write_level(
+    queue: &RenderQueue,
+    texture: &Texture,
+    layer: u32,
+    level: u32,
+    width: u32,
+    height: u32,
+    texel_bytes: u32,
+    texels: &[u8],
+) {
+    queue.write_texture(
+        TexelCopyTextureInfo {
+            texture,
+            mip_level: level,
+            origin: Origin3d { x: 0, y: 0, z: layer },
+            aspect: TextureAspect::All,
+        },
+        texels,
+        TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(width * texel_bytes), rows_per_image: Some(height) },
+        Extent3d { width, height, depth_or_array_layers: 1 },
+    );
+}

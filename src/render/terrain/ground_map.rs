@@ -1,0 +1,148 @@
+//! A picture of the terrain from above that every pass reads: where it hides the key light, and where crowns cover it.
+
+use std::sync::Arc;
+
+use bevy::{
+    log::error_once,
+    ecs::{
+        resource::Resource,
+        system::{Res, ResMut},
+        world::{FromWorld, World},
+    },
+    render::{
+        render_resource::{
+            Extent3d, Texture, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages, TextureView,
+            TextureViewDescriptor,
+        },
+        renderer::{RenderDevice, RenderQueue},
+    },
+};
+use glam::{DVec2, DVec3, Vec3};
+use half::f16;
+
+use crate::{
+    render::{components::Ground, extract::ExtractedScene, gpu, report::FrameReport},
+    scatter::CoverMap,
+    terrain::{
+        Terrain,
+        sun_horizon::{HorizonGrid, sun_horizon},
+    },
+};
+
+/// Texels along the longer side of the map.
+const LONGEST_SIDE: f64 = 512.0;
+/// Metres towards the light within which relief can hide it.
+const HORIZON_DISTANCE: u32 = 12_000;
+
+/// Height in metres above the ground that the key light clears (R) and share of ground under crowns (G).
+#[derive(Resource)]
+pub struct GroundMap {
+    /// For sampling.
+    pub view: TextureView,
+    /// Mean share of ground under crowns where the terrain is known.
+    pub mean_cover: f32,
+    texture: Texture,
+    size: (u32, u32),
+    extent: DVec2,
+    shows: Option<Shown>,
+}
+
+struct Shown {
+    terrain: Arc<Terrain>,
+    cover: Option<Arc<CoverMap>>,
+    light: Vec3,
+}
+
+impl FromWorld for GroundMap {
+    fn from_world(world: &mut World) -> Self {
+        let (texture, view) = create(world.resource::<RenderDevice>(), (1, 1));
+        Self { view, mean_cover: 0.0, texture, size: (1, 1), extent: DVec2::ONE, shows: None }
+    }
+}
+
+fn create(device: &RenderDevice, size: (u32, u32)) -> (Texture, TextureView) {
+    let texture = device.create_texture(&TextureDescriptor {
+        label: Some("canopy_ground_map"),
+        size: Extent3d { width: size.0, height: size.1, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: TextureDimension::D2,
+        format: TextureFormat::Rg16Float,
+        usage: TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST,
+        view_formats: &[],
+    });
+    let view = texture.create_view(&TextureViewDescriptor::default());
+    (texture, view)
+}
+
+impl GroundMap {
+    /// Camera-relative origin and inverse size of the map, for a camera at `camera` (scene metres).
+    pub fn placement(&self, camera: DVec3) -> [f32; 4] {
+        let origin = -0.5 * self.extent - DVec2::new(camera.x, camera.z);
+        [origin.x as f32, origin.y as f32, (1.0 / self.extent.x) as f32, (1.0 / self.extent.y) as f32]
+    }
+}
+
+/// Computes the map when the terrain, its cover or the key light's direction changed.
+pub fn prepare_ground_map(
+    scene: Res<ExtractedScene>,
+    device: Res<RenderDevice>,
+    queue: Res<RenderQueue>,
+    report: Res<FrameReport>,
+    mut map: ResMut<GroundMap>,
+) {
+    let (Some((_, ground)), Some(daylight)) = (&scene.ground, &scene.daylight) else { return };
+    let light = daylight.0.key_direction;
+    let same_ground = map.shows.as_ref().is_some_and(|shown| {
+        Arc::ptr_eq(&shown.terrain, &ground.terrain)
+            && match (&shown.cover, &ground.cover) {
+                (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+                (None, None) => true,
+                _ => false,
+            }
+    });
+    if same_ground && map.shows.as_ref().is_some_and(|shown| shown.light == light) {
+        report.skipped("terrain shadow", "light and terrain rest");
+        return;
+    }
+    let extent = ground.terrain.extent();
+    let texel = extent.max_element() / LONGEST_SIDE;
+    let size = ((extent.x / texel).ceil().max(1.0) as u32, (extent.y / texel).ceil().max(1.0) as u32);
+    if size != map.size {
+        (map.texture, map.view) = create(&device, size);
+        map.size = size;
+    }
+    map.extent = extent;
+    let grid = HorizonGrid { columns: size.0 as usize, rows: size.1 as usize, max_distance: HORIZON_DISTANCE };
+    let horizon = match sun_horizon(&ground.terrain, &grid, light.as_dvec3()) {
+        Ok(horizon) => horizon,
+        Err(error) => {
+            error_once!("the terrain's shadow cannot be computed: {error}");
+            return;
+        }
+    };
+    let texels = texels(ground, &horizon, size);
+    if !same_ground {
+        let sum: f32 = texels.iter().map(|texel| texel[1].to_f32()).sum();
+        map.mean_cover = sum / texels.len().max(1) as f32;
+    }
+    gpu::write_level(&queue, &map.texture, 0, 0, size.0, size.1, 4, bytemuck::cast_slice(&texels));
+    report.ran("terrain shadow", format!("{} × {} cells", size.0, size.1));
+    map.shows = Some(Shown { terrain: ground.terrain.clone(), cover: ground.cover.clone(), light });
+}
+
+/// One texel a cell, row by row from the north.
+fn texels(ground: &Ground, horizon: &[f32], size: (u32, u32)) -> Vec<[f16; 2]> {
+    let extent = ground.terrain.extent();
+    let cell = extent / DVec2::new(f64::from(size.0), f64::from(size.1));
+    (0..size.1)
+        .flat_map(|row| (0..size.0).map(move |column| (column, row)))
+        .map(|(column, row)| {
+            let place = (DVec2::new(f64::from(column), f64::from(row)) + 0.5) * cell - 0.5 * extent;
+            let height = ground.terrain.height(place.x, place.y) as f32;
+            let clears = horizon.get((row * size.0 + column) as usize).map_or(0.0, |h| h - height);
+            let cover = ground.cover.as_ref().map_or(0.0, |cover| cover.at(place));
+            [f16::from_f32(clears.clamp(-6.0e4, 6.0e4)), f16::from_f32(cover)]
+        })
+        .collect()
+}

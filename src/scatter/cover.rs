@@ -1,0 +1,252 @@
+//! How much of the ground is under crowns, as a map: it darkens the forest floor where trees are too far to be drawn.
+
+use std::ops::Range;
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use super::ScatterError;
+use super::packed::{PackedStand, VariantBounds, check_bounds};
+use super::stand::{Area, MAX_SCALE, MIN_SCALE, Stand, XzPlane};
+
+/// The most texels of a map: 64 MiB.
+const MAX_TEXELS: f64 = (1u64 << 26) as f64;
+
+/// Smallest texel, metres: it bounds the work that one crown can cause.
+const MIN_TEXEL_M: f64 = 0.01;
+
+/// Rows that one task fills.
+const BAND: usize = 16;
+
+/// Share of the ground under crowns. Row 0 is the northern one (smallest Z), columns run east.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CoverMap {
+    /// X and Z of the north-western corner, metres.
+    pub origin: DVec2,
+    /// Side of a texel, metres.
+    pub texel: f64,
+    /// Texels in a row.
+    pub columns: u32,
+    /// Number of rows.
+    pub rows: u32,
+    /// Row after row: 0 is open ground, 255 is closed canopy.
+    pub cover: Vec<u8>,
+}
+
+impl CoverMap {
+    /// Share of the ground under crowns at a point (X, Z), 0 to 1, of the texel it is in; 0 outside of the map.
+    pub fn at(&self, point: DVec2) -> f32 {
+        let place = ((point - self.origin) / self.texel).floor();
+        let inside = |value: f64, count: u32| (0.0..f64::from(count)).contains(&value).then_some(value as usize);
+        match (inside(place.x, self.columns), inside(place.y, self.rows)) {
+            (Some(column), Some(row)) => f32::from(self.cover[row * self.columns as usize + column]) / 255.0,
+            _ => 0.0,
+        }
+    }
+}
+
+/// A stand whose crowns can be mapped.
+pub trait Crowns {
+    /// Foot (X, Z), variant and scale of each tree.
+    fn crowns(&self) -> impl Iterator<Item = (DVec2, u16, f32)>;
+}
+
+impl Crowns for Stand {
+    fn crowns(&self) -> impl Iterator<Item = (DVec2, u16, f32)> {
+        self.trees.iter().map(|tree| (tree.position.xz_plane(), tree.variant, tree.scale))
+    }
+}
+
+impl Crowns for PackedStand {
+    fn crowns(&self) -> impl Iterator<Item = (DVec2, u16, f32)> {
+        self.trees.iter().map(|tree| (tree.position(self.cell_size).xz_plane(), tree.variant(), tree.scale()))
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Crown {
+    center: DVec2,
+    radius: f64,
+}
+
+/// Maps the crowns of `stand` on texels of `texel` metres.
+///
+/// A crown is a full disc of its variant's radius, scaled. The share of a texel that one disc covers is exact along X
+/// and from slabs (at least 8 a disc and 4 a texel) along Z; each disc's whole area is kept. Several discs cover
+/// `1 − Π (1 − share)`, as independent ones do. The map spans `extent`, or all crowns where that is `None`, in whole
+/// texels that begin at multiples of `texel`; of no trees it is empty. Time: some 50 ms for 300,000 trees of 3 m radius
+/// on texels of 8 m (two cores).
+///
+/// # Errors
+/// [`ScatterError::VariantBounds`], [`ScatterError::TooManyVariants`], [`ScatterError::UnknownVariant`] for the bounds,
+/// [`ScatterError::Unpackable`] for a scale outside of its range, [`ScatterError::Size`] for a texel below 1 cm or so small
+/// that the map has more than 2²⁶.
+pub fn cover_map<S: Crowns>(
+    stand: &S,
+    bounds: &[VariantBounds],
+    texel: f64,
+    extent: Option<Area>,
+) -> Result<CoverMap, ScatterError> {
+    let bad_texel = |remedy: String| ScatterError::Size { what: "the texel of the cover map", value: texel, remedy };
+    if !(MIN_TEXEL_M..=f64::MAX).contains(&texel) {
+        return Err(bad_texel(format!("give finite metres, at least {MIN_TEXEL_M}")));
+    }
+    check_bounds(bounds)?;
+    let crowns: Vec<Crown> = stand
+        .crowns()
+        .enumerate()
+        .map(|(tree, (center, variant, scale))| {
+            let Some(bound) = bounds.get(usize::from(variant)) else {
+                return Err(ScatterError::UnknownVariant { tree, variant, count: bounds.len() });
+            };
+            if !(MIN_SCALE..=MAX_SCALE).contains(&scale) {
+                let remedy = format!("scales are {MIN_SCALE} to {MAX_SCALE}");
+                return Err(ScatterError::Unpackable { tree, what: "scale", value: scale.into(), remedy });
+            }
+            Ok(Crown { center, radius: f64::from(bound.radius * scale) })
+        })
+        .collect::<Result<_, _>>()?;
+    let span = extent.or_else(|| {
+        crowns.iter().fold(None, |span: Option<Area>, crown| {
+            let (min, max) = (crown.center - crown.radius, crown.center + crown.radius);
+            Some(span.map_or(Area { min, max }, |span| Area { min: span.min.min(min), max: span.max.max(max) }))
+        })
+    });
+    let Some(span) = span else {
+        return Ok(CoverMap { origin: DVec2::ZERO, texel, columns: 0, rows: 0, cover: Vec::new() });
+    };
+    let origin = (span.min / texel).floor() * texel;
+    let counts = ((span.max - origin) / texel).ceil().max(DVec2::ONE);
+    if !(0.0..=MAX_TEXELS).contains(&(counts.x * counts.y)) {
+        let least = (span.size().x * span.size().y / MAX_TEXELS).sqrt().max(span.size().max_element() / MAX_TEXELS);
+        return Err(bad_texel(format!(
+            "the map would have more than {MAX_TEXELS} texels; give more than {least:.2} m"
+        )));
+    }
+    let (columns, rows) = (counts.x as usize, counts.y as usize);
+
+    let mut open = vec![1f32; columns * rows];
+    let largest = crowns.iter().fold(0f64, |largest, crown| largest.max(crown.radius));
+    let discs = UnitDisc::ladder(largest / texel);
+    let bands = crowns_by_band(&crowns, origin, texel, rows);
+    open.par_chunks_mut(BAND * columns).enumerate().for_each(|(band, texels)| {
+        let grid =
+            BandGrid { origin: origin + DVec2::new(0.0, (band * BAND) as f64 * texel), texel, columns, discs: &discs };
+        let mut shares = vec![0f32; columns];
+        for crown in &bands[band] {
+            grid.splat(*crown, texels, &mut shares);
+        }
+    });
+    let cover = open.par_iter().map(|open| ((1.0 - open) * 255.0).round() as u8).collect();
+    Ok(CoverMap { origin, texel, columns: columns as u32, rows: rows as u32, cover })
+}
+
+/// The crowns that touch each band of rows, in order.
+fn crowns_by_band(crowns: &[Crown], origin: DVec2, texel: f64, rows: usize) -> Vec<Vec<Crown>> {
+    let depth = BAND as f64 * texel;
+    let mut bands = vec![Vec::new(); rows.div_ceil(BAND)];
+    for crown in crowns {
+        let first = ((crown.center.y - crown.radius - origin.y) / depth).floor().max(0.0) as usize;
+        let last = ((crown.center.y + crown.radius - origin.y) / depth).floor();
+        if last >= 0.0 {
+            for band in bands.iter_mut().take((last as usize).saturating_add(1)).skip(first) {
+                band.push(*crown);
+            }
+        }
+    }
+    bands
+}
+
+/// A disc of radius 1, cut into chords of equal distance.
+struct UnitDisc {
+    /// Distance of each chord from the centre, -1 to 1, and its half length.
+    chords: Vec<(f64, f64)>,
+    /// What a chord's length is multiplied with for its share of the disc: the distance of the chords, less the little
+    /// that the midpoint rule has too much.
+    depth: f64,
+}
+
+/// Chords that the smallest crowns are cut into, as a power of two.
+const MIN_CHORDS_LOG2: u32 = 3;
+
+impl UnitDisc {
+    /// Discs of 8, 16, 32, ... chords, up to what a radius of `largest` texels needs.
+    fn ladder(largest: f64) -> Vec<Self> {
+        (0..=Self::rung(largest)).map(|rung| Self::new(1 << (MIN_CHORDS_LOG2 as usize + rung))).collect()
+    }
+
+    /// The place in the ladder of the disc for a radius in texels: at least four chords a texel.
+    fn rung(radius: f64) -> usize {
+        let chords = (8.0 * radius).ceil().max(1.0) as u64;
+        chords.next_power_of_two().ilog2().saturating_sub(MIN_CHORDS_LOG2) as usize
+    }
+
+    fn new(count: usize) -> Self {
+        let offset = |k: usize| (2 * k + 1) as f64 / count as f64 - 1.0;
+        let chords: Vec<(f64, f64)> = (0..count).map(|k| (offset(k), (1.0 - offset(k).powi(2)).sqrt())).collect();
+        let length: f64 = chords.iter().map(|chord| 2.0 * chord.1).sum();
+        Self { chords, depth: std::f64::consts::PI / length }
+    }
+}
+
+struct BandGrid<'a> {
+    origin: DVec2,
+    texel: f64,
+    columns: usize,
+    discs: &'a [UnitDisc],
+}
+
+impl BandGrid<'_> {
+    /// Multiplies the open share of the texels under `crown`. `shares` is a row of zeros, and is so again afterwards.
+    fn splat(&self, crown: Crown, texels: &mut [f32], shares: &mut [f32]) {
+        // All in texels from here on.
+        let center = (crown.center - self.origin) / self.texel;
+        let radius = crown.radius / self.texel;
+        let Some(disc) = self.discs.get(UnitDisc::rung(radius)) else { return };
+        let rows = texels.len() / self.columns;
+        let depth = disc.depth * radius;
+        // Slabs of equal height around the chords; one that a border between rows cuts is shared out between the two.
+        let half_slab = radius / disc.chords.len() as f64;
+        let per_slab = 0.5 / half_slab;
+        let mut row = None;
+        let mut touched = 0..0;
+        for &(offset, half) in &disc.chords {
+            let (top, bottom) = (center.y + offset * radius - half_slab, center.y + offset * radius + half_slab);
+            let half = half * radius;
+            let (left, right) = ((center.x - half).max(0.0), (center.x + half).min(self.columns as f64));
+            if !(bottom >= 0.0 && top < rows as f64 && left < right) {
+                continue;
+            }
+            // Truncation instead of rounding functions, which cost more than all else here; `bottom` and `left` are not
+            // negative, and a column that only touches gets a share of 0.
+            let (first, end) = (left as usize, (right as usize + 1).min(self.columns));
+            let border = bottom as i64;
+            let above = ((border as f64 - top) * per_slab).clamp(0.0, 1.0);
+            for (place, part) in [(border - 1, above), (border, 1.0 - above)] {
+                let Some(place) = usize::try_from(place).ok().filter(|&place| part > 0.0 && place < rows) else {
+                    continue;
+                };
+                if row != Some(place) {
+                    self.flush(row, touched.clone(), texels, shares);
+                    row = Some(place);
+                    touched = self.columns..0;
+                }
+                for (column, share) in (first..end).zip(&mut shares[first..end]) {
+                    let overlap = right.min((column + 1) as f64) - left.max(column as f64);
+                    *share += (overlap * part * depth) as f32;
+                }
+                touched = touched.start.min(first)..touched.end.max(end);
+            }
+        }
+        self.flush(row, touched, texels, shares);
+    }
+
+    fn flush(&self, row: Option<usize>, touched: Range<usize>, texels: &mut [f32], shares: &mut [f32]) {
+        let Some(row) = row else { return };
+        let texels = &mut texels[row * self.columns + touched.start..row * self.columns + touched.end];
+        for (texel, share) in texels.iter_mut().zip(&mut shares[touched]) {
+            *texel *= (1.0 - *share).max(0.0);
+            *share = 0.0;
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! From the rows of an inventory to a stand on a ground.
+
+use std::collections::{BTreeMap, HashMap};
+use std::fmt;
+use std::ops::Range;
+
+use glam::DVec3;
+
+use super::hash::{self, Stream};
+use super::inventory::InventoryTree;
+use super::stand::{Ground, MAX_SCALE, MIN_SCALE, Stand, Tree, sink};
+use super::{Allometry, ScatterError};
+
+/// Two trees nearer than this are one tree that is listed twice, metres.
+const SAME_PLACE_M: f64 = 0.01;
+
+/// Lines that a message of the warnings lists.
+const LISTED: usize = 5;
+
+/// How a species of an inventory is drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InventorySpecies {
+    /// Its name in the file; letter case and surrounding blanks do not count.
+    pub name: String,
+    /// Which plants are of this species; one is drawn by lot for each tree.
+    pub variants: Range<u16>,
+    /// Height of each variant's plant at scale 1, metres, as many as there are variants.
+    pub plant_heights_m: Vec<f32>,
+    /// Height of a tree of which neither height nor dbh is known, metres.
+    pub default_height_m: f32,
+    /// Height of a tree of which only the dbh is known.
+    pub allometry: Allometry,
+    /// Radius of the trunk at the ground at scale 1, root flare included, metres; sinks the foot on slopes.
+    pub trunk_radius_m: f32,
+}
+
+impl InventorySpecies {
+    fn validate(&self) -> Result<(), ScatterError> {
+        let fail = |message: String| Err(ScatterError::Species { species: self.name.clone(), message });
+        if self.variants.is_empty() || self.plant_heights_m.len() != self.variants.len() {
+            return fail(format!(
+                "{} variants with {} plant heights: give at least one variant and a height for each",
+                self.variants.len(),
+                self.plant_heights_m.len()
+            ));
+        }
+        let usable = |metres: f32| metres.is_finite() && metres > 0.0;
+        if let Some(bad) = self.plant_heights_m.iter().find(|&&height| !usable(height)) {
+            return fail(format!("a plant height of {bad} m: give finite metres above 0"));
+        }
+        if !usable(self.default_height_m) {
+            return fail(format!("a default height of {} m: give finite metres above 0", self.default_height_m));
+        }
+        if !(0.0..=20.0).contains(&self.trunk_radius_m) {
+            return fail(format!("a trunk radius of {} m: give metres from 0 to 20", self.trunk_radius_m));
+        }
+        Ok(())
+    }
+}
+
+/// What of an inventory could not be taken as it is written. Lines are those of the file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct InventoryWarnings {
+    /// Lines of trees outside the ground; they are left out.
+    pub outside: Vec<u64>,
+    /// Lines of trees within 1 cm of an earlier one, with that one's line; they are left out.
+    pub duplicates: Vec<(u64, u64)>,
+    /// Species that the table lacks, with the number of their trees; drawn as the table's first.
+    pub unknown_species: BTreeMap<String, usize>,
+    /// Lines of trees so much smaller or larger than their plant that they are drawn at the limit of the scale.
+    pub rescaled: Vec<u64>,
+}
+
+impl InventoryWarnings {
+    /// Whether the inventory was taken as it is.
+    pub fn is_empty(&self) -> bool {
+        self.outside.is_empty()
+            && self.duplicates.is_empty()
+            && self.unknown_species.is_empty()
+            && self.rescaled.is_empty()
+    }
+}
+
+impl fmt::Display for InventoryWarnings {
+    /// One line for each kind of warning, each ended by a newline.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let lines = |lines: &mut dyn Iterator<Item = u64>| {
+            lines.take(LISTED).map(|line| line.to_string()).collect::<Vec<_>>().join(", ")
+        };
+        if !self.outside.is_empty() {
+            let (count, first) = (self.outside.len(), lines(&mut self.outside.iter().copied()));
+            writeln!(f, "{count} tree(s) outside the terrain are left out; the first in line(s) {first}")?;
+        }
+        if !self.duplicates.is_empty() {
+            let (count, first) = (self.duplicates.len(), lines(&mut self.duplicates.iter().map(|pair| pair.0)));
+            writeln!(f, "{count} tree(s) at the place of an earlier one are left out; the first in line(s) {first}")?;
+        }
+        if !self.unknown_species.is_empty() {
+            let names: Vec<String> =
+                self.unknown_species.iter().map(|(name, count)| format!("{name} ({count})")).collect();
+            writeln!(f, "species without an entry are drawn as the first one: {}", names.join(", "))?;
+        }
+        if !self.rescaled.is_empty() {
+            let (count, first) = (self.rescaled.len(), lines(&mut self.rescaled.iter().copied()));
+            writeln!(
+                f,
+                "{count} tree(s) are beyond {MIN_SCALE} to {MAX_SCALE} times their plant and drawn at that limit; the \
+                 first in line(s) {first}"
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// A stand from an inventory, and what to tell the user.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct InventoryStand {
+    /// The trees in the order of the rows; [`Tree::index`] is the row's place, from 0.
+    pub stand: Stand,
+    /// What was left out or changed.
+    pub warnings: InventoryWarnings,
+}
+
+/// Puts the trees of an inventory on `ground`.
+///
+/// `to_local` maps x and y of the file to scene-local metres (X and Z of the result count). `species` is the table of
+/// what is drawn; its first entry serves trees without a species or of one that is not in the table. The height is the
+/// row's, else from its dbh by the species' [`Allometry`], else the species' default; the tree's scale is that height
+/// over its plant's. Yaw, tint and the variant come from `seed` and the row's place.
+///
+/// # Errors
+/// [`ScatterError::NoSpecies`] for an empty table, [`ScatterError::Species`] for an entry that nothing can be drawn from,
+/// [`ScatterError::TooManyTrees`] beyond 2³² - 1 rows.
+pub fn stand_from_inventory<G: Ground + ?Sized>(
+    rows: &[InventoryTree],
+    to_local: impl Fn(f64, f64) -> DVec3,
+    ground: &G,
+    species: &[InventorySpecies],
+    seed: u64,
+) -> Result<InventoryStand, ScatterError> {
+    let default = species.first().ok_or(ScatterError::NoSpecies)?;
+    species.iter().try_for_each(InventorySpecies::validate)?;
+    if u32::try_from(rows.len()).is_err() {
+        return Err(ScatterError::TooManyTrees { count: rows.len() as f64, limit: u32::MAX });
+    }
+    let table: HashMap<String, &InventorySpecies> =
+        species.iter().rev().map(|entry| (key(&entry.name), entry)).collect();
+    let mut result = InventoryStand::default();
+    let mut taken = Places::default();
+    for (row, index) in rows.iter().zip(0u32..) {
+        let place = to_local(row.x, row.y);
+        let known = place.x.is_finite() && place.z.is_finite() && ground.contains(place.x, place.z);
+        let height = if known { ground.height(place.x, place.z) } else { f64::NAN };
+        if !height.is_finite() {
+            result.warnings.outside.push(row.line);
+            continue;
+        }
+        if let Some(first) = taken.earlier(place.x, place.z, row.line) {
+            result.warnings.duplicates.push((row.line, first));
+            continue;
+        }
+        let entry = match &row.species {
+            None => default,
+            Some(name) => table.get(&key(name)).copied().unwrap_or_else(|| {
+                *result.warnings.unknown_species.entry(name.trim().to_owned()).or_default() += 1;
+                default
+            }),
+        };
+        let n = u64::from(index);
+        let variant = hash::below(seed, n, Stream::Variant, entry.variants.len() as u32) as u16;
+        let tree_height = row
+            .height_m
+            .or_else(|| entry.allometry.height_m(row.dbh_m?))
+            .map_or(entry.default_height_m, |metres| metres as f32);
+        let plant_height = entry.plant_heights_m.get(usize::from(variant)).copied().unwrap_or(entry.default_height_m);
+        let wanted = tree_height / plant_height;
+        let scale = wanted.clamp(MIN_SCALE, MAX_SCALE);
+        if scale != wanted {
+            result.warnings.rescaled.push(row.line);
+        }
+        let slope = ground.slope(place.x, place.z);
+        let sunk = if slope.is_finite() { sink(entry.trunk_radius_m * scale, slope) } else { 0.0 };
+        result.stand.trees.push(Tree {
+            position: DVec3::new(place.x, height - sunk, place.z),
+            yaw: hash::angle_f32(seed, n, Stream::Yaw),
+            scale,
+            variant: entry.variants.start + variant,
+            tint: hash::unit_f32(seed, n, Stream::Tint) * 2.0 - 1.0,
+            index,
+        });
+    }
+    Ok(result)
+}
+
+fn key(name: &str) -> String {
+    name.trim().to_lowercase()
+}
+
+/// Places of earlier trees, in squares of the distance below which two are the same.
+#[derive(Default)]
+struct Places {
+    squares: HashMap<(i64, i64), Vec<(f64, f64, u64)>>,
+}
+
+impl Places {
+    /// The line of an earlier tree at this place; if there is none, this one is remembered.
+    fn earlier(&mut self, x: f64, z: f64, line: u64) -> Option<u64> {
+        let (column, row) = ((x / SAME_PLACE_M).floor() as i64, (z / SAME_PLACE_M).floor() as i64);
+        let around = (-1..=1).flat_map(|dz| (-1..=1).map(move |dx| (dx, dz)));
+        let earlier = around
+            .filter_map(|(dx, dz)| self.squares.get(&(column.saturating_add(dx), row.saturating_add(dz))))
+            .flatten()
+            .filter(|(other_x, other_z, _)| (other_x - x).hypot(other_z - z) < SAME_PLACE_M)
+            .map(|&(_, _, line)| line)
+            .min();
+        if earlier.is_none() {
+            self.squares.entry((column, row)).or_default().push((x, z, line));
+        }
+        earlier
+    }
+}

@@ -1,0 +1,48 @@
+//! Where trees stand: from rules or from an inventory to a [`Stand`], and from there to 16 bytes a tree.
+//!
+//! ```text
+//! sequence (Halton, Hammersley, random) ─┐
+//! rules (density, slope, height, ...)  ──┼─ place() ──────────┐
+//! ground (anything that is a Ground)   ──┤                    ├─ Stand ─┬─ PackedStand (GPU: trees by cell)
+//! inventory (CSV) ───────────────────────┴─ stand_from_inventory()       └─ cover_map() (shade of the far floor)
+//! ```
+//!
+//! Franzke 2005 (section 4.4, figure 4.17) scatters its plants by the Halton and Hammersley points of
+//! [Halton 1964] and [Hammersley & Handscomb 1964], because they fill the ground evenly without the rows of a grid.
+//! Here the points carry density, slope, height and clearing rules, a least distance, and several species.
+//! A point's *index* decides nothing but its place: species, size, yaw and tint come from a hash of it ([`hash`]),
+//! as index bits are the very digits of the coordinates.
+//!
+//! Positions are scene-local: metres, f64, X east, Z south, Y up from the datum of the heights.
+//! Every result is the same for any number of threads.
+
+pub mod allometry;
+mod clearings;
+pub mod cover;
+pub mod discrepancy;
+mod error;
+pub mod hash;
+pub mod inventory;
+pub mod inventory_stand;
+pub mod packed;
+pub mod placement;
+pub mod radical_inverse;
+pub mod rules;
+pub mod sequence;
+mod spacing;
+mod stand;
+
+pub use allometry::Allometry;
+pub use cover::{CoverMap, cover_map};
+pub use discrepancy::star_discrepancy;
+pub use error::{BadValue, ScatterError};
+pub use inventory::{
+    Coordinates, Inventory, InventoryOptions, InventoryTree, LengthUnit, parse_inventory, read_inventory,
+};
+pub use inventory_stand::{InventorySpecies, InventoryStand, InventoryWarnings, stand_from_inventory};
+pub use packed::{Cell, PackedStand, PackedTree, VariantBounds};
+pub use placement::{Placement, PlacementReport, place};
+pub use radical_inverse::{RadicalInverse, radical_inverse};
+pub use rules::{ClearingNoise, PlacementRules, Sequence, SizeRule, SpeciesRule};
+pub use sequence::{HaltonSequence, halton, hammersley, random};
+pub use stand::{Area, Ground, MAX_COORDINATE_M, MAX_SCALE, MIN_SCALE, Stand, Tree};

@@ -1,0 +1,107 @@
+//! Collecting impossible values with their place in the text.
+
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+
+use super::error::{Problem, SceneError};
+use super::locate::{Outline, Position};
+
+/// Gathers the problems of one scene file.
+pub(super) struct Check<'a> {
+    outline: Option<Outline<'a>>,
+    problems: Vec<Problem>,
+}
+
+impl<'a> Check<'a> {
+    pub(super) fn new(text: &'a str) -> Self {
+        Self { outline: Outline::of(text), problems: Vec::new() }
+    }
+
+    /// Notes that the value at `field` is impossible.
+    pub(super) fn problem(&mut self, field: &str, message: impl Into<String>, remedy: impl Into<String>) {
+        let position = self.outline.as_ref().map_or(Position { line: 1, column: 1 }, |outline| outline.value(field));
+        self.problems.push(Problem {
+            position,
+            field: field.to_owned(),
+            message: message.into(),
+            remedy: remedy.into(),
+        });
+    }
+
+    /// A number that must be finite and in `range`; whether it is.
+    pub(super) fn number(&mut self, field: &str, value: f64, range: RangeInclusive<f64>, unit: &str) -> bool {
+        let fine = range.contains(&value);
+        if !fine {
+            let (low, high) = range.into_inner();
+            let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+            let message = if value.is_finite() {
+                format!("is {value}{unit}, which is impossible")
+            } else {
+                format!("is {value}, which is no finite number")
+            };
+            self.problem(field, message, format!("write a value from {low} to {high}{unit}"));
+        }
+        fine
+    }
+
+    /// A whole number that must be in `range`.
+    pub(super) fn count(&mut self, field: &str, value: u32, range: RangeInclusive<u32>) {
+        if !range.contains(&value) {
+            let (low, high) = range.into_inner();
+            self.problem(field, format!("is {value}"), format!("write a whole number from {low} to {high}"));
+        }
+    }
+
+    /// A range `(low, high)` whose ends must be in `limits` and in order (equal ends are a range of one value).
+    pub(super) fn ordered(&mut self, field: &str, value: (f64, f64), limits: RangeInclusive<f64>, unit: &str) {
+        let low = self.number(&format!("{field}[0]"), value.0, limits.clone(), unit);
+        let high = self.number(&format!("{field}[1]"), value.1, limits, unit);
+        if low && high && value.0 > value.1 {
+            self.problem(
+                field,
+                format!("is ({}, {}) {unit}: the lower end lies above the upper one", value.0, value.1),
+                format!("write ({}, {})", value.1, value.0),
+            );
+        }
+    }
+
+    /// As [`Self::ordered`], for limits between which there must be room: the ends must differ.
+    pub(super) fn interval(&mut self, field: &str, value: (f64, f64), limits: RangeInclusive<f64>, unit: &str) {
+        self.ordered(field, value, limits, unit);
+        if value.0 == value.1 {
+            self.problem(
+                field,
+                format!("is ({}, {}) {unit}: nothing lies between", value.0, value.1),
+                "write the lower end, then the higher one",
+            );
+        }
+    }
+
+    /// A point of which every coordinate must be finite and within `limits`.
+    pub(super) fn point(&mut self, field: &str, value: (f64, f64, f64), limits: [RangeInclusive<f64>; 3]) {
+        let [x, y, z] = limits;
+        self.number(&format!("{field}[0]"), value.0, x, "m");
+        self.number(&format!("{field}[1]"), value.1, y, "m");
+        self.number(&format!("{field}[2]"), value.2, z, "m");
+    }
+
+    /// A text that must not be empty.
+    pub(super) fn text(&mut self, field: &str, value: &str, remedy: &str) {
+        if value.trim().is_empty() {
+            self.problem(field, "is empty", remedy);
+        }
+    }
+
+    /// A path that must not be empty.
+    pub(super) fn path(&mut self, field: &str, value: &Path) {
+        if value.as_os_str().is_empty() {
+            self.problem(field, "is empty", "name a file, relative to the scene file");
+        }
+    }
+
+    /// The error that lists the problems in the file's order, if there are any.
+    pub(super) fn finish(mut self, path: PathBuf) -> Result<(), SceneError> {
+        self.problems.sort_by_key(|problem| problem.position);
+        if self.problems.is_empty() { Ok(()) } else { Err(SceneError::Invalid { path, problems: self.problems }) }
+    }
+}

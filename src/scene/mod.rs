@@ -1,0 +1,162 @@
+//! What a user writes: scene files, times, poses and render requests, validated.
+//!
+//! A scene file is [RON](https://docs.rs/ron): structures are `(field: value, ...)`, choices `Name(field: value, ...)`,
+//! lists `[a, b]`, comments `//`. Optional values need no `Some`. Only `terrain` is required; every other field has
+//! the default that its documentation names. Relative paths are relative to the scene file.
+//!
+//! ```
+//! let text = r#"(
+//!     terrain: Noise(size: 400, amplitude: 20),
+//!     species: [(name: "oak", plant: Grown(form: Broadleaf), height: (14, 22))],
+//!     trees: Scattered(stems_per_hectare: 280, min_distance: 1.5),
+//!     place: (latitude: 47.5, longitude: 9.2, time: "2026-06-21T15:30+02:00"),
+//! )"#;
+//! let scene = canopy::scene::Scene::parse(text, "oaks.ron".as_ref())?;
+//! assert_eq!(scene.place.time.utc().to_rfc3339(), "2026-06-21T13:30:00+00:00");
+//!
+//! let wrong = canopy::scene::Scene::parse(&text.replace("47.5", "100"), "oaks.ron".as_ref());
+//! assert!(wrong.is_err_and(|error| error.to_string().starts_with("oaks.ron:5:23: `place.latitude` is 100 degrees")));
+//! # Ok::<(), canopy::scene::SceneError>(())
+//! ```
+//!
+//! Positions are metres from the terrain's centre: +X east, −Z north. Angles in scene files and on the command line
+//! are degrees, yaw is a compass bearing; [`Viewpoint`] turns both into the renderer's frame.
+//!
+//! This room knows no other: it says what the user wants, not how it is built.
+
+mod camera;
+mod check;
+mod error;
+mod ground;
+mod locate;
+mod parse;
+mod path;
+mod place;
+mod plan;
+mod quality;
+mod request;
+mod species;
+mod time;
+mod trees;
+
+pub use camera::{Camera, PathKey, Pose, Viewpoint};
+pub use error::{Problem, SceneError};
+pub use ground::{Coordinates, Crop, Ground, GroundFile, GroundFlat, GroundImage, GroundNoise, Surroundings};
+pub use locate::Position;
+pub use parse::{ArgumentError, parse_pose, parse_positive, parse_seconds, parse_size};
+pub use path::Path;
+pub use place::{Moon, Place};
+pub use plan::{Frame, PlanError, RenderPlan};
+pub use quality::Quality;
+pub use request::{Clock, FlyOptions, Pictures, Progress, RenderOptions, RenderReport, Silent, Still, View};
+pub use species::{GltfPlants, GrownForm, GrownPlants, PlantSource, Species};
+pub use time::{LocalTime, TimeError, YEARS};
+pub use trees::{Anchor, Area, Clearings, InventoryTrees, LengthUnit, ScatteredTrees, Sequence, Trees};
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path as FilePath;
+
+use ron::extensions::Extensions;
+use serde::Deserialize;
+
+use check::Check;
+
+/// A scene: terrain, trees, place, camera and quality.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// Name for titles and messages. Default: the file's name without its ending.
+    #[serde(default)]
+    pub name: String,
+    /// Seed of everything random: places, species, yaw, scale and tint of trees; any integer from 0 to
+    /// 18446744073709551615. Default 1.
+    #[serde(default = "one")]
+    pub seed: u64,
+    /// The ground. Required.
+    pub terrain: Ground,
+    /// The species. Default: none; required if there are trees.
+    #[serde(default)]
+    pub species: Vec<Species>,
+    /// Where trees stand. Default `None`.
+    #[serde(default)]
+    pub trees: Trees,
+    /// Place on earth, date and air. Default: the terrain file's place, summer solstice 2026, noon UTC.
+    #[serde(default)]
+    pub place: Place,
+    /// Camera. Default: 20 m above the terrain's centre, looking north.
+    #[serde(default)]
+    pub camera: Camera,
+    /// Drawing quality.
+    #[serde(default)]
+    pub quality: Quality,
+}
+
+/// No scene file is larger; what is, is something else (a terrain, a plant), and would only waste memory.
+const LARGEST_FILE: u64 = 4 << 20;
+
+fn one() -> u64 {
+    1
+}
+
+impl Scene {
+    /// Reads and validates a scene file. Relative paths in it become relative to the working directory, that is,
+    /// ready to open.
+    ///
+    /// # Errors
+    /// [`SceneError`]: the file cannot be read, is larger than 4 MiB, is no RON, has an unknown field, or values that
+    /// are impossible (all of them are listed).
+    pub fn read(path: &FilePath) -> Result<Self, SceneError> {
+        let failed = |source| SceneError::Read { path: path.to_owned(), source };
+        let mut bytes = Vec::new();
+        let file = File::open(path).map_err(failed)?;
+        let length = file.metadata().map_err(failed)?.len();
+        file.take(LARGEST_FILE + 1).read_to_end(&mut bytes).map_err(failed)?;
+        if bytes.len() as u64 > LARGEST_FILE {
+            return Err(SceneError::TooLarge { path: path.to_owned(), bytes: length, limit: LARGEST_FILE });
+        }
+        match std::str::from_utf8(&bytes) {
+            Ok(text) => Self::parse(text, path),
+            Err(error) => {
+                let valid = bytes.get(..error.valid_up_to()).unwrap_or_default();
+                let before = String::from_utf8_lossy(valid);
+                Err(SceneError::Syntax {
+                    path: path.to_owned(),
+                    position: Position::of_offset(&before, before.len()),
+                    message: "the text is no UTF-8 from here on".to_owned(),
+                    remedy: "save the file as UTF-8; a scene file is a RON text".to_owned(),
+                })
+            }
+        }
+    }
+
+    /// Validates the text of a scene file; `path` is where it comes from: for messages, for relative paths, and for
+    /// the default name.
+    ///
+    /// # Errors
+    /// [`SceneError::Syntax`] or [`SceneError::Invalid`].
+    pub fn parse(text: &str, path: &FilePath) -> Result<Self, SceneError> {
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let options = ron::Options::default()
+            .with_default_extension(Extensions::IMPLICIT_SOME)
+            .with_default_extension(Extensions::UNWRAP_VARIANT_NEWTYPES);
+        let mut scene: Self = options.from_str(text).map_err(|error| error::from_ron(error, text, path.to_owned()))?;
+        let mut check = Check::new(text);
+        scene.terrain.check(&mut check);
+        species::check_all(&scene.species, &mut check);
+        scene.trees.check(&scene.species, &mut check);
+        scene.place.check(&scene.terrain, &mut check);
+        scene.camera.check(&mut check);
+        scene.quality.check(&mut check);
+        check.finish(path.to_owned())?;
+
+        let folder = path.parent().unwrap_or_else(|| FilePath::new(""));
+        scene.terrain.resolve(folder);
+        scene.trees.resolve(folder);
+        scene.species.iter_mut().for_each(|species| species.resolve(folder));
+        if scene.name.trim().is_empty() {
+            scene.name = path.file_stem().map_or("scene".to_owned(), |stem| stem.to_string_lossy().into_owned());
+        }
+        Ok(scene)
+    }
+}

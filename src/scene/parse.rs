@@ -1,0 +1,114 @@
+//! Texts of the command line to values.
+
+use super::camera::Pose;
+
+/// Why an argument is not what it should be.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ArgumentError {
+    /// Not `WIDTHxHEIGHT`.
+    #[error("`{0}` is no size; write width and height in pixels, each at least 1, as in 1280x720")]
+    Size(String),
+    /// Not `x,y,z,yaw,pitch`.
+    #[error(
+        "`{0}` is no camera; write x,y,z,yaw,pitch (metres east, above the ground, south; degrees), as in 0,20,0,90,-5"
+    )]
+    Pose(String),
+    /// A coordinate of a camera that is out of range.
+    #[error("`{0}`: {1}")]
+    PoseRange(String, &'static str),
+    /// Not a time in seconds.
+    #[error("`{0}` is no time in seconds; write a number that is not negative, as in 12.5s")]
+    Seconds(String),
+    /// Not a positive number.
+    #[error("`{0}` is no positive number")]
+    Positive(String),
+}
+
+/// Reads `1280x720`: width and height in pixels, each from 1 to 4294967295 (what the device can draw is its affair).
+///
+/// # Errors
+/// [`ArgumentError::Size`].
+pub fn parse_size(text: &str) -> Result<(u32, u32), ArgumentError> {
+    let parts = text.trim().split_once(['x', 'X', '×']);
+    let size = parts.and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
+    size.filter(|(width, height)| *width > 0 && *height > 0).ok_or_else(|| ArgumentError::Size(text.to_owned()))
+}
+
+/// Reads `x,y,z,yaw,pitch` as [`Pose`] states them: metres east, above the ground and south; degrees.
+///
+/// # Errors
+/// [`ArgumentError::Pose`] or [`ArgumentError::PoseRange`].
+pub fn parse_pose(text: &str) -> Result<Pose, ArgumentError> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    let numbers = numbers.unwrap_or_default();
+    let &[x, y, z, yaw, pitch] = numbers.as_slice() else { return Err(ArgumentError::Pose(text.to_owned())) };
+    if numbers.iter().any(|number| !number.is_finite()) {
+        return Err(ArgumentError::Pose(text.to_owned()));
+    }
+    let range = |message| Err(ArgumentError::PoseRange(text.to_owned(), message));
+    if !(-1e7..=1e7).contains(&x) || !(-1e7..=1e7).contains(&z) {
+        return range("x and z are metres from the terrain's centre, at most 10000000 away");
+    }
+    if !(0.0..=1e5).contains(&y) {
+        return range("y is the height above the ground in metres, 0 to 100000");
+    }
+    if yaw.abs() > 36_000.0 {
+        return range("yaw is a compass bearing in degrees, 0 to 360");
+    }
+    if pitch.abs() > 90.0 {
+        return range("pitch is in degrees above the horizon, -90 to 90");
+    }
+    Ok(Pose { position: (x, y, z), yaw, pitch })
+}
+
+/// Reads a time in seconds that is not negative, with or without an `s` behind it.
+///
+/// # Errors
+/// [`ArgumentError::Seconds`].
+pub fn parse_seconds(text: &str) -> Result<f64, ArgumentError> {
+    let trimmed = text.trim();
+    let number = trimmed.strip_suffix('s').unwrap_or(trimmed).trim_end().parse().ok();
+    number.filter(|seconds: &f64| seconds.is_finite() && *seconds >= 0.0).ok_or(ArgumentError::Seconds(text.to_owned()))
+}
+
+/// Reads a finite number above 0.
+///
+/// # Errors
+/// [`ArgumentError::Positive`].
+pub fn parse_positive(text: &str) -> Result<f64, ArgumentError> {
+    let number = text.trim().parse().ok();
+    number.filter(|number: &f64| number.is_finite() && *number > 0.0).ok_or(ArgumentError::Positive(text.to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes() {
+        assert_eq!(parse_size("1280x720"), Ok((1280, 720)));
+        assert_eq!(parse_size("1X1"), Ok((1, 1)));
+        for wrong in ["0x0", "1280", "x", "-1x5", "1280x0", "99999999999x1", "1.5x2", ""] {
+            assert_eq!(parse_size(wrong), Err(ArgumentError::Size(wrong.to_owned())));
+        }
+    }
+
+    #[test]
+    fn poses() {
+        let pose = Pose { position: (-10.5, 2.0, 30.0), yaw: 270.0, pitch: -5.0 };
+        assert_eq!(parse_pose("-10.5, 2, 30,270,-5"), Ok(pose));
+        for wrong in ["", "1,2,3", "1,2,3,4,5,6", "a,2,3,4,5", "NaN,2,3,4,5", "inf,2,3,4,5", "1,-2,3,4,5", "1,2,3,4,91"]
+        {
+            assert!(parse_pose(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn seconds_and_rates() {
+        assert_eq!(parse_seconds("12.5s"), Ok(12.5));
+        assert_eq!(parse_seconds("0"), Ok(0.0));
+        assert!(parse_seconds("-1s").is_err() && parse_seconds("inf").is_err() && parse_seconds("s").is_err());
+        assert_eq!(parse_positive("25"), Ok(25.0));
+        assert!(parse_positive("0").is_err() && parse_positive("NaN").is_err());
+    }
+}

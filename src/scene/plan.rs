@@ -1,0 +1,297 @@
+//! From a request to the frames to draw: file names, cameras, instants. A pure function of the request and the scene.
+
+use std::ffi::OsStr;
+use std::path::{Path as FilePath, PathBuf};
+
+use chrono::{DateTime, Utc};
+
+use super::Scene;
+use super::camera::{Pose, Viewpoint};
+use super::path::Path;
+use super::request::{Clock, Pictures, RenderOptions, View};
+use super::time::LocalTime;
+
+/// Pictures per second of a flight whose rate nobody stated.
+const DEFAULT_FPS: f64 = 25.0;
+/// A day of film; more frames than that are a slip of the keyboard.
+const MOST_FRAMES: u32 = 10_000_000;
+
+/// One picture to draw.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// The PNG to write.
+    pub file: PathBuf,
+    /// The camera, in scene-local coordinates.
+    pub view: Viewpoint,
+    /// Date and time, Universal Time.
+    pub instant: DateTime<Utc>,
+}
+
+/// The pictures that a request asks for, in order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderPlan {
+    /// At least one.
+    pub frames: Vec<Frame>,
+}
+
+/// Why a request cannot be planned.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PlanError {
+    /// The request follows a path that the scene does not have.
+    #[error("the scene `{0}` has no camera path to fly along; add `camera: (path: [...])` to it, or use --camera")]
+    NoPath(String),
+    /// The request starts off the path.
+    #[error("{seconds} s is not on the scene's camera path, which goes from {start} s to {end} s; choose a time on it")]
+    OffPath {
+        /// The time asked for.
+        seconds: f64,
+        /// The path's first time.
+        start: f64,
+        /// The path's last time.
+        end: f64,
+    },
+    /// No picture was asked for.
+    #[error("no picture was asked for; name one file, or one frame, at least")]
+    Nothing,
+    /// Too many pictures.
+    #[error("{0} frames are too many; ask for at most {MOST_FRAMES}")]
+    TooMany(u32),
+    /// Pictures per second that are none.
+    #[error("{0} pictures per second are impossible; choose a positive rate such as 25")]
+    BadRate(f64),
+    /// A picture's name does not say that it is a PNG.
+    #[error("`{}` does not end in .png, the format of all pictures; call it {}", .0.display(), .0.with_extension("png").display())]
+    NoPng(PathBuf),
+    /// Two pictures of a request would overwrite each other.
+    #[error("`{}` is named twice; give each picture a file of its own", .0.display())]
+    SameFile(PathBuf),
+}
+
+impl RenderPlan {
+    /// Plans `options` for `scene`. `ground` gives the terrain's height in metres at local `(x, z)`; heights in poses
+    /// count from it.
+    ///
+    /// A sequence moves along the scene's path, `1 / fps` seconds per picture from [`View::Along`] (or the path's
+    /// beginning) on, and rests at the path's end; its camera stands still at a [`View::Pose`], in a scene without
+    /// a path, and in a time-lapse whose `fps` nobody stated.
+    ///
+    /// # Errors
+    /// [`PlanError`]: a path that the scene lacks, a time off the path, no frames or too many, a rate that is not
+    /// positive, or a file name that does not end in `.png`.
+    pub fn new(options: &RenderOptions, scene: &Scene, ground: &dyn Fn(f64, f64) -> f64) -> Result<Self, PlanError> {
+        let camera = Flight::new(options.view, scene)?;
+        let viewpoint = |pose: Pose| {
+            let (x, _, z) = pose.position;
+            pose.viewpoint(ground(x, z), scene.camera.field_of_view)
+        };
+        let frames = match &options.pictures {
+            Pictures::Stills(stills) => {
+                let view = viewpoint(camera.still());
+                for (number, still) in stills.iter().enumerate() {
+                    if !is_png(&still.out) {
+                        return Err(PlanError::NoPng(still.out.clone()));
+                    }
+                    if stills.iter().take(number).any(|before| before.out == still.out) {
+                        return Err(PlanError::SameFile(still.out.clone()));
+                    }
+                }
+                let instant = |at: Option<LocalTime>| at.unwrap_or(scene.place.time).utc();
+                stills.iter().map(|still| Frame { file: still.out.clone(), view, instant: instant(still.at) }).collect()
+            }
+            Pictures::Sequence { out, frames, fps, clock } => {
+                if *frames > MOST_FRAMES {
+                    return Err(PlanError::TooMany(*frames));
+                }
+                if let Some(rate) = fps.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
+                    return Err(PlanError::BadRate(rate));
+                }
+                let step = match clock {
+                    Clock::Lapse { .. } => fps.map(|rate| 1.0 / rate),
+                    Clock::Standing(_) => Some(1.0 / fps.unwrap_or(DEFAULT_FPS)),
+                };
+                let frame = |number: u32| Frame {
+                    file: numbered(out, number, *frames),
+                    view: viewpoint(step.map_or(camera.still(), |step| camera.moving(f64::from(number) * step))),
+                    instant: instant(*clock, scene.place.time, number, *frames),
+                };
+                (0..*frames).map(frame).collect::<Vec<_>>()
+            }
+        };
+        if frames.is_empty() { Err(PlanError::Nothing) } else { Ok(Self { frames }) }
+    }
+}
+
+/// The camera of a request.
+enum Flight {
+    Standing(Pose),
+    /// A path, the time at which pictures start, and the pose of a still.
+    Moving {
+        path: Path,
+        start: f64,
+        still: Pose,
+    },
+}
+
+impl Flight {
+    fn new(view: View, scene: &Scene) -> Result<Self, PlanError> {
+        let path = Path::new(&scene.camera.path);
+        match (view, path) {
+            (View::Pose(pose), _) => Ok(Self::Standing(pose)),
+            (View::Scene, None) => Ok(Self::Standing(scene.camera.start)),
+            (View::Scene, Some(path)) => Ok(Self::Moving { start: path.start(), still: scene.camera.start, path }),
+            (View::Along(_), None) => Err(PlanError::NoPath(scene.name.clone())),
+            (View::Along(seconds), Some(path)) => {
+                if !(path.start()..=path.end()).contains(&seconds) {
+                    return Err(PlanError::OffPath { seconds, start: path.start(), end: path.end() });
+                }
+                Ok(Self::Moving { start: seconds, still: path.at(seconds), path })
+            }
+        }
+    }
+
+    fn still(&self) -> Pose {
+        match self {
+            Self::Standing(pose) | Self::Moving { still: pose, .. } => *pose,
+        }
+    }
+
+    fn moving(&self, seconds: f64) -> Pose {
+        match self {
+            Self::Standing(pose) => *pose,
+            Self::Moving { path, start, .. } => path.at(start + seconds),
+        }
+    }
+}
+
+fn instant(clock: Clock, scene: LocalTime, number: u32, frames: u32) -> DateTime<Utc> {
+    match clock {
+        Clock::Standing(at) => at.unwrap_or(scene).utc(),
+        Clock::Lapse { from, to } => {
+            let last = frames.saturating_sub(1).max(1);
+            from.toward(to, f64::from(number) / f64::from(last)).utc()
+        }
+    }
+}
+
+fn is_png(path: &FilePath) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) && path.file_stem().is_some()
+}
+
+/// The name of picture `number` of `frames`: four digits, or as many as the last one needs.
+fn numbered(out: &FilePath, number: u32, frames: u32) -> PathBuf {
+    let digits = frames.saturating_sub(1).to_string().len().max(4);
+    if is_png(out) {
+        let mut name = out.file_stem().unwrap_or(OsStr::new("")).to_owned();
+        name.push(format!("-{number:0digits$}.png"));
+        out.with_file_name(name)
+    } else {
+        out.join(format!("{number:0digits$}.png"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Still;
+    use super::*;
+
+    type Outcome = Result<(), Box<dyn std::error::Error>>;
+
+    fn scene(path: &str) -> Result<Scene, super::super::SceneError> {
+        let text = format!(
+            "(terrain: Flat(), place: (latitude: 47, longitude: 9, time: \"2026-06-21T12:00+02:00\"), camera: (start: \
+             (position: (1, 2, 3), yaw: 90, pitch: -10), field_of_view: 60, path: [{path}]))"
+        );
+        Scene::parse(&text, "test.ron".as_ref())
+    }
+
+    const PATH: &str = "(seconds: 0, position: (0, 10, 0), yaw: 0, pitch: 0), \
+                        (seconds: 10, position: (100, 10, 0), yaw: 0, pitch: 0)";
+
+    fn options(view: View, pictures: Pictures) -> RenderOptions {
+        RenderOptions {
+            scene: "test.ron".into(),
+            pictures,
+            view,
+            size: (64, 36),
+            seed: None,
+            adapter: None,
+            quiet: true,
+            explain: false,
+        }
+    }
+
+    fn sequence(frames: u32, fps: Option<f64>, clock: Clock) -> Pictures {
+        Pictures::Sequence { out: "out/flight".into(), frames, fps, clock }
+    }
+
+    fn hill(x: f64, z: f64) -> f64 {
+        100.0 + 0.5 * x + z
+    }
+
+    #[test]
+    fn a_still_stands_over_the_ground_and_looks_along_its_bearing() -> Outcome {
+        let still = Still { out: "a.png".into(), at: None };
+        let plan = RenderPlan::new(&options(View::Scene, Pictures::Stills(vec![still])), &scene(PATH)?, &hill)?;
+        let frame = &plan.frames[0];
+        assert_eq!(frame.view.position, glam::DVec3::new(1.0, 105.5, 3.0));
+        let expected = glam::DVec3::new(10_f64.to_radians().cos(), -10_f64.to_radians().sin(), 0.0);
+        assert!(frame.view.forward().abs_diff_eq(expected, 1e-12), "{}", frame.view.forward());
+        assert!((frame.view.field_of_view - 60_f64.to_radians()).abs() < 1e-12);
+        assert_eq!(frame.instant.to_rfc3339(), "2026-06-21T10:00:00+00:00");
+        Ok(())
+    }
+
+    #[test]
+    fn a_sequence_flies_along_the_path_and_rests_at_its_end() -> Outcome {
+        let request = options(View::Along(8.0), sequence(5, Some(1.0), Clock::Standing(None)));
+        let plan = RenderPlan::new(&request, &scene(PATH)?, &hill)?;
+        let xs: Vec<f64> = plan.frames.iter().map(|frame| frame.view.position.x).collect();
+        for (x, expected) in xs.iter().zip([80.0, 90.0, 100.0, 100.0, 100.0]) {
+            assert!((x - expected).abs() < 1e-9, "{xs:?}");
+        }
+        assert_eq!(plan.frames[4].file, PathBuf::from("out/flight/0004.png"));
+        assert!(plan.frames.iter().all(|frame| frame.view.position.y == hill(frame.view.position.x, 0.0) + 10.0));
+        Ok(())
+    }
+
+    #[test]
+    fn a_time_lapse_covers_its_span_from_a_standing_camera() -> Outcome {
+        let clock = Clock::Lapse { from: "2026-06-21T04:00Z".parse()?, to: "2026-06-21T20:00Z".parse()? };
+        let plan = RenderPlan::new(&options(View::Scene, sequence(5, None, clock)), &scene(PATH)?, &hill)?;
+        let hours: Vec<String> = plan.frames.iter().map(|frame| frame.instant.format("%H:%M").to_string()).collect();
+        assert_eq!(hours, ["04:00", "08:00", "12:00", "16:00", "20:00"]);
+        assert!(plan.frames.iter().all(|frame| frame.view == plan.frames[0].view));
+        let moving = RenderPlan::new(&options(View::Scene, sequence(5, Some(1.0), clock)), &scene(PATH)?, &hill)?;
+        assert!(moving.frames[0].view != moving.frames[4].view);
+        let single = RenderPlan::new(&options(View::Scene, sequence(1, None, clock)), &scene(PATH)?, &hill)?;
+        assert_eq!(single.frames[0].instant.to_rfc3339(), "2026-06-21T04:00:00+00:00");
+        Ok(())
+    }
+
+    #[test]
+    fn numbers_are_padded_to_the_longest() {
+        assert_eq!(numbered("out/a.png".as_ref(), 7, 20), PathBuf::from("out/a-0007.png"));
+        assert_eq!(numbered("out/a".as_ref(), 7, 10_001), PathBuf::from("out/a/00007.png"));
+        assert_eq!(numbered("out/v1.2".as_ref(), 7, 10_000), PathBuf::from("out/v1.2/0007.png"));
+    }
+
+    #[test]
+    fn impossible_requests_say_what_to_do() -> Outcome {
+        let bare = scene("")?;
+        let still = |out: &str| Pictures::Stills(vec![Still { out: out.into(), at: None }]);
+        let error = |view, pictures, scene: &Scene| RenderPlan::new(&options(view, pictures), scene, &hill).err();
+        assert_eq!(error(View::Along(1.0), still("a.png"), &bare), Some(PlanError::NoPath("test".into())));
+        assert!(matches!(error(View::Along(11.0), still("a.png"), &scene(PATH)?), Some(PlanError::OffPath { .. })));
+        assert!(matches!(error(View::Along(f64::NAN), still("a.png"), &scene(PATH)?), Some(PlanError::OffPath { .. })));
+        assert_eq!(error(View::Scene, still("a.jpg"), &bare), Some(PlanError::NoPng("a.jpg".into())));
+        let standing = Clock::Standing(None);
+        assert_eq!(error(View::Scene, sequence(0, None, standing), &bare), Some(PlanError::Nothing));
+        assert_eq!(error(View::Scene, sequence(2, Some(0.0), standing), &bare), Some(PlanError::BadRate(0.0)));
+        assert_eq!(error(View::Scene, sequence(u32::MAX, None, standing), &bare), Some(PlanError::TooMany(u32::MAX)));
+        let twice = Pictures::Stills(vec![Still { out: "a.png".into(), at: None }; 2]);
+        assert_eq!(error(View::Scene, twice, &bare), Some(PlanError::SameFile("a.png".into())));
+        let fault = PlanError::NoPng("a.jpg".into()).to_string();
+        assert!(fault.ends_with("call it a.png"), "{fault}");
+        Ok(())
+    }
+}

@@ -1,0 +1,150 @@
+//! What the program asks of the library: plain data that the command line fills and `app` carries out.
+
+use std::path::PathBuf;
+
+use super::camera::Pose;
+use super::time::LocalTime;
+
+/// Everything about an interactive flight.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FlyOptions {
+    /// The scene file.
+    pub scene: PathBuf,
+    /// Size of the window in pixels, each at least 1.
+    pub size: (u32, u32),
+    /// Date and time at the start; `None` takes the scene's.
+    pub at: Option<LocalTime>,
+    /// Where the camera starts; along the path it starts flying.
+    pub view: View,
+    /// Simulated seconds per real second at the start; 0 is a standing clock.
+    pub clock: f64,
+    /// Whether the camera may go under the ground.
+    pub underground: bool,
+    /// Replaces the scene's seed.
+    pub seed: Option<u64>,
+    /// Part of the name of the graphics adapter to use; `None` lets the driver choose.
+    pub adapter: Option<String>,
+    /// No progress and no notes, only warnings and errors.
+    pub quiet: bool,
+    /// Print which passes ran, which were skipped, and why.
+    pub explain: bool,
+}
+
+/// Everything about a headless render.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderOptions {
+    /// The scene file.
+    pub scene: PathBuf,
+    /// Which pictures, and where they go. [`super::RenderPlan`] turns them into frames.
+    pub pictures: Pictures,
+    /// Where the camera stands.
+    pub view: View,
+    /// Size of a picture in pixels, each at least 1; the device may allow less than what is asked.
+    pub size: (u32, u32),
+    /// Replaces the scene's seed.
+    pub seed: Option<u64>,
+    /// Part of the name of the graphics adapter to use; `None` lets the driver choose.
+    pub adapter: Option<String>,
+    /// No progress and no notes, only warnings and errors.
+    pub quiet: bool,
+    /// Report which passes ran, which were skipped, and why.
+    pub explain: bool,
+}
+
+/// Single pictures or a sequence.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Pictures {
+    /// Pictures from one camera at one or several instants.
+    Stills(Vec<Still>),
+    /// Numbered pictures.
+    Sequence {
+        /// A `.png` file name, into which the numbers go (`flight.png` becomes `flight-0000.png`, ...), or a folder
+        /// (no `.png` ending), in which the files are called `0000.png`, ...
+        out: PathBuf,
+        /// How many, at least 1.
+        frames: u32,
+        /// Pictures per second of flight along the scene's path, above 0; `None` is 25 for a flight, and a camera
+        /// that stands still for a time-lapse.
+        fps: Option<f64>,
+        /// The instants.
+        clock: Clock,
+    },
+}
+
+/// One picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Still {
+    /// The PNG to write.
+    pub out: PathBuf,
+    /// Date and time; `None` takes the scene's.
+    pub at: Option<LocalTime>,
+}
+
+/// The instants of a sequence.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Clock {
+    /// All pictures at one instant; `None` takes the scene's.
+    Standing(Option<LocalTime>),
+    /// A time-lapse: evenly spaced from the first to the last, both included.
+    Lapse {
+        /// Instant of the first picture.
+        from: LocalTime,
+        /// Instant of the last picture.
+        to: LocalTime,
+    },
+}
+
+/// Where the camera stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum View {
+    /// As the scene says: a still from its start, a sequence along its path if it has one.
+    #[default]
+    Scene,
+    /// At a fixed pose.
+    Pose(Pose),
+    /// On the scene's path at this time in seconds; a sequence starts there.
+    Along(f64),
+}
+
+/// What a headless render did.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RenderReport {
+    /// The files written, in order.
+    pub files: Vec<PathBuf>,
+    /// With [`RenderOptions::explain`]: which passes ran, which were skipped, and why, one line each.
+    pub explanation: Vec<String>,
+}
+
+/// Hears how far a long task has come. One stage at a time: a new one ends the one before.
+pub trait Progress: Send {
+    /// A stage of `steps` equal steps begins (0 where their number is unknown), called `what` for the user.
+    fn begin(&mut self, what: &str, steps: u64);
+
+    /// `steps` further steps of the stage are done.
+    fn advance(&mut self, steps: u64);
+
+    /// The stage is over.
+    fn end(&mut self);
+
+    /// Something that the user ought to know though the work goes on: a missing texture, holes in a terrain.
+    fn warn(&mut self, message: &str);
+
+    /// Something worth a line for who wants to know: what was loaded, from which cache, how long it took.
+    fn note(&mut self, message: &str);
+}
+
+/// Hears nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Silent;
+
+impl Progress for Silent {
+    fn begin(&mut self, _what: &str, _steps: u64) {}
+
+    fn advance(&mut self, _steps: u64) {}
+
+    fn end(&mut self) {}
+
+    fn warn(&mut self, _message: &str) {}
+
+    fn note(&mut self, _message: &str) {}
+}

@@ -1,0 +1,187 @@
+//! The species of a scene: what a tree of each looks like, how tall it is and where it grows.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::check::Check;
+
+/// One species.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Species {
+    /// Name, unique in the scene; inventories refer to it. Required.
+    pub name: String,
+    /// Share among the species that may grow at a place, relative to theirs, 0.000001 to 1000000. Default 1.
+    #[serde(default = "one")]
+    pub weight: f64,
+    /// What its trees look like. Required.
+    pub plant: PlantSource,
+    /// Range of heights in metres, `(lowest, highest)`, each 0.1 to 150. Default (16, 26).
+    #[serde(default = "default_height")]
+    pub height: (f64, f64),
+    /// Range of ground heights in metres above the terrain's datum where it grows. Default: everywhere.
+    #[serde(default)]
+    pub elevation: Option<(f64, f64)>,
+    /// Steepest ground it grows on, in degrees, 0 to 90. Default 90: any.
+    #[serde(default = "ninety")]
+    pub slope_limit: f64,
+    /// Radius of the trunk's foot, root flare included, in metres for a tree of mean height, 0.001 to 10; says how far
+    /// a trunk must reach into a slope. Default: 1.5 % of the mean height.
+    #[serde(default)]
+    pub trunk_radius: Option<f64>,
+}
+
+/// Where a species' plants come from: `Grown(form: Broadleaf)` or `Gltf(files: ["oak.glb"])`.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub enum PlantSource {
+    /// Grown by rule, no file needed.
+    Grown(GrownPlants),
+    /// Read from glTF or GLB files.
+    Gltf(GltfPlants),
+}
+
+/// Plants grown by rule.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct GrownPlants {
+    /// How they grow. Default `Broadleaf`.
+    pub form: GrownForm,
+    /// Number of different individuals, 1 to 16. More look richer and cost memory and bake time. Default 3.
+    pub individuals: u32,
+    /// Triangles of one full model, 5000 to 100000. Default 20000.
+    pub triangles: u32,
+    /// Seed of the first individual; each further one adds 1. Default 1.
+    pub seed: u64,
+}
+
+impl Default for GrownPlants {
+    fn default() -> Self {
+        Self { form: GrownForm::Broadleaf, individuals: 3, triangles: 20_000, seed: 1 }
+    }
+}
+
+/// The rules by which a plant grows.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+pub enum GrownForm {
+    /// The broadleaf that the program ships.
+    Broadleaf,
+    /// The conifer that the program ships.
+    Conifer,
+    /// Rules from a RON file, relative to the scene file: `form: File("../species/birch.ron")`.
+    File(PathBuf),
+}
+
+/// Plants read from files.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GltfPlants {
+    /// One individual per file, 1 to 16, relative to the scene file. Required.
+    pub files: Vec<PathBuf>,
+    /// Names of materials that are foliage, whatever their alpha mode says. Default: none named.
+    #[serde(default)]
+    pub foliage: Vec<String>,
+    /// Names of materials that are wood, whatever their alpha mode says. Default: none named.
+    #[serde(default)]
+    pub wood: Vec<String>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn ninety() -> f64 {
+    90.0
+}
+
+fn default_height() -> (f64, f64) {
+    (16.0, 26.0)
+}
+
+/// Ground heights that a limit may name, in metres.
+pub(super) const ELEVATIONS: std::ops::RangeInclusive<f64> = -12_000.0..=100_000.0;
+
+impl Species {
+    /// Mean of the range of heights, in metres.
+    pub fn mean_height(&self) -> f64 {
+        0.5 * (self.height.0 + self.height.1)
+    }
+
+    /// Radius of the trunk's foot in metres for a tree of mean height, as stated or 1.5 % of that height.
+    pub fn trunk_radius_m(&self) -> f64 {
+        self.trunk_radius.unwrap_or(0.015 * self.mean_height())
+    }
+
+    fn check(&self, at: &str, check: &mut Check) {
+        check.text(&format!("{at}.name"), &self.name, "give the species a name of its own");
+        check.number(&format!("{at}.weight"), self.weight, 1e-6..=1e6, "");
+        check.ordered(&format!("{at}.height"), self.height, 0.1..=150.0, "m");
+        if let Some(elevation) = self.elevation {
+            check.interval(&format!("{at}.elevation"), elevation, ELEVATIONS, "m");
+        }
+        check.number(&format!("{at}.slope_limit"), self.slope_limit, 0.0..=90.0, "degrees");
+        if let Some(radius) = self.trunk_radius {
+            check.number(&format!("{at}.trunk_radius"), radius, 0.001..=10.0, "m");
+        }
+        match &self.plant {
+            PlantSource::Grown(grown) => {
+                check.count(&format!("{at}.plant.individuals"), grown.individuals, 1..=16);
+                check.count(&format!("{at}.plant.triangles"), grown.triangles, 5_000..=100_000);
+                if let GrownForm::File(path) = &grown.form {
+                    check.path(&format!("{at}.plant.form"), path);
+                }
+            }
+            PlantSource::Gltf(gltf) => gltf.check(at, check),
+        }
+    }
+
+    pub(super) fn resolve(&mut self, folder: &Path) {
+        match &mut self.plant {
+            PlantSource::Grown(GrownPlants { form: GrownForm::File(path), .. }) => *path = folder.join(&path),
+            PlantSource::Grown(_) => {}
+            PlantSource::Gltf(gltf) => gltf.files.iter_mut().for_each(|file| *file = folder.join(&file)),
+        }
+    }
+}
+
+impl GltfPlants {
+    fn check(&self, at: &str, check: &mut Check) {
+        if self.files.is_empty() || self.files.len() > 16 {
+            check.problem(
+                &format!("{at}.plant.files"),
+                format!("names {} files", self.files.len()),
+                "name 1 to 16 glTF or GLB files, one per individual",
+            );
+        }
+        for (number, file) in self.files.iter().enumerate() {
+            check.path(&format!("{at}.plant.files[{number}]"), file);
+        }
+        for (number, material) in self.wood.iter().enumerate() {
+            if self.foliage.contains(material) {
+                check.problem(
+                    &format!("{at}.plant.wood[{number}]"),
+                    format!("names the material `{material}`, which `foliage` names too"),
+                    "a material is one of the two: remove it from one list",
+                );
+            }
+        }
+    }
+}
+
+/// Checks all species of a scene, and that no two share a name.
+pub(super) fn check_all(species: &[Species], check: &mut Check) {
+    let mut first_of: BTreeMap<&str, usize> = BTreeMap::new();
+    for (number, one) in species.iter().enumerate() {
+        one.check(&format!("species[{number}]"), check);
+        if let Some(first) = first_of.get(one.name.as_str()) {
+            check.problem(
+                &format!("species[{number}].name"),
+                format!("is `{}`, the name of species[{first}] too", one.name),
+                "give every species a name of its own",
+            );
+        } else {
+            first_of.insert(&one.name, number);
+        }
+    }
+}

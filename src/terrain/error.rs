@@ -1,0 +1,209 @@
+//! What can go wrong with a terrain, and what a reader wants the user to know.
+
+use std::fmt;
+use std::path::PathBuf;
+
+/// Why a terrain could not be made. Every message says what is wrong, where, and what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum TerrainError {
+    /// The file cannot be opened or read.
+    #[error("{path}: {source}", path = .path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// The file's content is none of the known formats.
+    #[error(
+        "{path}: not a known height format; readable are GeoTIFF, ESRI ASCII grid, SRTM .hgt (1201x1201 or 3601x3601) \
+         and 16-bit greyscale PNG; convert with `gdal_translate -of GTiff IN OUT.tif`", path = .path.display()
+    )]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file breaks the rules of its format, ends too early, or promises more than it holds.
+    #[error("{path}: {place}: {problem}; {remedy}", path = .path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// Line and column, row, tag or chunk.
+        place: String,
+        /// What is wrong there.
+        problem: String,
+        /// What the user can do.
+        remedy: String,
+    },
+    /// The file is well formed but says something that this reader does not handle.
+    #[error("{path}: {problem}; {remedy}", path = .path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// What is not handled.
+        problem: String,
+        /// What the user can do.
+        remedy: String,
+    },
+    /// It is not known what the file's horizontal coordinates mean.
+    #[error(
+        "{path}: unknown coordinate system ({problem}); write one into the file (`gdal_edit.py -a_srs EPSG:<code> FILE`) \
+         or state it in `ReadOptions::coordinate_system`", path = .path.display()
+    )]
+    UnknownCoordinateSystem {
+        /// The file.
+        path: PathBuf,
+        /// What was found.
+        problem: String,
+    },
+    /// A PNG has no metres, and none were given.
+    #[error(
+        "{path}: an image says nothing about metres; give its sample spacing and the heights of black and white in \
+         `ReadOptions::image_scale`", path = .path.display()
+    )]
+    MissingImageScale {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Every sample is marked as missing.
+    #[error("{path}: all {samples} samples are without data; check the file's no-data value and the crop", path = .path.display())]
+    OnlyNoData {
+        /// The file.
+        path: PathBuf,
+        /// Samples looked at.
+        samples: usize,
+    },
+    /// The crop keeps less than two rows or columns.
+    #[error(
+        "{path}: the crop keeps {columns} columns and {rows} rows, at least 2 of each are needed; the file covers \
+         west {west}, south {south}, east {east}, north {north} in its own coordinates", path = .path.display()
+    )]
+    EmptyCrop {
+        /// The file.
+        path: PathBuf,
+        /// Columns inside the crop.
+        columns: usize,
+        /// Rows inside the crop.
+        rows: usize,
+        /// Western limit of the file's samples, in its coordinates.
+        west: f64,
+        /// Southern limit.
+        south: f64,
+        /// Eastern limit.
+        east: f64,
+        /// Northern limit.
+        north: f64,
+    },
+    /// A height field needs two samples each way to have a surface.
+    #[error("a height field of {columns} columns and {rows} rows has no surface; at least 2 of each are needed")]
+    TooSmall {
+        /// Columns given.
+        columns: usize,
+        /// Rows given.
+        rows: usize,
+    },
+    /// More samples than fit the limit of memory.
+    #[error("{columns} columns x {rows} rows are more than the limit of {limit} samples; crop or resample the data")]
+    TooLarge {
+        /// Columns asked for.
+        columns: usize,
+        /// Rows asked for.
+        rows: usize,
+        /// The most samples accepted.
+        limit: usize,
+    },
+    /// The number of heights is not columns times rows.
+    #[error("{heights} heights do not fill {columns} columns x {rows} rows; give columns * rows values, row by row")]
+    WrongCount {
+        /// Heights given.
+        heights: usize,
+        /// Columns given.
+        columns: usize,
+        /// Rows given.
+        rows: usize,
+    },
+    /// A height is not a number, infinite or absurd.
+    #[error("the height at column {column}, row {row} is {height}; heights must be finite and within +-{limit} m")]
+    BadHeight {
+        /// Column from the west.
+        column: usize,
+        /// Row from the north.
+        row: usize,
+        /// The value found.
+        height: f32,
+        /// The largest magnitude accepted, in metres.
+        limit: f32,
+    },
+    /// A spacing, wavelength or other parameter is out of its range.
+    #[error("{name} is {value}; it must be {range}")]
+    BadParameter {
+        /// Which parameter.
+        name: &'static str,
+        /// The value found.
+        value: f64,
+        /// The range accepted, in words.
+        range: &'static str,
+    },
+}
+
+/// What a reader did on its own account; the terrain is usable.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Warning {
+    /// Samples without data were filled from the rim of their holes.
+    HolesFilled {
+        /// Samples filled.
+        filled: usize,
+        /// Samples of the terrain.
+        total: usize,
+    },
+    /// Samples that no place on earth has were taken as holes although the file does not mark them so.
+    ImplausibleHeights {
+        /// Samples concerned.
+        count: usize,
+    },
+    /// The file names no coordinate system; its coordinates were taken as degrees or as local metres.
+    AssumedCoordinates {
+        /// True: degrees of longitude and latitude. False: local metres.
+        degrees: bool,
+    },
+    /// A projected system was read whose place on earth is not known here: distances are right, but latitude and
+    /// longitude are not available.
+    PlaceUnknown {
+        /// The EPSG code found, if any.
+        epsg: Option<u32>,
+    },
+    /// A projected file states no linear unit; metres were assumed.
+    AssumedMetres,
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Warning::HolesFilled { filled, total } => write!(
+                f,
+                "{filled} of {total} samples ({:.2} %) have no data and were filled from the rim of their holes",
+                100.0 * *filled as f64 / (*total).max(1) as f64
+            ),
+            Warning::ImplausibleHeights { count } => write!(
+                f,
+                "{count} samples lie outside -12000 m to 30000 m and were taken as missing; set the file's no-data value"
+            ),
+            Warning::AssumedCoordinates { degrees: true } => {
+                write!(f, "the file names no coordinate system; its coordinates look like degrees and were taken so")
+            }
+            Warning::AssumedCoordinates { degrees: false } => {
+                write!(f, "the file names no coordinate system; its coordinates were taken as local metres")
+            }
+            Warning::PlaceUnknown { epsg: Some(code) } => write!(
+                f,
+                "EPSG:{code} is read as plain metres: latitude and longitude of the terrain are unknown, state them for the sun"
+            ),
+            Warning::PlaceUnknown { epsg: None } => write!(
+                f,
+                "a projection of the file's own is read as plain metres: latitude and longitude of the terrain are unknown, \
+                 state them for the sun"
+            ),
+            Warning::AssumedMetres => write!(f, "the file states no linear unit; metres were assumed"),
+        }
+    }
+}

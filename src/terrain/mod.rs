@@ -1,0 +1,31 @@
+//! Terrain: height fields in metres, the smooth ground through them, and what drawing and light need to know of it.
+//!
+//! ```text
+//! read::read_terrain (GeoTIFF, ESRI ASCII, .hgt, PNG) --+
+//!                                                       +--> HeightField --> Terrain: height, normal, slope
+//! noise::NoiseTerrain::height_field --------------------+                      |-> tiles: levels of detail to draw
+//!                                                                              +-> sun_horizon: shadow of the relief
+//! ```
+//!
+//! The local frame of everything here: metres, origin at the centre of the field, x east, z south, heights above the
+//! datum of the data. [`GeoReference`] leads from the coordinates of a file to this frame and back.
+
+mod error;
+mod extended_grid;
+mod geo_reference;
+mod height_bounds;
+mod height_field;
+mod holes;
+pub mod noise;
+pub mod read;
+pub mod sun_horizon;
+mod surface;
+pub mod tiles;
+
+pub use error::{TerrainError, Warning};
+pub use extended_grid::Surroundings;
+pub use geo_reference::{CoordinateSystem, GeoReference};
+pub use height_field::{HeightField, MAX_HEIGHT, MAX_SAMPLES};
+pub use noise::{NoiseKind, NoiseTerrain};
+pub use read::{Crop, ImageScale, ReadOptions, read_terrain};
+pub use surface::Terrain;

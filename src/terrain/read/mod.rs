@@ -1,0 +1,221 @@
+//! Reading terrain from files as they come. The format is known by a file's content, not by its name.
+//!
+//! | format | horizontal system | heights |
+//! |---|---|---|
+//! | GeoTIFF, BigTIFF | its GeoKeys: degrees, UTM, any projection in metres or feet | 8 to 64 bit integers and floats, one band |
+//! | ESRI ASCII grid | none in the file: local metres, or degrees if the numbers look like it | text |
+//! | SRTM `.hgt` | degrees, from the file's name (`N36W085.hgt`) | 16 bit, 1201² or 3601² |
+//! | PNG, 16 bit greyscale | metres from [`ReadOptions::image_scale`] | from the same |
+
+mod ascii_grid;
+mod geotiff;
+mod hgt;
+mod image;
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use glam::DVec2;
+
+use super::holes::fill_holes;
+use super::{CoordinateSystem, GeoReference, HeightField, MAX_SAMPLES, Surroundings, Terrain, TerrainError, Warning};
+
+/// Heights outside this range (metres) are no heights of the earth, but a mark for missing data.
+const PLAUSIBLE: std::ops::RangeInclusive<f32> = -12_000.0..=30_000.0;
+
+/// What to read and how to understand it; the default reads a whole file as it describes itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ReadOptions {
+    /// Read only the samples inside this window.
+    pub crop: Option<Crop>,
+    /// Metres of an image; needed for PNG, ignored for all else.
+    pub image_scale: Option<ImageScale>,
+    /// The coordinate system, instead of what the file says or does not say.
+    pub coordinate_system: Option<CoordinateSystem>,
+    /// What lies outside the field.
+    pub surroundings: Surroundings,
+}
+
+/// A window in the coordinates of the file (degrees, or easting and northing). Samples on its border are inside.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Crop {
+    /// Smallest x.
+    pub west: f64,
+    /// Smallest y.
+    pub south: f64,
+    /// Largest x.
+    pub east: f64,
+    /// Largest y.
+    pub north: f64,
+}
+
+/// The metres of a greyscale image. Its file coordinates are metres from its lower left sample.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ImageScale {
+    /// Distance of neighbouring samples in metres, above 0.
+    pub spacing: f64,
+    /// Height of black (0) in metres.
+    pub lowest: f64,
+    /// Height of white (65535) in metres.
+    pub highest: f64,
+}
+
+/// Reads a terrain. Holes are filled from their rims; the warnings say what the reader decided on its own account.
+///
+/// Memory stays within a few times the samples asked for, and within a limit that follows from the size of the file:
+/// a header alone allocates nothing.
+///
+/// # Errors
+/// See [`TerrainError`]: a file that cannot be read, is of no known format, broken, without data, without a known
+/// coordinate system, or of less than two rows or columns. No input makes this function panic.
+pub fn read_terrain(path: &Path, options: &ReadOptions) -> Result<(Terrain, Vec<Warning>), TerrainError> {
+    let io = |source| TerrainError::Io { path: path.to_owned(), source };
+    let mut file = File::open(path).map_err(io)?;
+    let length = file.metadata().map_err(io)?.len();
+    let mut start = Vec::new();
+    file.by_ref().take(512).read_to_end(&mut start).map_err(io)?;
+    let source = Source { path, length, options };
+    let raster = if geotiff::recognises(&start) {
+        geotiff::read(&source)?
+    } else if image::recognises(&start) {
+        image::read(&source)?
+    } else if ascii_grid::recognises(&start) {
+        ascii_grid::read(&source)?
+    } else if hgt::recognises(length) {
+        hgt::read(&source)?
+    } else {
+        return Err(TerrainError::UnknownFormat { path: path.to_owned() });
+    };
+    raster.into_terrain(&source)
+}
+
+/// What every reader gets.
+struct Source<'a> {
+    path: &'a Path,
+    /// Bytes in the file.
+    length: u64,
+    options: &'a ReadOptions,
+}
+
+impl Source<'_> {
+    fn malformed(&self, place: impl Into<String>, problem: impl ToString, remedy: impl Into<String>) -> TerrainError {
+        TerrainError::Malformed {
+            path: self.path.to_owned(),
+            place: place.into(),
+            problem: problem.to_string(),
+            remedy: remedy.into(),
+        }
+    }
+
+    fn unsupported(&self, problem: impl Into<String>, remedy: impl Into<String>) -> TerrainError {
+        TerrainError::Unsupported { path: self.path.to_owned(), problem: problem.into(), remedy: remedy.into() }
+    }
+
+    /// The part of a grid that the options ask for.
+    fn window(&self, grid: &Grid) -> Result<Window, TerrainError> {
+        if grid.columns < 2 || grid.rows < 2 {
+            return Err(TerrainError::TooSmall { columns: grid.columns, rows: grid.rows });
+        }
+        let whole = Window { column: 0, row: 0, columns: grid.columns, rows: grid.rows };
+        let window = match self.options.crop {
+            None => whole,
+            Some(crop) => {
+                // A millionth of a cell: a limit written with a few digits still takes the sample it names.
+                let range = |low: f64, high: f64, count: usize| {
+                    let first = (low - 1e-6).ceil().max(0.0);
+                    let end = ((high + 1e-6).floor() + 1.0).min(count as f64);
+                    // Comparisons with NaN are false, so a limit that is not a number keeps nothing.
+                    if first < end { (first as usize, (end - first) as usize) } else { (0, 0) }
+                };
+                let west = (crop.west - grid.first.x) / grid.step.x;
+                let east = (crop.east - grid.first.x) / grid.step.x;
+                let north = (grid.first.y - crop.north) / grid.step.y;
+                let south = (grid.first.y - crop.south) / grid.step.y;
+                let (column, columns) = range(west, east, grid.columns);
+                let (row, rows) = range(north, south, grid.rows);
+                if columns < 2 || rows < 2 {
+                    let last = grid.position(grid.columns - 1, grid.rows - 1);
+                    return Err(TerrainError::EmptyCrop {
+                        path: self.path.to_owned(),
+                        columns,
+                        rows,
+                        west: grid.first.x,
+                        south: last.y,
+                        east: last.x,
+                        north: grid.first.y,
+                    });
+                }
+                Window { column, row, columns, rows }
+            }
+        };
+        if window.columns.checked_mul(window.rows).is_none_or(|count| count > MAX_SAMPLES) {
+            return Err(TerrainError::TooLarge { columns: window.columns, rows: window.rows, limit: MAX_SAMPLES });
+        }
+        Ok(window)
+    }
+}
+
+/// How a file's samples lie in its coordinates.
+#[derive(Clone, Copy, Debug)]
+struct Grid {
+    columns: usize,
+    rows: usize,
+    /// File coordinates of the north-western sample.
+    first: DVec2,
+    /// Distance of samples in file coordinates to the east and to the south, both positive.
+    step: DVec2,
+}
+
+impl Grid {
+    fn position(&self, column: usize, row: usize) -> DVec2 {
+        self.first + DVec2::new(column as f64, -(row as f64)) * self.step
+    }
+}
+
+/// A part of a grid, in samples.
+#[derive(Clone, Copy, Debug)]
+struct Window {
+    column: usize,
+    row: usize,
+    columns: usize,
+    rows: usize,
+}
+
+/// What a reader found: the samples of a window, holes as NaN.
+struct Raster {
+    grid: Grid,
+    window: Window,
+    system: CoordinateSystem,
+    heights: Vec<f32>,
+    warnings: Vec<Warning>,
+}
+
+impl Raster {
+    fn into_terrain(mut self, source: &Source) -> Result<(Terrain, Vec<Warning>), TerrainError> {
+        let mut implausible = 0;
+        for height in &mut self.heights {
+            if !height.is_nan() && !PLAUSIBLE.contains(height) {
+                *height = f32::NAN;
+                implausible += 1;
+            }
+        }
+        if implausible > 0 {
+            self.warnings.push(Warning::ImplausibleHeights { count: implausible });
+        }
+        let samples = self.heights.len();
+        let filled = fill_holes(self.window.columns, self.window.rows, &mut self.heights);
+        if filled == samples {
+            return Err(TerrainError::OnlyNoData { path: source.path.to_owned(), samples });
+        }
+        if filled > 0 {
+            self.warnings.push(Warning::HolesFilled { filled, total: samples });
+        }
+        let Window { column, row, columns, rows } = self.window;
+        let corners = [self.grid.position(column, row), self.grid.position(column + columns - 1, row + rows - 1)];
+        let reference = GeoReference::new(self.system, 0.5 * (corners[0] + corners[1]))?;
+        let spacing = self.grid.step * reference.metres_per_unit();
+        let field = HeightField::new(columns, rows, spacing, self.heights)?;
+        Ok((Terrain::new(field, Some(reference), source.options.surroundings), self.warnings))
+    }
+}

@@ -1,0 +1,516 @@
+//! Bakes on whole plants: what they keep, that they are deterministic, and that the cache can be trusted.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use canopy::bake::ambient::{AmbientSettings, ambient_visibility};
+use canopy::bake::billboard::{Cross, CrossSettings, bake_cross};
+use canopy::bake::cache::{Cache, CacheKey};
+use canopy::bake::rasterize::{View, projected_area};
+use canopy::bake::shadow_proxy::{shadow_proxy, simplify_foliage};
+use canopy::bake::{BakeError, BakeSettings, BakeSource, BakedPlant, bake_plant};
+use canopy::plant::{PartKind, Plant, PlantMaterial, PlantMesh, PlantPart};
+use glam::{Mat3, Quat, Vec2, Vec3};
+use image::{Rgba, RgbaImage};
+use proptest::prelude::*;
+
+/// A small generator of its own (SplitMix64), so that the test plants never change.
+struct Random(u64);
+
+impl Random {
+    fn unit(&mut self) -> f32 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 40) as f32 / (1u32 << 24) as f32
+    }
+
+    fn signed(&mut self) -> f32 {
+        2.0 * self.unit() - 1.0
+    }
+
+    fn direction(&mut self) -> Vec3 {
+        loop {
+            let v = Vec3::new(self.signed(), self.signed(), self.signed());
+            if (0.01..1.0).contains(&v.length_squared()) {
+                return v.normalize();
+            }
+        }
+    }
+}
+
+/// A leaf: a disc on a texture whose hidden colour is a screaming magenta.
+fn leaf_texture() -> RgbaImage {
+    RgbaImage::from_fn(32, 32, |x, y| {
+        let d = Vec2::new(x as f32 - 15.5, y as f32 - 15.5).length();
+        if d < 13.0 { Rgba([60, 120, 30, 255]) } else { Rgba([255, 0, 255, 0]) }
+    })
+}
+
+fn add_card(mesh: &mut PlantMesh, center: Vec3, turn: Quat, half: f32) {
+    let base = mesh.positions.len() as u32;
+    let (u, v) = (turn * Vec3::X * half, turn * Vec3::Y * half);
+    mesh.positions.extend([center - u - v, center + u - v, center + u + v, center - u + v]);
+    mesh.normals.extend([turn * Vec3::Z; 4]);
+    mesh.uvs.extend([Vec2::new(0.0, 1.0), Vec2::new(1.0, 1.0), Vec2::new(1.0, 0.0), Vec2::new(0.0, 0.0)]);
+    mesh.triangles.extend([[base, base + 1, base + 2], [base, base + 2, base + 3]]);
+}
+
+/// A tapering tube.
+fn add_branch(mesh: &mut PlantMesh, from: Vec3, to: Vec3, radius: f32) {
+    const SIDES: u32 = 6;
+    let base = mesh.positions.len() as u32;
+    let (right, up) = (to - from).normalize().any_orthonormal_pair();
+    for (end, r) in [(from, radius), (to, 0.4 * radius)] {
+        for side in 0..SIDES {
+            let (sin, cos) = (std::f32::consts::TAU * side as f32 / SIDES as f32).sin_cos();
+            let normal = cos * right + sin * up;
+            mesh.positions.push(end + r * normal);
+            mesh.normals.push(normal);
+            mesh.uvs.push(Vec2::new(side as f32 / SIDES as f32, 0.0));
+        }
+    }
+    for side in 0..SIDES {
+        let next = (side + 1) % SIDES;
+        let [a, b, c, d] = [side, next, SIDES + next, SIDES + side].map(|i| base + i);
+        mesh.triangles.extend([[a, b, c], [a, c, d]]);
+    }
+}
+
+/// A tree of `cards` leaves in clumps at the ends of branches around a trunk, about 8 m high.
+fn tree(cards: usize, seed: u64) -> Plant {
+    let mut random = Random(seed);
+    let (mut wood, mut leaves) = (PlantMesh::default(), PlantMesh::default());
+    add_branch(&mut wood, Vec3::ZERO, 6.0 * Vec3::Y, 0.25);
+    let clumps: Vec<Vec3> = (0..40)
+        .map(|_| {
+            let end = Vec3::new(0.3, 5.0, -0.2) + random.direction() * Vec3::new(2.4, 2.8, 2.0) * random.unit().cbrt();
+            add_branch(&mut wood, Vec3::new(0.0, 0.6 * end.y, 0.0), end, 0.06);
+            end
+        })
+        .collect();
+    for card in 0..cards {
+        let center = clumps[card % clumps.len()] + 0.5 * random.unit() * random.direction();
+        let turn = Quat::from_rotation_arc(Vec3::Z, random.direction());
+        add_card(&mut leaves, center, turn, 0.10 + 0.05 * random.unit());
+    }
+    let bark = PlantMaterial { base_color: Vec3::new(0.2, 0.12, 0.07), ..Default::default() };
+    let leaf = PlantMaterial {
+        base_color_texture: Some(Arc::new(leaf_texture())),
+        transmission: Vec3::new(0.3, 0.5, 0.1),
+        ..Default::default()
+    };
+    Plant {
+        name: "test tree".into(),
+        parts: vec![
+            PlantPart { kind: PartKind::Wood, mesh: wood, material: bark },
+            PlantPart { kind: PartKind::Foliage, mesh: leaves, material: leaf },
+        ],
+    }
+}
+
+fn small_settings() -> BakeSettings {
+    let cross = CrossSettings { resolution: 64, supersampling: 2, ..Default::default() };
+    BakeSettings { cross, ..Default::default() }
+}
+
+fn same(a: &BakedPlant, b: &BakedPlant) -> bool {
+    a.ambient == b.ambient && a.shadow_proxy == b.shadow_proxy && a.cross == b.cross
+}
+
+fn decode_octahedral(code: [u8; 2]) -> Vec3 {
+    let f = Vec2::new(f32::from(code[0]), f32::from(code[1])) / 255.0 * 2.0 - 1.0;
+    let z = 1.0 - f.x.abs() - f.y.abs();
+    let t = (-z).max(0.0);
+    Vec3::new(f.x - t * f.x.signum(), f.y - t * f.y.signum(), z).normalize()
+}
+
+/// Area that a level of a plane's picture shows with an alpha test at one half, square metres, bilinear as on the GPU.
+fn picture_area(cross: &Cross, index: usize, level: usize) -> f32 {
+    const ZOOM: usize = 4;
+    let chain = &cross.textures.color[index];
+    let (width, height) = chain.level_size(level);
+    let (width, height) = (width as usize, height as usize);
+    let texels = &chain.levels[level];
+    let alpha = |x: usize, y: usize| f32::from(texels[4 * (y.min(height - 1) * width + x.min(width - 1)) + 3]);
+    let at = |i: usize| ((i as f32 + 0.5) / ZOOM as f32 - 0.5).max(0.0);
+    let mut inside = 0usize;
+    for (i, j) in (0..height * ZOOM).flat_map(|j| (0..width * ZOOM).map(move |i| (i, j))) {
+        let (x, y) = (at(i), at(j));
+        let (x0, y0) = (x as usize, y as usize);
+        let (u, v) = (x.fract(), y.fract());
+        let top = (1.0 - u) * alpha(x0, y0) + u * alpha(x0 + 1, y0);
+        let bottom = (1.0 - u) * alpha(x0, y0 + 1) + u * alpha(x0 + 1, y0 + 1);
+        inside += usize::from((1.0 - v) * top + v * bottom >= 127.5);
+    }
+    let plane = &cross.planes[index];
+    4.0 * plane.u.length() * plane.v.length() * inside as f32 / (width * height * ZOOM * ZOOM) as f32
+}
+
+#[test]
+fn ambient_is_brighter_outside_than_inside_and_on_top_than_below() {
+    let plant = tree(6000, 1);
+    let ambient = ambient_visibility(&plant, &AmbientSettings::default());
+    assert_eq!(
+        ambient.iter().map(Vec::len).collect::<Vec<_>>(),
+        plant.parts.iter().map(|p| p.mesh.positions.len()).collect::<Vec<_>>()
+    );
+    let mean = |select: &dyn Fn(Vec3) -> bool| {
+        let chosen: Vec<f32> = plant.parts[1]
+            .mesh
+            .positions
+            .iter()
+            .zip(&ambient[1])
+            .filter(|(p, _)| select(**p))
+            .map(|(_, k)| *k)
+            .collect();
+        assert!(chosen.len() > 20, "the test looks at {} vertices only", chosen.len());
+        chosen.iter().sum::<f32>() / chosen.len() as f32
+    };
+    let middle = Vec3::new(0.3, 5.0, -0.2);
+    let inside = mean(&|p| p.distance(middle) < 1.0);
+    let outside = mean(&|p| p.distance(middle) > 2.2);
+    assert!(outside > 1.3 * inside, "outside {outside}, inside {inside}");
+    let (top, bottom) = (mean(&|p| p.y > 6.5), mean(&|p| p.y < 3.5));
+    assert!(top > 1.1 * bottom, "top {top}, bottom {bottom}");
+}
+
+#[test]
+fn ambient_of_bare_wood_is_open_and_of_denser_foliage_darker() {
+    let mut bare = tree(1, 2);
+    bare.parts.truncate(1);
+    assert!(ambient_visibility(&bare, &AmbientSettings::default())[0].iter().all(|&k| k == 1.0));
+    let mean = |cards: usize| {
+        let ambient = ambient_visibility(&tree(cards, 3), &AmbientSettings::default());
+        ambient[0].iter().sum::<f32>() / ambient[0].len() as f32
+    };
+    let (thin, dense) = (mean(400), mean(8000));
+    assert!(dense < 0.8 * thin && thin < 1.0, "thin {thin}, dense {dense}");
+}
+
+#[test]
+fn a_cross_covers_what_the_plant_covers_in_every_mip() {
+    let plant = tree(1500, 4);
+    let ambient = ambient_visibility(&plant, &AmbientSettings::default());
+    let cross = bake_cross(&plant, &ambient, &CrossSettings::default());
+    let bounds = plant.bounds().unwrap();
+    for (index, plane) in cross.planes.iter().enumerate() {
+        assert!((plane.u.cross(plane.v).normalize() - plane.normal).length() < 1e-5);
+        let reach = plane.u.abs() + plane.v.abs();
+        let along = Vec3::ONE - plane.normal.abs();
+        assert!(((plane.center + reach - bounds.max) * along).length() < 1e-4);
+        assert!(((plane.center - reach - bounds.min) * along).length() < 1e-4);
+
+        let view = View { center: plane.center, right: plane.u, up: plane.v, toward: plane.normal };
+        let full = projected_area(&plant, &view, 2048);
+        assert!(full > 1.0);
+        assert_eq!(cross.textures.color[index].levels.len(), 9);
+        for (level, tolerance) in [0.03, 0.03, 0.03, 0.05, 0.05].into_iter().enumerate() {
+            let shown = picture_area(&cross, index, level) / full;
+            assert!((shown - 1.0).abs() < tolerance, "plane {index}, level {level} shows {shown} of the plant");
+        }
+    }
+}
+
+#[test]
+fn a_cross_has_no_foreign_colour_anywhere() {
+    let plant = tree(1500, 5);
+    let cross = bake_cross(&plant, &[], &CrossSettings { resolution: 128, ..Default::default() });
+    for chain in &cross.textures.color {
+        // Leaves are green (60, 120, 30), bark is brown: red never exceeds what lies between, blue stays low.
+        for texel in chain.levels.iter().flat_map(|level| level.chunks_exact(4)) {
+            assert!(texel[2] < 80 && texel[0] < 140 && texel[1] > 60, "{texel:?}");
+        }
+    }
+    assert!((cross.transmission - Vec3::new(0.3, 0.5, 0.1)).length() < 1e-5);
+}
+
+/// One leaf turned by hand: its normal, ambient visibility and kind are known in every plane.
+#[test]
+fn a_cross_keeps_normal_ambient_and_kind() {
+    let mut mesh = PlantMesh::default();
+    let normal = Vec3::new(0.5, 0.6, 0.7).normalize();
+    // The vertex normal looks away from all three viewers and has to be turned.
+    add_card(&mut mesh, Vec3::new(0.0, 2.0, 0.0), Quat::from_rotation_arc(Vec3::Z, -normal), 1.0);
+    let part = PlantPart { kind: PartKind::Foliage, mesh, material: PlantMaterial::default() };
+    let plant = Plant { name: String::new(), parts: vec![part] };
+    let cross = bake_cross(&plant, &[vec![0.4; 4]], &CrossSettings { resolution: 64, ..Default::default() });
+    for (plane, chain) in cross.planes.iter().zip(&cross.textures.properties) {
+        for level in &chain.levels {
+            for texel in level.chunks_exact(4) {
+                let decoded = plane.frame() * decode_octahedral([texel[0], texel[1]]);
+                assert!(decoded.angle_between(normal) < 0.02, "{decoded}");
+                assert_eq!((texel[2], texel[3]), (102, 255));
+            }
+        }
+    }
+    let frame = cross.planes[1].frame();
+    assert!((frame - Mat3::from_cols(Vec3::NEG_Z, Vec3::Y, Vec3::X)).abs_diff_eq(Mat3::ZERO, 1e-5));
+}
+
+#[test]
+fn nothing_and_flat_plants_give_crosses_too() {
+    let empty = bake_cross(&Plant::default(), &[], &CrossSettings::default());
+    assert_eq!(empty.planes.len(), 3);
+    assert!(empty.textures.color.iter().flat_map(|chain| &chain.levels).flatten().all(|&byte| byte == 0));
+
+    let mut mesh = PlantMesh::default();
+    add_card(&mut mesh, Vec3::Y, Quat::IDENTITY, 1.0);
+    let part = PlantPart { kind: PartKind::Foliage, mesh, material: PlantMaterial::default() };
+    let flat = Plant { name: String::new(), parts: vec![part] };
+    let ambient = ambient_visibility(&flat, &AmbientSettings::default());
+    let cross = bake_cross(&flat, &ambient, &CrossSettings { resolution: 64, ..Default::default() });
+    assert_eq!(cross.planes[1].u, Vec3::ZERO);
+    assert!(cross.planes.iter().all(|plane| plane.frame().is_finite()));
+    assert_eq!(cross.textures.color[0].coverage(0, 0.5), 1.0);
+    assert_eq!(cross.textures.color[1].coverage(0, 0.5), 0.0);
+    let proxy = simplify_foliage(&flat, 1);
+    assert_eq!(proxy.parts[0].mesh, flat.parts[0].mesh);
+}
+
+#[test]
+fn a_fifth_of_the_triangles_casts_the_same_shadow() {
+    let plant = tree(3000, 6);
+    let total = plant.triangle_count(PartKind::Foliage) + plant.triangle_count(PartKind::Wood);
+    let light = simplify_foliage(&plant, total / 5);
+    let kept: usize = light.parts.iter().map(|part| part.mesh.triangles.len()).sum();
+    assert!(kept <= total / 5 && kept > total / 6, "{kept} of {total}");
+    let bounds = plant.bounds().unwrap();
+    for toward in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::new(0.3, 0.8, -0.5), Vec3::new(-0.7, 0.2, 0.4)] {
+        let mut view = View::framing(bounds, toward.normalize());
+        (view.right, view.up) = (1.3 * view.right, 1.3 * view.up);
+        let ratio = projected_area(&light, &view, 1024) / projected_area(&plant, &view, 1024);
+        assert!((ratio - 1.0).abs() < 0.10, "towards {toward}: {ratio}");
+    }
+    assert_eq!(shadow_proxy(&plant, total / 5), light.parts.iter().map(|part| part.mesh.clone()).collect::<Vec<_>>());
+    // The trunk, with the largest area a triangle, is never dropped.
+    assert!(light.parts[0].mesh.positions.iter().any(|p| p.y == 0.0));
+}
+
+#[test]
+fn a_bake_is_the_same_on_one_thread_and_on_four() {
+    let plant = Arc::new(tree(2000, 7));
+    let bake = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| bake_plant(Arc::clone(&plant), &BakeSettings::default(), None).0)
+    };
+    assert!(same(&bake(1), &bake(4)));
+}
+
+#[test]
+fn the_cache_gives_back_what_was_baked() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = Cache::new(folder.path().join("not/yet/there"));
+    let plant = Arc::new(tree(500, 8));
+    let (fresh, source) = bake_plant(Arc::clone(&plant), &small_settings(), Some(&cache));
+    assert!(matches!(source, BakeSource::Fresh { warning: None }), "{source:?}");
+    let (cached, source) = bake_plant(Arc::clone(&plant), &small_settings(), Some(&cache));
+    assert!(matches!(source, BakeSource::Cache), "{source:?}");
+    assert!(same(&fresh, &cached));
+
+    // One vertex, one texel, one setting: each is another plant.
+    let mut moved = Plant::clone(&plant);
+    moved.parts[1].mesh.positions[0].x += 1e-6;
+    let mut painted = Plant::clone(&plant);
+    let mut texture = leaf_texture();
+    texture.put_pixel(3, 4, Rgba([1, 2, 3, 4]));
+    painted.parts[1].material.base_color_texture = Some(Arc::new(texture));
+    for (other, settings) in [
+        (moved, small_settings()),
+        (painted, small_settings()),
+        (Plant::clone(&plant), BakeSettings { shadow_share: 0.3, ..small_settings() }),
+    ] {
+        assert!(cache.load(&CacheKey::new(&other, &settings), &Arc::new(other)).is_none());
+    }
+    let left: Vec<PathBuf> = std::fs::read_dir(cache.folder()).unwrap().map(|entry| entry.unwrap().path()).collect();
+    assert_eq!(left, [cache.file(&CacheKey::new(&plant, &small_settings().in_range()))]);
+}
+
+#[test]
+fn a_damaged_cache_file_is_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = Cache::new(folder.path());
+    let plant = Arc::new(Plant::default());
+    let (fresh, _) = bake_plant(Arc::clone(&plant), &small_settings(), Some(&cache));
+    let key = CacheKey::new(&plant, &small_settings());
+    let whole = std::fs::read(cache.file(&key)).unwrap();
+    for length in (0..200).chain((200..whole.len()).step_by(9973)) {
+        std::fs::write(cache.file(&key), &whole[..length]).unwrap();
+        assert!(cache.load(&key, &plant).is_none(), "cut at {length}");
+    }
+    let (again, source) = bake_plant(Arc::clone(&plant), &small_settings(), Some(&cache));
+    assert!(matches!(source, BakeSource::Fresh { warning: None }));
+    assert!(same(&fresh, &again));
+    assert_eq!(std::fs::read(cache.file(&key)).unwrap(), whole);
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("a file");
+    std::fs::write(&file, b"in the way").unwrap();
+    let cache = Cache::new(file.join("below"));
+    let (baked, source) = bake_plant(Arc::new(tree(50, 9)), &small_settings(), Some(&cache));
+    let BakeSource::Fresh { warning: Some(warning @ BakeError::CacheFolder { .. }) } = source else {
+        panic!("{source:?}")
+    };
+    assert!(warning.to_string().contains("CANOPY_CACHE"), "{warning}");
+    assert_eq!(baked.ambient.len(), 2);
+
+    // A folder in the place of the file: it can be neither read nor replaced.
+    let cache = Cache::new(folder.path());
+    let plant = Arc::new(tree(50, 9));
+    let path = cache.file(&CacheKey::new(&plant, &small_settings()));
+    std::fs::create_dir_all(path.join("full")).unwrap();
+    let (_, source) = bake_plant(plant, &small_settings(), Some(&cache));
+    assert!(matches!(source, BakeSource::Fresh { warning: Some(BakeError::CacheWrite { .. }) }), "{source:?}");
+}
+
+#[test]
+fn several_writers_leave_one_whole_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = Cache::new(folder.path());
+    let plant = Arc::new(tree(50, 10));
+    std::thread::scope(|scope| {
+        for _ in 0..4 {
+            scope.spawn(|| bake_plant(Arc::clone(&plant), &small_settings(), Some(&cache)));
+        }
+    });
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    let (_, source) = bake_plant(plant, &small_settings(), Some(&cache));
+    assert!(matches!(source, BakeSource::Cache));
+}
+
+/// Generous limits: they catch a bake that became ten times slower, not a busy machine.
+#[test]
+fn sixty_thousand_triangles_are_baked_in_seconds() {
+    let plant = Arc::new(tree(30_000, 11));
+    let timed = |what: &str, limit: u64, work: &mut dyn FnMut()| {
+        let start = Instant::now();
+        work();
+        let time = start.elapsed();
+        println!("{what}: {time:?}");
+        assert!(time < Duration::from_secs(limit), "{what} took {time:?}");
+    };
+    let mut ambient = Vec::new();
+    timed("ambient visibility", 5, &mut || ambient = ambient_visibility(&plant, &AmbientSettings::default()));
+    timed("crossed billboards", 15, &mut || drop(bake_cross(&plant, &ambient, &CrossSettings::default())));
+    timed("shadow proxy", 10, &mut || drop(shadow_proxy(&plant, 12_000)));
+    let folder = tempfile::tempdir().unwrap();
+    let cache = Cache::new(folder.path());
+    bake_plant(Arc::clone(&plant), &BakeSettings::default(), Some(&cache));
+    timed("from the cache", 1, &mut || drop(bake_plant(Arc::clone(&plant), &BakeSettings::default(), Some(&cache))));
+}
+
+#[test]
+fn real_trees_keep_their_area() {
+    let Some(folder) = std::env::var_os("CANOPY_DATA").map(PathBuf::from) else {
+        println!("skipped: no CANOPY_DATA");
+        return;
+    };
+    for name in ["oak-medium", "aspen-medium", "pine-medium", "bush-1"] {
+        real_tree(&folder.join("trees").join(name).with_extension("glb"));
+    }
+}
+
+fn real_tree(path: &Path) {
+    if !path.exists() {
+        println!("skipped: no {}", path.display());
+        return;
+    }
+    let (plant, _) = canopy::plant::gltf::load_plant(path, &Default::default()).unwrap();
+    let (baked, _) = bake_plant(Arc::new(plant), &BakeSettings::default(), None);
+    for (index, plane) in baked.cross.planes.iter().enumerate() {
+        let view = View { center: plane.center, right: plane.u, up: plane.v, toward: plane.normal };
+        let shown = picture_area(&baked.cross, index, 0) / projected_area(&baked.plant, &view, 2048);
+        assert!((shown - 1.0).abs() < 0.03, "{}: plane {index} shows {shown}", baked.plant.name);
+    }
+    let bounds = baked.plant.bounds().unwrap();
+    let mut proxy = Plant::clone(&baked.plant);
+    proxy.parts.iter_mut().zip(&baked.shadow_proxy).for_each(|(part, mesh)| part.mesh = mesh.clone());
+    for toward in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::new(0.5, 0.7, -0.5).normalize()] {
+        let mut view = View::framing(bounds, toward);
+        (view.right, view.up) = (1.3 * view.right, 1.3 * view.up);
+        let ratio = projected_area(&proxy, &view, 1024) / projected_area(&baked.plant, &view, 1024);
+        assert!((ratio - 1.0).abs() < 0.10, "{} towards {toward}: {ratio}", baked.plant.name);
+    }
+}
+
+fn any_number() -> impl Strategy<Value = f32> {
+    prop_oneof![8 => -10.0f32..10.0, 1 => Just(0.0f32), 1 => -1e30f32..1e30, 1 => Just(f32::NAN), 1 => Just(f32::INFINITY)]
+}
+
+fn any_vector() -> impl Strategy<Value = Vec3> {
+    [any_number(), any_number(), any_number()].prop_map(Vec3::from)
+}
+
+fn any_part() -> impl Strategy<Value = PlantPart> {
+    let vertex = (any_vector(), any_vector(), any_vector());
+    let vertices = proptest::collection::vec(vertex, 0..24);
+    let triangles = proptest::collection::vec([0u32..26, 0u32..26, 0u32..26], 0..16);
+    (vertices, triangles, any::<bool>(), any::<bool>(), any_vector(), any_number()).prop_map(
+        |(vertices, triangles, leaf, textured, color, alpha_cutoff)| PlantPart {
+            kind: if leaf { PartKind::Foliage } else { PartKind::Wood },
+            mesh: PlantMesh {
+                positions: vertices.iter().map(|v| v.0).collect(),
+                normals: vertices.iter().map(|v| v.1).collect(),
+                uvs: vertices.iter().map(|v| v.2.truncate()).collect(),
+                triangles,
+            },
+            material: PlantMaterial {
+                base_color: color,
+                base_color_texture: textured.then(|| Arc::new(leaf_texture())),
+                alpha_cutoff,
+                transmission: color,
+                ..Default::default()
+            },
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..Default::default() })]
+
+    /// Whatever a plant holds, even what the type forbids: no panic, nothing that is not finite, everything in range.
+    #[test]
+    fn any_plant_bakes_to_finite_values(
+        parts in proptest::collection::vec(any_part(), 0..3),
+        target in 0usize..40,
+        cell in any_number(),
+        extinction in any_number(),
+        smoothing in any_number(),
+    ) {
+        let plant = Plant { name: String::new(), parts };
+        let ambient = ambient_visibility(&plant, &AmbientSettings { cell, extinction, ..Default::default() });
+        for (part, values) in plant.parts.iter().zip(&ambient) {
+            prop_assert_eq!(part.mesh.positions.len(), values.len());
+            prop_assert!(values.iter().all(|k| (0.0..=1.0).contains(k)));
+        }
+        let settings = CrossSettings { resolution: 3, supersampling: 0, normal_smoothing: smoothing };
+        let cross = bake_cross(&plant, &ambient, &settings);
+        prop_assert_eq!(cross.textures.color[0].width, 64);
+        prop_assert!(cross.transmission.is_finite());
+        for plane in &cross.planes {
+            prop_assert!(plane.center.is_finite() && plane.u.is_finite() && plane.v.is_finite());
+            prop_assert!(plane.frame().is_finite());
+        }
+        let lighter = simplify_foliage(&plant, target);
+        prop_assert_eq!(lighter.parts.len(), plant.parts.len());
+    }
+
+    /// Targets are met to within the size of one element, and what comes out is a sound mesh.
+    #[test]
+    fn simplification_keeps_targets(target in 20usize..2400, seed in 0u64..4) {
+        let plant = tree(1000, seed);
+        let lighter = simplify_foliage(&plant, target);
+        let count: usize = lighter.parts.iter().map(|part| part.mesh.triangles.len()).sum();
+        let whole: usize = plant.parts.iter().map(|part| part.mesh.triangles.len()).sum();
+        prop_assert!(count <= target.max(14).min(whole) && count + 16 >= target.min(whole), "{} for {}", count, target);
+        for mesh in lighter.parts.iter().map(|part| &part.mesh) {
+            prop_assert!(mesh.positions.iter().all(|p| p.is_finite()));
+            prop_assert!(mesh.triangles.iter().flatten().all(|&corner| (corner as usize) < mesh.positions.len()));
+        }
+    }
+}

@@ -1,0 +1,6 @@
+//! Plant textures and glTF import.
+
+#[path = "plant/gltf.rs"]
+mod gltf;
+#[path = "plant/texture.rs"]
+mod texture;
