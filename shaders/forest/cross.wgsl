@@ -48,8 +48,8 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     out.relative = tree.position + local;
     out.clip = frame.clip_from_relative * vec4(out.relative, 1.0);
     if threshold >= 1.0 {
-        // Nothing would pass the test: no area, no fragments.
-        out.clip = vec4(2.0, 2.0, 2.0, 1.0);
+        // Nothing would pass the test: no area, no fragments. Inside the view, as clipping costs more than rejection.
+        out.clip = vec4(0.0, 0.0, 0.5, 1.0);
     }
     out.uv = vec2(0.5 + 0.5 * corner.x, 0.5 - 0.5 * corner.y);
     out.layer = u32(variants[tree.variant].size.z) + plane_index;

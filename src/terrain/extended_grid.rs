@@ -40,7 +40,7 @@ const RISE_REACH: usize = 6;
 const FAR: f64 = 1.0e15;
 
 /// The samples of a field with [`PAD`] more on each side; further ones are found by folding.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(super) struct ExtendedGrid {
     columns: usize,
     rows: usize,
@@ -64,9 +64,9 @@ impl ExtendedGrid {
         for (row, source) in field.heights().chunks_exact(columns).enumerate() {
             samples[(row + PAD) * stride + PAD..][..columns].copy_from_slice(source);
         }
-        let lines = Lines { first: PAD * stride, next: stride, lines: rows, step: 1, count: columns };
+        let lines = Lines { first: PAD * stride, next: stride, lines: rows, pads: 0, step: 1, count: columns };
         lines.extend(&mut samples, surroundings);
-        let lines = Lines { first: 0, next: 1, lines: stride, step: stride, count: rows };
+        let lines = Lines { first: 0, next: 1, lines: stride, pads: PAD, step: stride, count: rows };
         lines.extend(&mut samples, surroundings);
         Self { columns, rows, stride, samples, surroundings }
     }
@@ -75,14 +75,18 @@ impl ExtendedGrid {
     /// taken as the first sample.
     #[inline]
     pub(super) fn patch(&self, column: f64, row: f64) -> Patch {
-        let (columns, column_fraction) = self.neighbours(column, self.columns);
-        let (rows, row_fraction) = self.neighbours(row, self.rows);
+        let (first_column, column_fraction) = split(column);
+        let (first_row, row_fraction) = split(row);
         let mut samples = [[0.0; 4]; 4];
-        if columns[3] == columns[0] + 3 {
-            for (line, row) in samples.iter_mut().zip(rows) {
-                line.copy_from_slice(&self.samples[row * self.stride + columns[0]..][..4]);
+        if let (Some(column), Some(row)) = (stored(first_column, self.columns), stored(first_row, self.rows)) {
+            let start = row * self.stride + column;
+            let block = &self.samples[start..start + 3 * self.stride + 4];
+            for (line, at) in samples.iter_mut().zip([0, self.stride, 2 * self.stride, 3 * self.stride]) {
+                line.copy_from_slice(&block[at..at + 4]);
             }
         } else {
+            let columns = self.neighbours(first_column, self.columns);
+            let rows = self.neighbours(first_row, self.rows);
             for (line, row) in samples.iter_mut().zip(rows) {
                 for (sample, column) in line.iter_mut().zip(columns) {
                     *sample = self.samples[row * self.stride + column];
@@ -105,28 +109,56 @@ impl ExtendedGrid {
         self.surroundings
     }
 
-    #[inline]
-    fn neighbours(&self, place: f64, count: usize) -> ([usize; 4], f64) {
-        let place = if place.is_finite() { place.clamp(-FAR, FAR) } else { 0.0 };
-        let floor = place.floor();
-        let first = floor as i64 - 1;
-        let pad = PAD as i64;
-        let indices = if first >= -pad && first + 3 < count as i64 + pad {
-            let start = (first + pad) as usize;
-            [start, start + 1, start + 2, start + 3]
-        } else {
-            [0, 1, 2, 3].map(|offset| {
-                let index = first + offset;
-                let stored = if index >= -pad && index < count as i64 + pad {
-                    index
-                } else {
-                    fold(index, count, self.surroundings) as i64
-                };
-                (stored + pad) as usize
-            })
+    /// Storage indices of four samples from `first` on. Those that are not all stored lie so far out (8 samples at least)
+    /// that they are pure images.
+    fn neighbours(&self, first: i64, count: usize) -> [usize; 4] {
+        if let Some(start) = stored(first, count) {
+            return [start, start + 1, start + 2, start + 3];
+        }
+        let last = count as i64 - 1;
+        let place = match self.surroundings {
+            Surroundings::Border => first,
+            Surroundings::Mirror => first.rem_euclid(2 * last),
         };
-        (indices, place - floor)
+        [0, 1, 2, 3].map(|offset| {
+            let index = match self.surroundings {
+                Surroundings::Border => (place + offset).clamp(0, last),
+                // Within four steps of a place in 0..period: at most a few turns, even of the shortest period, 2.
+                Surroundings::Mirror => {
+                    let mut turned = place + offset;
+                    while turned >= 2 * last {
+                        turned -= 2 * last;
+                    }
+                    if turned > last { 2 * last - turned } else { turned }
+                }
+            };
+            (index + PAD as i64) as usize
+        })
     }
+}
+
+/// The first of the four samples around a place, and the place's fraction between the second and the third.
+#[inline]
+fn split(place: f64) -> (i64, f64) {
+    // Comparisons with NaN are false.
+    let place = if place.abs() <= FAR {
+        place
+    } else if place.is_nan() {
+        0.0
+    } else {
+        FAR.copysign(place)
+    };
+    // Without SSE 4.1 `floor` is a call; this is not.
+    let truncated = place as i64;
+    let floor = truncated - i64::from(place < truncated as f64);
+    (floor - 1, place - floor as f64)
+}
+
+/// Storage index of a sample, if it and the three after it are stored.
+#[inline]
+fn stored(first: i64, count: usize) -> Option<usize> {
+    let start = first + PAD as i64;
+    (start >= 0 && start + 3 < (count + 2 * PAD) as i64).then_some(start as usize)
 }
 
 impl Patch {
@@ -134,7 +166,8 @@ impl Patch {
     #[inline]
     pub(super) fn height(&self) -> f64 {
         let (u, v) = (weights(self.column_fraction), weights(self.row_fraction));
-        self.weighted(&u, &v)
+        let [a, b, c, d] = &self.samples;
+        v[0] * dot(a, &u) + v[1] * dot(b, &u) + v[2] * dot(c, &u) + v[3] * dot(d, &u)
     }
 
     /// Height in metres and its derivatives along columns and rows in metres per sample.
@@ -144,11 +177,10 @@ impl Patch {
         let (du, dv) = (weight_slopes(self.column_fraction), weight_slopes(self.row_fraction));
         let (mut height, mut along_columns, mut along_rows) = (0.0, 0.0, 0.0);
         for (j, line) in self.samples.iter().enumerate() {
-            let line = line.map(f64::from);
-            let value = dot(&line, &u);
+            let value = dot(line, &u);
             height += v[j] * value;
             along_rows += dv[j] * value;
-            along_columns += v[j] * dot(&line, &du);
+            along_columns += v[j] * dot(line, &du);
         }
         (height, along_columns, along_rows)
     }
@@ -167,8 +199,9 @@ impl Patch {
     pub(super) fn bounds(&self) -> (f32, f32) {
         let lines = self.samples.map(|line| bezier(line.map(f64::from)));
         let (mut low, mut high) = (f64::MAX, f64::MIN);
-        for i in 0..4 {
-            for control in bezier([lines[0][i], lines[1][i], lines[2][i], lines[3][i]]) {
+        let [first, second, third, fourth] = lines;
+        for (((a, b), c), d) in first.into_iter().zip(second).zip(third).zip(fourth) {
+            for control in bezier([a, b, c, d]) {
                 low = low.min(control);
                 high = high.max(control);
             }
@@ -200,7 +233,7 @@ impl Patch {
     }
 
     fn weighted(&self, u: &[f64; 4], v: &[f64; 4]) -> f64 {
-        self.samples.iter().zip(v).map(|(line, v)| v * dot(&line.map(f64::from), u)).sum()
+        self.samples.iter().zip(v).map(|(line, v)| v * dot(line, u)).sum()
     }
 }
 
@@ -221,6 +254,8 @@ struct Lines {
     first: usize,
     next: usize,
     lines: usize,
+    /// How many of the lines, first and last, are pads of the other axis.
+    pads: usize,
     step: usize,
     count: usize,
 }
@@ -236,7 +271,9 @@ impl Lines {
         };
         for (edge, outward) in [(0, -1), (last, 1)] {
             let rises = smoothed(&self.border_rises(samples, edge, outward));
-            for (line, rise) in rises.iter().enumerate() {
+            for line in 0..self.lines {
+                // A pad takes the rise of the line that it is the image of: pure images must be alike, to the last sample.
+                let rise = rises[fold(line as i64 - self.pads as i64, rises.len(), surroundings)];
                 for k in 1..=PAD as i64 {
                     let image = samples[self.at(line, fold(edge + outward * k, self.count, surroundings) as i64)];
                     let run = (1.0 - k as f64 / BLEND).max(0.0) / (1.0 - 1.0 / BLEND);
@@ -247,14 +284,14 @@ impl Lines {
         }
     }
 
-    /// The outward rise per sample at the border of each line, over a few samples.
+    /// The outward rise per sample at the border of each line that is no pad, over a few samples.
     fn border_rises(&self, samples: &[f32], edge: i64, outward: i64) -> Vec<f64> {
         let depth = (self.count as i64 - 1).min(RISE_DEPTH);
         let rise = |line| {
             let inner = samples[self.at(line, edge - outward * depth)];
             (f64::from(samples[self.at(line, edge)]) - f64::from(inner)) / depth as f64
         };
-        (0..self.lines).map(rise).collect()
+        (self.pads..self.lines - self.pads).map(rise).collect()
     }
 
     fn at(&self, line: usize, index: i64) -> usize {
@@ -281,8 +318,11 @@ fn smoothed(values: &[f64]) -> Vec<f64> {
 }
 
 #[inline]
-fn dot(a: &[f64; 4], b: &[f64; 4]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+fn dot(samples: &[f32; 4], weights: &[f64; 4]) -> f64 {
+    f64::from(samples[0]) * weights[0]
+        + f64::from(samples[1]) * weights[1]
+        + f64::from(samples[2]) * weights[2]
+        + f64::from(samples[3]) * weights[3]
 }
 
 /// Catmull-Rom weights of the four samples around a place `t` in 0..=1 between the second and the third.

@@ -12,7 +12,7 @@ use super::{HeightField, Surroundings};
 const FINE_CELLS: usize = 1 << 20;
 
 /// Bounds over blocks of cells of the stored (padded) grid; each level halves the one before.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(super) struct HeightBounds {
     /// A block of the finest level is `1 << shift` cells wide.
     shift: u32,
@@ -23,7 +23,7 @@ pub(super) struct HeightBounds {
 }
 
 /// Height bounds in metres, shared by all who ask.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(super) struct BoundsInMetres {
     pub(super) bounds: Arc<HeightBounds>,
     /// Samples per metre.
@@ -44,7 +44,7 @@ impl BoundsInMetres {
     }
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 struct Level {
     columns: usize,
     rows: usize,
@@ -165,16 +165,11 @@ impl HeightBounds {
     }
 
     fn over_cells(&self, columns: (usize, usize), rows: (usize, usize)) -> (f32, f32) {
-        let mut shift = self.shift;
-        let mut chosen = None;
-        for level in &self.levels {
-            chosen = Some((level, shift));
-            if (columns.1 >> shift) - (columns.0 >> shift) < 4 && (rows.1 >> shift) - (rows.0 >> shift) < 4 {
-                break;
-            }
-            shift += 1;
-        }
-        let Some((level, shift)) = chosen else { return NOTHING };
+        let narrow = |(from, to): (usize, usize), shift: u32| (to >> shift) - (from >> shift) < 4;
+        let mut levels = (self.shift..).zip(&self.levels);
+        let fitting = levels.find(|(shift, _)| narrow(columns, *shift) && narrow(rows, *shift));
+        // The coarsest level is a single block, so one always fits.
+        let Some((shift, level)) = fitting else { return self.total() };
         let mut all = NOTHING;
         for row in rows.0 >> shift..=rows.1 >> shift {
             for column in columns.0 >> shift..=columns.1 >> shift {

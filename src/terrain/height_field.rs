@@ -1,5 +1,7 @@
 //! A regular grid of heights in metres.
 
+use std::fmt;
+
 use glam::DVec2;
 
 use super::TerrainError;
@@ -15,7 +17,7 @@ pub const MAX_SAMPLES: usize = 1 << 28;
 ///
 /// Local frame: the origin is the centre of the grid, x points east, z south. Column `c` lies at
 /// `x = (c - (columns - 1) / 2) * spacing.x`, row `r` at `z = (r - (rows - 1) / 2) * spacing.y`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub struct HeightField {
     columns: usize,
     rows: usize,
@@ -99,6 +101,18 @@ impl HeightField {
     /// The heights of the lowest and the highest sample in metres.
     pub fn min_max(&self) -> (f32, f32) {
         self.heights.iter().fold((f32::MAX, f32::MIN), |(low, high), &h| (low.min(h), high.max(h)))
+    }
+}
+
+impl fmt::Debug for HeightField {
+    /// Size and range; the heights themselves would fill the screen.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("HeightField")
+            .field("columns", &self.columns)
+            .field("rows", &self.rows)
+            .field("spacing", &self.spacing)
+            .field("min_max", &self.min_max())
+            .finish_non_exhaustive()
     }
 }
 

@@ -1,5 +1,6 @@
 //! The ground: a height field as one smooth surface over the whole plane.
 
+use std::fmt;
 use std::sync::Arc;
 
 use glam::{DVec2, Vec3};
@@ -16,8 +17,8 @@ use super::{GeoReference, HeightField, Surroundings};
 /// field; [`Surroundings`] says what lies outside. All functions are finite for every input: a coordinate that is
 /// not finite counts as the field's north-western corner.
 ///
-/// Cost: 15 to 40 ns a call.
-#[derive(Clone, Debug)]
+/// Cost: 30 to 50 ns a call on the field, 70 ns far outside.
+#[derive(Clone)]
 pub struct Terrain {
     field: HeightField,
     reference: Option<GeoReference>,
@@ -129,6 +130,16 @@ impl Terrain {
     #[inline]
     fn patch(&self, x: f64, z: f64) -> Patch {
         self.grid.patch(x * self.per_metre.x + self.centre.x, z * self.per_metre.y + self.centre.y)
+    }
+}
+
+impl fmt::Debug for Terrain {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Terrain")
+            .field("field", &self.field)
+            .field("reference", &self.reference)
+            .field("surroundings", &self.surroundings())
+            .finish_non_exhaustive()
     }
 }
 

@@ -30,6 +30,7 @@ pub(super) fn read(source: &Source) -> Result<Raster, TerrainError> {
     let mut words = Words::new(&text);
     let header = Header::read(source, &mut words)?;
     let (grid, missing) = (header.grid(source)?, header.missing);
+    let window = source.window(&grid)?;
     let (system, warning) = match source.options.coordinate_system {
         Some(system) => (system, None),
         None => {
@@ -40,7 +41,6 @@ pub(super) fn read(source: &Source) -> Result<Raster, TerrainError> {
             (system, Some(Warning::AssumedCoordinates { degrees }))
         }
     };
-    let window = source.window(&grid)?;
     let heights = read_heights(source, &mut words, &grid, &window, missing)?;
     Ok(Raster { grid, window, system, heights, warnings: warning.into_iter().collect() })
 }

@@ -125,8 +125,8 @@ impl Source<'_> {
                 let range = |low: f64, high: f64, count: usize| {
                     let first = (low - 1e-6).ceil().max(0.0);
                     let end = ((high + 1e-6).floor() + 1.0).min(count as f64);
-                    // Comparisons with NaN are false, so a limit that is not a number keeps nothing.
-                    if first < end { (first as usize, (end - first) as usize) } else { (0, 0) }
+                    // A limit that is not a number keeps nothing: comparisons with it are false.
+                    if low <= high && first < end { (first as usize, (end - first) as usize) } else { (0, 0) }
                 };
                 let west = (crop.west - grid.first.x) / grid.step.x;
                 let east = (crop.east - grid.first.x) / grid.step.x;

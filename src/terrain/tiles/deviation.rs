@@ -7,7 +7,7 @@ use super::super::Terrain;
 use super::mesh::triangulated_height;
 
 /// Samples of the ground per level at most; beyond, an even share of the quads is looked at.
-const BUDGET: usize = 2_000_000;
+const BUDGET: usize = 1_000_000;
 /// Measured maxima are raised by this much, for what lies between the samples and for tiles that fall differently on
 /// the mirror images of the field.
 const MEASURED_MARGIN: f64 = 1.1;
