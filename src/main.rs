@@ -22,7 +22,7 @@ fn run(arguments: Arguments) -> Outcome {
         return list_adapters().into();
     }
     match arguments.command {
-        Some(Command::Fly(fly)) => fly_through(cli::fly_options(fly, &common)).into(),
+        Some(Command::Fly(fly)) => fly_through(&cli::fly_options(fly, &common)).into(),
         Some(Command::Render(render)) => match cli::render_options(render, &common) {
             Ok(options) => render_pictures(&options).into(),
             Err(error) => Outcome::Usage(error),
@@ -36,9 +36,9 @@ fn list_adapters() -> anyhow::Result<()> {
     cli::print_lines(canopy::app::list_adapters()?)
 }
 
-fn fly_through(options: canopy::scene::FlyOptions) -> anyhow::Result<()> {
-    canopy::app::fly(options)?;
-    Ok(())
+fn fly_through(options: &canopy::scene::FlyOptions) -> anyhow::Result<()> {
+    let mut bars = Bars::new(options.quiet);
+    Ok(canopy::app::fly(options, &mut bars)?)
 }
 
 fn render_pictures(options: &canopy::scene::RenderOptions) -> anyhow::Result<()> {

@@ -1,10 +1,15 @@
 //! The one integration binary: every room's tests, the shaders, the pictures and what the program must withstand.
 
+mod app;
 mod bake;
 mod cli;
 mod grow;
 mod light;
 mod plant;
+mod render;
 mod scatter;
 mod scene;
+mod shaders;
+mod support;
 mod terrain;
+mod withstand;

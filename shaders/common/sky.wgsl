@@ -25,6 +25,17 @@ fn sky_radiance(direction: vec3<f32>) -> vec3<f32> {
     return textureSampleLevel(sky_texture, sky_sampler, (vec2(column, row) + 0.5) / SKY_SIZE, 0.0).rgb;
 }
 
+// Radiance that a white Lambertian surface returns under the sky: src/light/sh.rs fixes signs and order.
+fn sky_irradiance(n: vec3<f32>) -> vec3<f32> {
+    let s = &light.sky;
+    var sum = 0.28209479 * (*s)[0].rgb;
+    sum += 0.48860251 * (n.y * (*s)[2].rgb - n.x * (*s)[1].rgb - n.z * (*s)[3].rgb);
+    sum += 1.09254843 * (n.x * n.z * (*s)[4].rgb - n.x * n.y * (*s)[5].rgb - n.y * n.z * (*s)[7].rgb);
+    sum += 0.31539157 * (3.0 * n.y * n.y - 1.0) * (*s)[6].rgb;
+    sum += 0.54627421 * (n.z * n.z - n.x * n.x) * (*s)[8].rgb;
+    return max(sum, vec3(0.0));
+}
+
 // Optical depth of a haze whose density falls exponentially with height, along a straight ray.
 fn fog_optical_depth(relative: vec3<f32>) -> f32 {
     let distance = length(relative);
@@ -36,13 +47,17 @@ fn fog_optical_depth(relative: vec3<f32>) -> f32 {
     return distance * start * min(mean, 50.0);
 }
 
+// What lies behind much air has the colour of the sky's rim in its direction. Little air has the mean colour of the sky on
+// that side: the bright rim around a low sun belongs to the whole path to the horizon, most of which is not there, or lies
+// in the shadow of the land.
 fn apply_fog(color: vec3<f32>, relative: vec3<f32>) -> vec3<f32> {
     let transmittance = exp(-light.fog.rgb * fog_optical_depth(relative));
-    let distance = max(length(relative), 1e-3);
-    var direction = relative / distance;
-    // What lies behind the fog is the sky's rim, never the ground's own row of the table.
-    direction = normalize(vec3(direction.x, max(direction.y, 0.015), direction.z));
-    return color * transmittance + sky_radiance(direction) * (1.0 - transmittance);
+    let direction = relative / max(length(relative), 1e-3);
+    let mean = sky_irradiance(normalize(vec3(direction.x, max(direction.y, 0.4), direction.z)));
+    let rim = sky_radiance(normalize(vec3(direction.x, max(direction.y, 0.03), direction.z)));
+    let amount = 1.0 - transmittance.g;
+    let inscatter = mix(mean, min(rim, 6.0 * mean), amount * amount);
+    return color * transmittance + inscatter * (1.0 - transmittance);
 }
 
 // The eye's loss of colour in the dark and its shift to blue [Jensen et al. 2000, eq. 4; Larson et al. 1997, eq. 10]:

@@ -1,6 +1,6 @@
 // Crossed billboards [Franzke 2005, 4.3]: two upright planes and a level one, eighteen pulled vertices a tree.
 #import canopy::frame::{frame, light}
-#import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, cross_threshold, tint_foliage, stand_ambient}
+#import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, cross_threshold, tint_foliage, stand_ambient, scattered, leaf_visibility}
 #import canopy::lighting::{Surface, shade}
 #import canopy::sky::{apply_fog, night_vision}
 #import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
@@ -20,7 +20,8 @@ struct Varying {
     @location(7) @interpolate(flat) front: vec3<f32>,
     // Threshold, height above the foot in metres, relative height, tint.
     @location(5) look: vec4<f32>,
-    @location(6) @interpolate(flat) transmission: vec3<f32>,
+    // rgb: transmission of the leaves, w: crown's radius in metres.
+    @location(6) @interpolate(flat) crown: vec4<f32>,
 }
 
 const VERTICES_A_TREE: u32 = 18u;
@@ -39,8 +40,10 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     let center = tree.position + turn(plane.center.xyz, tree.yaw) * tree.scale;
     let normal = turn(plane.normal.xyz, tree.yaw);
     let toward = dot(normal, normalize(center));
-    // A plane goes as it is seen edge-on: its picture is nothing but a streak there.
-    let edge = 0.5 + 0.51 * (1.0 - smoothstep(0.10, 0.34, abs(toward)));
+    // A plane goes as it is seen edge-on: its picture is nothing but a streak there. The level plane comes in only
+    // when looked down on; from the side it would be a shelf in the crown.
+    let level = plane_index == 2u;
+    let edge = 0.5 + 0.51 * (1.0 - smoothstep(select(0.10, 0.42, level), select(0.34, 0.72, level), abs(toward)));
     let threshold = max(cross_threshold(length(tree.position.xz)), edge);
 
     var out: Varying;
@@ -58,7 +61,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     // Seen from behind, the crown's other half stands before the viewer: mirrored across the plane.
     out.front = normal * select(1.0, -1.0, toward > 0.0);
     out.look = vec4(threshold, local.y, local.y / height, tree.tint);
-    out.transmission = variants[tree.variant].transmission.rgb;
+    out.crown = vec4(variants[tree.variant].transmission.rgb, variants[tree.variant].size.y * tree.scale);
     return out;
 }
 
@@ -73,8 +76,8 @@ fn decode_octahedral(e: vec2<f32>) -> vec3<f32> {
 
 @fragment
 fn fragment(in: Varying) -> @location(0) vec4<f32> {
-    let texel = textureSample(color_pictures, picture_sampler, in.uv, in.layer);
     let level = picture_level(in.uv);
+    let texel = textureSampleLevel(color_pictures, picture_sampler, in.uv, in.layer, level);
     var coverage = 1.0;
 #ifdef ALPHA_TO_COVERAGE
     coverage = clamp((texel.a - in.look.x) / max(fwidth(texel.a), 1e-4) + 0.5, 0.0, 1.0);
@@ -94,14 +97,18 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     var surface: Surface;
     surface.albedo = mix(texel.rgb, tint_foliage(texel.rgb, in.look.w), foliage);
     surface.normal = normal;
-    surface.transmission = in.transmission * foliage;
+    surface.transmission = in.crown.rgb * foliage;
     let map = ground_map(in.relative);
-    surface.ambient = properties.b * stand_ambient(in.look.z, map.y);
+    surface.ambient = scattered(properties.b) * stand_ambient(in.look.z, map.y);
     var visibility = terrain_visibility(map, in.look.y);
     if visibility > 0.0 {
-        let near = cascaded_visibility(in.relative, normal);
+        // The picture stands for a round crown: what faces the light lies before the plane that casts the shadow, what
+        // turns away from it behind.
+        let bulge = normal * (0.55 * in.crown.w * foliage);
+        let near = cascaded_visibility(in.relative + bulge, normal);
         visibility *= mix(1.0, near.x, near.y);
     }
+    visibility *= mix(1.0, leaf_visibility(properties.b), foliage);
     var color = shade(surface, visibility);
     if frame.flags.y > 0.5 {
         color = mix(color, vec3(0.2, 0.35, 1.0) * dot(color, vec3(0.5)), 0.6);
@@ -109,10 +116,11 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     return vec4(night_vision(apply_fog(color, in.relative)), coverage);
 }
 
-// Level of the property picture, taken before the test: derivatives after a discard are undefined on some devices.
+// Level of the pictures: the mean of the two axes' levels. The larger one, as samplers have it, would blur a plane seen
+// askew along its whole height; what little this leaves to alias is leaves, and their coverage is right at any level.
 fn picture_level(uv: vec2<f32>) -> f32 {
-    let size = vec2<f32>(textureDimensions(property_pictures));
+    let size = vec2<f32>(textureDimensions(color_pictures));
     let dx = dpdx(uv * size);
     let dy = dpdy(uv * size);
-    return 0.5 * log2(max(max(dot(dx, dx), dot(dy, dy)), 1e-8));
+    return 0.25 * (log2(max(dot(dx, dx), 1e-8)) + log2(max(dot(dy, dy), 1e-8)));
 }

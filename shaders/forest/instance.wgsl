@@ -84,10 +84,21 @@ fn cross_threshold(distance: f32) -> f32 {
 
 // Individual shift of the foliage's hue and brightness.
 fn tint_foliage(albedo: vec3<f32>, tint: f32) -> vec3<f32> {
-    return albedo * (1.0 + tint * vec3(0.22, 0.10, -0.06));
+    return albedo * (1.0 + tint * vec3(0.18, 0.07, -0.05));
+}
+
+// Ambient light at a visibility k: what does not come from the sky comes from other leaves, by their albedo.
+fn scattered(k: f32) -> f32 {
+    return k + (1.0 - k) * 0.2;
+}
+
+// Share of the key light that reaches a leaf of ambient visibility k past the leaves around it, for which the shadow
+// maps are too coarse: what sees little of the sky mostly lies in shade.
+fn leaf_visibility(k: f32) -> f32 {
+    return min(0.35 + 2.0 * k, 1.1);
 }
 
 // Light that the neighbours' crowns leave: darkest at the forest's floor.
 fn stand_ambient(relative_height: f32, cover: f32) -> f32 {
-    return mix(1.0 - 0.72 * cover, 1.0, smoothstep(0.0, 0.95, relative_height));
+    return mix(1.0 - 0.55 * cover, 1.0, smoothstep(0.0, 0.95, relative_height));
 }

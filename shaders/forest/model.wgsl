@@ -1,6 +1,6 @@
 // The full model of a tree, near the camera.
 #import canopy::frame::{frame, light}
-#import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, model_threshold, tint_foliage, stand_ambient}
+#import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, model_threshold, tint_foliage, stand_ambient, scattered, leaf_visibility}
 #import canopy::lighting::{Surface, shade}
 #import canopy::sky::{apply_fog, night_vision}
 #import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
@@ -111,12 +111,15 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
     surface.normal = normal;
     surface.transmission = part.transmission.rgb;
     let map = ground_map(in.relative);
-    surface.ambient = in.look.x * stand_ambient(in.look.z, map.y);
+    surface.ambient = scattered(in.look.x) * stand_ambient(in.look.z, map.y);
     var visibility = terrain_visibility(map, in.look.y);
     if visibility > 0.0 {
         let near = cascaded_visibility(in.relative, normal);
         visibility *= mix(1.0, near.x, near.y);
     }
+#ifdef FOLIAGE
+    visibility *= leaf_visibility(in.look.x);
+#endif
     var color = shade(surface, visibility);
     if frame.flags.y > 0.5 {
         color = mix(color, vec3(0.15, 0.9, 0.2) * dot(color, vec3(0.5)), 0.6);

@@ -93,7 +93,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let normal = normalize(smooth_normal + vec3(tilt.x, 0.0, tilt.y) * detail);
 
     let steepness = 1.0 - smooth_normal.y;
-    let litter = mix(vec3(0.075, 0.050, 0.030), vec3(0.135, 0.090, 0.050), clamp(fine.g * 1.4 - 0.2 + grain.g - 0.5, 0.0, 1.0));
+    let litter = mix(vec3(0.050, 0.040, 0.022), vec3(0.100, 0.078, 0.042), clamp(fine.g * 1.4 - 0.2 + grain.g - 0.5, 0.0, 1.0));
     let moss = mix(vec3(0.030, 0.048, 0.014), vec3(0.055, 0.080, 0.022), grain.b);
     let floor_mix = smoothstep(0.45, 0.62, middle.b * 0.6 + fine.b * 0.4);
     let forest_floor = mix(litter, moss, floor_mix * 0.75);
@@ -117,7 +117,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.albedo = albedo;
     surface.normal = normal;
     surface.transmission = vec3(0.0);
-    surface.ambient = (1.0 - 0.72 * cover) * (0.8 + 0.2 * grain.r);
+    surface.ambient = (1.0 - 0.55 * cover) * (0.8 + 0.2 * grain.r);
     if outside {
         surface.ambient = 0.85;
     }

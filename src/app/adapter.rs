@@ -66,3 +66,22 @@ pub fn settings(wanted: Option<&str>) -> Result<WgpuSettings, AppError> {
         ..WgpuSettings::default()
     })
 }
+
+/// Refuses a window or picture of `(width, height)` pixels that the adapter of `settings` cannot hold.
+///
+/// # Errors
+/// [`AppError::TooLarge`].
+pub fn check_size(settings: &WgpuSettings, (width, height): (u32, u32)) -> Result<(), AppError> {
+    let backends = settings.backends.unwrap_or(Backends::all());
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = backends;
+    let adapters = block_on(wgpu::Instance::new(descriptor).enumerate_adapters(backends));
+    let named = |name: String| settings.adapter_name.as_ref().is_none_or(|wanted| *wanted == name);
+    let chosen = adapters.iter().find(|adapter| named(adapter.get_info().name));
+    match chosen.map(|adapter| adapter.limits().max_texture_dimension_2d) {
+        Some(limit) if width > limit || height > limit || width == 0 || height == 0 => {
+            Err(AppError::TooLarge { width, height, limit })
+        }
+        _ => Ok(()),
+    }
+}

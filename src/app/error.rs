@@ -64,6 +64,15 @@ pub enum AppError {
         /// Names of those that are there.
         present: String,
     },
+    /// No display to open a window on.
+    #[error(
+        "no window can be opened: {details}; use `canopy render` for pictures without one, or run this in a virtual \
+         display (xvfb-run canopy fly ...)"
+    )]
+    NoDisplay {
+        /// What is missing.
+        details: String,
+    },
     /// A picture that the device cannot hold.
     #[error("a picture of {width}x{height} is beyond this device's limit of {limit} pixels a side; choose a smaller --size")]
     TooLarge {

@@ -5,12 +5,12 @@ use std::{path::Path, sync::Arc, time::Instant};
 use bevy::{
     app::{App, PluginGroup, PluginsState},
     asset::{Assets, Handle, RenderAssetUsages},
-    camera::{Camera, Camera3d, PerspectiveProjection, Projection, RenderTarget},
+    camera::{Camera, Camera3d, RenderTarget},
     core_pipeline::tonemapping::Tonemapping,
     ecs::entity::Entity,
     image::Image,
     log::{Level, LogPlugin},
-    prelude::{DefaultPlugins, Transform},
+    prelude::DefaultPlugins,
     render::{
         RenderApp, RenderPlugin,
         pipelined_rendering::PipelinedRenderingPlugin,
@@ -30,18 +30,15 @@ use bevy::{
 use chrono::{DateTime, Utc};
 use glam::DVec3;
 
-use super::{adapter, error::AppError, picture::Picture, stage::Stage};
+use super::{adapter, camera, error::AppError, notes::notes, picture::Picture, stage::Stage};
 use crate::{
     CanopyPlugins,
     render::{
-        components::{CanopyCamera, CanopyOrigin},
+        components::CanopyCamera,
         report::{FrameReport, PassOutcome},
     },
-    scene::{Frame, Progress, RenderOptions, RenderPlan, RenderReport, Viewpoint},
+    scene::{Progress, RenderOptions, RenderPlan, RenderReport, Viewpoint},
 };
-
-/// Metres to which the Bevy world's origin is rounded near the camera.
-const ORIGIN_STEP: f64 = 1024.0;
 
 /// Draws the pictures that `options` ask for.
 ///
@@ -63,7 +60,7 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
         let started = Instant::now();
         let picture = renderer.draw(&stage, &frame.view, frame.instant)?;
         let drawn = started.elapsed().as_secs_f64();
-        picture.save(&frame.file, &notes(&stage, frame, options))?;
+        picture.save(&frame.file, &notes(&stage, &options.scene, &frame.view, frame.instant))?;
         progress.note(&format!(
             "{}: drawn in {drawn:.2} s, written in {:.2} s",
             frame.file.display(),
@@ -91,27 +88,6 @@ fn check_writable(plan: &RenderPlan) -> Result<(), AppError> {
     std::fs::create_dir_all(folder).map_err(failed)?;
     tempfile::Builder::new().prefix(".canopy-").tempfile_in(folder).map_err(failed)?;
     Ok(())
-}
-
-/// What a picture's text chunks say: enough to make it again.
-fn notes(stage: &Stage, frame: &Frame, options: &RenderOptions) -> Vec<(&'static str, String)> {
-    let view = &frame.view;
-    vec![
-        ("Software", format!("Canopy {}", env!("CARGO_PKG_VERSION"))),
-        ("Title", stage.scene.name.clone()),
-        ("Scene", options.scene.display().to_string()),
-        ("Instant", frame.instant.to_rfc3339()),
-        ("Place", format!("{:.6}, {:.6}", stage.observer.latitude_deg, stage.observer.longitude_deg)),
-        (
-            "Camera",
-            format!(
-                "position {:.3}, {:.3}, {:.3} m; yaw {:.4} rad; pitch {:.4} rad; field of view {:.4} rad",
-                view.position.x, view.position.y, view.position.z, view.yaw, view.pitch, view.field_of_view
-            ),
-        ),
-        ("Seed", stage.scene.seed.to_string()),
-        ("Quality", format!("{:?}", stage.scene.quality)),
-    ]
 }
 
 /// A renderer without a window, driven frame by frame.
@@ -166,7 +142,7 @@ impl Renderer {
                 RenderTarget::from(target.clone()),
                 CanopyCamera,
                 Msaa::from_samples(msaa),
-                Tonemapping::TonyMcMapface,
+                Tonemapping::BlenderFilmic,
             ))
             .id();
         Ok(Self { app, camera, target, size, warm: false })
@@ -198,19 +174,10 @@ impl Renderer {
 
     /// Places the camera.
     pub fn set_view(&mut self, view: &Viewpoint) {
-        let origin = (view.position / ORIGIN_STEP).round() * ORIGIN_STEP;
+        let (origin, transform) = camera::place(view);
+        let projection = camera::projection(view.field_of_view);
         let world = self.app.world_mut();
-        world.insert_resource(CanopyOrigin(origin));
-        let transform = Transform {
-            translation: (view.position - origin).as_vec3(),
-            rotation: view.rotation().as_quat(),
-            ..Transform::default()
-        };
-        let projection = Projection::Perspective(PerspectiveProjection {
-            fov: view.field_of_view as f32,
-            near: 0.1,
-            ..PerspectiveProjection::default()
-        });
+        world.insert_resource(origin);
         world.entity_mut(self.camera).insert((transform, projection));
     }
 

@@ -1,8 +1,12 @@
 //! The program: scenes built into stages, headless pictures, the interactive flight, and what a file holds.
 
 mod adapter;
+mod camera;
 mod error;
+mod fly;
 mod headless;
+mod info;
+mod notes;
 mod picture;
 mod plants;
 mod stage;
@@ -10,5 +14,8 @@ mod trees;
 
 pub use adapter::list_adapters;
 pub use error::AppError;
+pub use fly::fly;
 pub use headless::{Renderer, render};
+pub use info::info;
+pub use picture::Picture;
 pub use stage::Stage;

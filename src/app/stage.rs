@@ -132,11 +132,12 @@ impl Stage {
                 scene::Moon::None => MoonSetting::None,
             },
             visibility_km: self.scene.place.visibility * 1e-3,
+            ..SkySettings::default()
         }
     }
 }
 
-fn observer(scene: &Scene, terrain: &Terrain, path: &Path) -> Result<Observer, AppError> {
+pub(super) fn observer(scene: &Scene, terrain: &Terrain, path: &Path) -> Result<Observer, AppError> {
     let known = terrain.reference().and_then(|reference| reference.latitude_longitude());
     let latitude = scene.place.latitude.or(known.map(|place| place.0));
     let longitude = scene.place.longitude.or(known.map(|place| place.1));
@@ -154,7 +155,7 @@ fn variant_bounds(plant: &BakedPlant) -> VariantBounds {
     })
 }
 
-fn build_terrain(ground: &scene::Ground, progress: &mut dyn Progress) -> Result<Terrain, AppError> {
+pub(super) fn build_terrain(ground: &scene::Ground, progress: &mut dyn Progress) -> Result<Terrain, AppError> {
     let surroundings = Surroundings::Mirror;
     let read = |path: &Path, options: ReadOptions, progress: &mut dyn Progress| -> Result<Terrain, AppError> {
         let (terrain, warnings) = read_terrain(path, &options)?;

@@ -23,7 +23,7 @@ use glam::Vec3;
 
 use super::components::{CanopyCamera, Daylight};
 use crate::light::{
-    LightError, LightSettings, LightState,
+    ExposureSettings, LightError, LightSettings, LightState,
     atmosphere::{Atmosphere, AtmosphereParams, luminance},
     moon::{MoonSetting, celestial_rotation},
     sun::{Observer, SunPosition},
@@ -40,6 +40,9 @@ pub struct SkySettings {
     pub moon: MoonSetting,
     /// Meteorological visibility at sea level in kilometres, 2 to 250. Lower is hazier.
     pub visibility_km: f64,
+    /// Stops by which pictures are brighter than the exposure curve has them, -10 to 10. A forest is darker than the
+    /// middle grey that the curve is made for; the default is 0.9.
+    pub compensation_ev: f32,
 }
 
 impl Default for SkySettings {
@@ -56,6 +59,7 @@ impl Default for SkySettings {
             instant: DateTime::from_timestamp(1_782_040_500, 0).unwrap_or_default(),
             moon: MoonSetting::FullOpposite,
             visibility_km: 40.0,
+            compensation_ev: 0.9,
         }
     }
 }
@@ -71,6 +75,7 @@ impl SkySettings {
         let settings = LightSettings {
             observer_height_m: self.observer.height_m.clamp(-500.0, 9000.0),
             star_rotation: celestial_rotation(self.instant, &self.observer),
+            exposure: ExposureSettings { compensation: self.compensation_ev, ..ExposureSettings::default() },
             ..LightSettings::default()
         };
         LightState::new(atmosphere, sun, moon, &settings)

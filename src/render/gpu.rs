@@ -79,17 +79,29 @@ impl GrowingBuffer {
     }
 }
 
-/// A texture array of RGBA8 layers with their mip chains; all chains have the size of the first.
+/// Smallest mip of an alpha-tested texture, texels along a side. In a single texel the alpha test is all or nothing: leaves
+/// that cover less than half of their picture would vanish with the distance.
+pub const SMALLEST_TESTED_MIP: u32 = 8;
+
+/// Number of levels of `chain` down to `smallest` texels along the shorter side (at least one).
+pub fn levels_down_to(chain: &MipChain, smallest: u32) -> usize {
+    let side = chain.width.min(chain.height).max(1);
+    let wanted = (side / smallest.max(1)).max(1).ilog2() as usize + 1;
+    wanted.min(chain.levels.len().max(1))
+}
+
+/// A texture array of RGBA8 layers with their mip chains down to `smallest` texels; all chains have the size of the first.
 pub fn texture_array(
     device: &RenderDevice,
     queue: &RenderQueue,
     label: &str,
     format: TextureFormat,
     layers: &[&MipChain],
+    smallest: u32,
 ) -> (Texture, TextureView) {
     let (width, height, levels) = layers
         .first()
-        .map_or((1, 1, 1), |chain| (chain.width.max(1), chain.height.max(1), chain.levels.len().max(1)));
+        .map_or((1, 1, 1), |chain| (chain.width.max(1), chain.height.max(1), levels_down_to(chain, smallest)));
     let texture = device.create_texture(&TextureDescriptor {
         label: Some(label),
         size: Extent3d { width, height, depth_or_array_layers: layers.len().max(1) as u32 },
@@ -115,15 +127,16 @@ pub fn texture_array(
     (texture, view)
 }
 
-/// A plain texture with one mip chain.
+/// A plain texture with one mip chain down to `smallest` texels.
 pub fn texture(
     device: &RenderDevice,
     queue: &RenderQueue,
     label: &str,
     format: TextureFormat,
     chain: &MipChain,
+    smallest: u32,
 ) -> TextureView {
-    let (texture, _) = texture_array(device, queue, label, format, &[chain]);
+    let (texture, _) = texture_array(device, queue, label, format, &[chain], smallest);
     texture.create_view(&TextureViewDescriptor {
         dimension: Some(TextureViewDimension::D2),
         ..Default::default()

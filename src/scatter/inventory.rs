@@ -116,11 +116,7 @@ pub fn read_inventory(path: &Path, options: InventoryOptions) -> Result<Inventor
 pub fn parse_inventory(bytes: &[u8], name: &str, options: InventoryOptions) -> Result<Inventory, ScatterError> {
     let text = decode(bytes, name)?;
     let separator = separator(&text);
-    let mut reader = csv::ReaderBuilder::new()
-        .delimiter(separator)
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
+    let mut reader = table(&text, separator);
     let header = reader.headers().map_err(|error| record_error(name, &text, &error))?.clone();
     let columns = Columns::find(&header, name, options)?;
     let mut cells = Cells { header: &header, decimal_comma: separator != b',', bad: Vec::new(), total_bad: 0 };
@@ -145,6 +141,40 @@ pub fn parse_inventory(bytes: &[u8], name: &str, options: InventoryOptions) -> R
         return Err(ScatterError::BadValues { name: name.to_owned(), total: cells.total_bad, first: cells.bad });
     }
     Ok(Inventory { rows, coordinates: columns.coordinates })
+}
+
+/// A column of an inventory, for people.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Column {
+    /// Its name as the file writes it.
+    pub name: String,
+    /// What is read from it, with its unit; `None` where it is ignored.
+    pub meaning: Option<String>,
+}
+
+/// The columns of an inventory in the order of the file; `bytes`, `name` and `options` as for [`parse_inventory`].
+///
+/// # Errors
+/// Those of [`parse_inventory`] that concern the header.
+pub fn columns_of(bytes: &[u8], name: &str, options: InventoryOptions) -> Result<Vec<Column>, ScatterError> {
+    let text = decode(bytes, name)?;
+    let mut reader = table(&text, separator(&text));
+    let header = reader.headers().map_err(|error| record_error(name, &text, &error))?.clone();
+    let columns = Columns::find(&header, name, options)?;
+    Ok(header
+        .iter()
+        .enumerate()
+        .map(|(index, name)| Column { name: name.to_owned(), meaning: columns.meaning(index, &normalised(name)) })
+        .collect())
+}
+
+/// The records of a file.
+fn table(text: &str, separator: u8) -> csv::Reader<&[u8]> {
+    csv::ReaderBuilder::new()
+        .delimiter(separator)
+        .comment(Some(b'#'))
+        .trim(csv::Trim::All)
+        .from_reader(text.as_bytes())
 }
 
 /// UTF-8 with or without a byte-order mark, else Latin-1.
@@ -277,6 +307,37 @@ impl Columns {
             height: length("height", &["height", "tree_height", "ht", "h"], options.height_unit)?,
             species: only("species", &|name| ["species", "sp", "species_name", "taxon"].contains(&name))?,
         })
+    }
+
+    /// What the column `index`, called `name` in lower case, is read for.
+    fn meaning(&self, index: usize, name: &str) -> Option<String> {
+        let length = |quantity: &str, column: LengthColumn| {
+            let unit = match column.unit {
+                LengthUnit::Metre => "metres",
+                LengthUnit::Centimetre => "centimetres",
+                LengthUnit::Millimetre => "millimetres",
+            };
+            let stated = ["_m", "_cm", "_mm"].iter().any(|suffix| name.ends_with(suffix));
+            let assumed = if stated { "" } else { " (assumed: the name states no unit)" };
+            format!("{quantity} in {unit}{assumed}")
+        };
+        let (x, y) = match self.coordinates {
+            Coordinates::Planar => ("position east in metres", "position north in metres"),
+            Coordinates::Geographic => ("longitude in degrees", "latitude in degrees"),
+        };
+        if index == self.x {
+            return Some(x.to_owned());
+        }
+        if index == self.y {
+            return Some(y.to_owned());
+        }
+        if self.species == Some(index) {
+            return Some("species".to_owned());
+        }
+        let dbh = self.dbh.filter(|column| column.index == index);
+        let height = self.height.filter(|column| column.index == index);
+        dbh.map(|column| length("diameter at breast height", column))
+            .or(height.map(|column| length("height", column)))
     }
 
     /// Possible values of x and y.

@@ -24,8 +24,6 @@ pub struct Quality {
     pub msaa: u32,
     /// Height of a cross plane's texture in texels, 32 to 2048. Higher: sharper far trees, memory. Default 256.
     pub cross_resolution: u32,
-    /// Planes of one cross, 2 to 6. More: rounder far trees, slower. Default 2.
-    pub cross_planes: u32,
     /// Distance in metres beyond which no tree is drawn, 100 to 200000. Default 20000.
     pub view_distance: f64,
     /// Greatest error of the drawn terrain in pixels, 0.25 to 32. Lower: more triangles. Default 1.
@@ -42,7 +40,6 @@ impl Default for Quality {
             fade_band: 20.0,
             msaa: 4,
             cross_resolution: 256,
-            cross_planes: 2,
             view_distance: 20_000.0,
             terrain_error: 1.0,
         }
@@ -66,7 +63,6 @@ impl Quality {
             check.problem("quality.msaa", format!("is {}", self.msaa), "write 1 (off) or 4");
         }
         check.count("quality.cross_resolution", self.cross_resolution, 32..=2048);
-        check.count("quality.cross_planes", self.cross_planes, 2..=6);
         check.number("quality.view_distance", self.view_distance, 100.0..=200_000.0, "m");
         check.number("quality.terrain_error", self.terrain_error, 0.25..=32.0, "pixels");
     }

@@ -175,7 +175,7 @@ impl GrowParameters {
                 fold_deg: 28.0,
                 normal_bend: 0.55,
                 shell: 0.25,
-                tint: [1.0, 1.0, 1.0],
+                tint: [0.82, 0.84, 0.9],
                 tint_variation: 0.1,
                 transmission: [0.35, 0.45, 0.16],
             },
@@ -241,7 +241,7 @@ impl Default for LeafParameters {
             fold_deg: 18.0,
             normal_bend: 0.55,
             shell: 0.65,
-            tint: [1.0, 1.0, 1.0],
+            tint: [0.62, 0.66, 0.72],
             tint_variation: 0.12,
             transmission: [0.6, 0.75, 0.25],
         }

@@ -25,8 +25,9 @@ pub use prepare::ForestStatistics;
 pub(crate) use prepare::{
     ForestPipelines, PreparedForests, forest_view, instance_bind_group, opaque_depth, prepare_view_lists,
 };
-pub(crate) use resources::{ForestLayouts, GpuForests, prepare_forests};
-pub(crate) use vertex::PlantVertex;
+pub(crate) use resources::{ForestLayouts, prepare_forests};
+pub use resources::{ForestViewUniform, GpuForests, PartUniform, PlaneUniform, VariantUniform};
+pub use vertex::PlantVertex;
 
 /// Draws [`Forest`](super::components::Forest)s.
 pub struct ForestPassPlugin;

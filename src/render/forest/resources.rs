@@ -325,7 +325,7 @@ impl TextureShelf {
     ) -> TextureView {
         let format = TextureFormat::Rgba8UnormSrgb;
         let Some(image) = &material.base_color_texture else {
-            return gpu::texture(device, queue, "canopy_white", format, &plain([255; 4]));
+            return gpu::texture(device, queue, "canopy_white", format, &plain([255; 4]), 1);
         };
         let foliage = kind == PartKind::Foliage;
         self.views
@@ -336,7 +336,8 @@ impl TextureShelf {
                 } else {
                     color_mips(image)
                 };
-                gpu::texture(device, queue, "canopy_base_color", format, &chain)
+                let smallest = if foliage { gpu::SMALLEST_TESTED_MIP } else { 1 };
+                gpu::texture(device, queue, "canopy_base_color", format, &chain, smallest)
             })
             .clone()
     }
@@ -344,11 +345,11 @@ impl TextureShelf {
     fn normal(&mut self, material: &PlantMaterial, device: &RenderDevice, queue: &RenderQueue) -> TextureView {
         let format = TextureFormat::Rgba8Unorm;
         let Some(image) = &material.normal_texture else {
-            return gpu::texture(device, queue, "canopy_flat", format, &plain([128, 128, 255, 255]));
+            return gpu::texture(device, queue, "canopy_flat", format, &plain([128, 128, 255, 255]), 1);
         };
         self.views
             .entry((Arc::as_ptr(image) as usize, false))
-            .or_insert_with(|| gpu::texture(device, queue, "canopy_normal", format, &normal_mips(image)))
+            .or_insert_with(|| gpu::texture(device, queue, "canopy_normal", format, &normal_mips(image), 1))
             .clone()
     }
 }
@@ -422,9 +423,11 @@ fn upload_crosses(
 ) -> BindGroup {
     let colors: Vec<&MipChain> = plants.iter().flat_map(|plant| &plant.cross.textures.color).collect();
     let properties: Vec<&MipChain> = plants.iter().flat_map(|plant| &plant.cross.textures.properties).collect();
-    let (_, colors) = gpu::texture_array(device, queue, "canopy_cross_color", TextureFormat::Rgba8UnormSrgb, &colors);
-    let (_, properties) =
-        gpu::texture_array(device, queue, "canopy_cross_properties", TextureFormat::Rgba8Unorm, &properties);
+    let upload = |label: &str, format: TextureFormat, layers: &[&MipChain]| {
+        gpu::texture_array(device, queue, label, format, layers, gpu::SMALLEST_TESTED_MIP).1
+    };
+    let colors = upload("canopy_cross_color", TextureFormat::Rgba8UnormSrgb, &colors);
+    let properties = upload("canopy_cross_properties", TextureFormat::Rgba8Unorm, &properties);
     device.create_bind_group(
         "canopy_cross",
         &pipelines.get_bind_group_layout(&layouts.cross),

@@ -23,7 +23,7 @@ use bevy::{
     render::{GpuResourceAppExt, Render, RenderApp, RenderSystems},
 };
 
-pub use prepare::ShadowMaps;
+pub use prepare::{CascadeViewUniform, ShadowMaps};
 
 /// Draws the sun's shadow maps.
 pub struct SunShadowPassPlugin;

@@ -24,7 +24,7 @@ use bevy::{
 
 pub use ground_map::GroundMap;
 pub(crate) use pass::terrain_pass;
-pub use prepare::TerrainStatistics;
+pub use prepare::{GpuTile, GpuTileVertex, TerrainStatistics};
 
 /// Draws the [`Ground`](super::components::Ground).
 pub struct TerrainPassPlugin;

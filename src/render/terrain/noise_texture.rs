@@ -51,7 +51,7 @@ fn texel(field: &Fbm<Perlin>, channel: usize, x: u32, y: u32) -> u8 {
 
 /// Uploads [`noise_image`].
 pub fn noise_texture(device: &RenderDevice, queue: &RenderQueue) -> TextureView {
-    gpu::texture(device, queue, "canopy_ground_noise", TextureFormat::Rgba8Unorm, &mip_chain(&noise_image()))
+    gpu::texture(device, queue, "canopy_ground_noise", TextureFormat::Rgba8Unorm, &mip_chain(&noise_image()), 1)
 }
 
 /// Box-filtered levels, all four channels alike: these are numbers, not colours.

@@ -1,0 +1,95 @@
+//! The field as Canopy draws it.
+
+use std::sync::Arc;
+
+use anyhow::Context;
+use canopy::{
+    app::Renderer,
+    bake::BakedPlant,
+    lod::FadeBand,
+    render::{
+        components::{Forest, Ground, SunShadowSettings},
+        daylight::SkySettings,
+    },
+    scene::Viewpoint,
+};
+use glam::DVec3;
+use image::RgbImage;
+
+use super::field::{Field, GROUND_REACH};
+
+/// Farther than any tree, metres.
+const EVERYWHERE: f32 = 1e6;
+
+/// Canopy's renderer with the field in it.
+pub struct Ours(Renderer);
+
+impl Ours {
+    /// Canopy's side of `field`.
+    pub fn new(field: &Field) -> anyhow::Result<Self> {
+        let look = &field.look;
+        let mut renderer = Renderer::new(look.size, None, 1)?;
+        let world = renderer.app().world_mut();
+        if look.ground {
+            world.spawn(Ground {
+                terrain: field.terrain.clone(),
+                cover: Some(field.cover.clone()),
+                error_pixels: 1.0,
+                view_distance: GROUND_REACH,
+            });
+        }
+        let mut shadow = SunShadowSettings {
+            map_size: look.shadow_size,
+            cascades: look.cascades,
+            distance: look.shadow_distance,
+            ..SunShadowSettings::default()
+        };
+        let (plant, fade) = if look.is_full() {
+            // The truth casts with its full models too.
+            shadow.proxy_distance = f64::from(EVERYWHERE);
+            (full_casters(&field.plant), FadeBand::new(EVERYWHERE, 1.0))
+        } else {
+            ((*field.plant).clone(), FadeBand::new(look.near, look.band))
+        };
+        if look.trees {
+            world.spawn(Forest {
+                stand: field.stand.clone(),
+                plants: Arc::new(vec![plant]),
+                origin: DVec3::ZERO,
+                fade,
+                view_distance: EVERYWHERE,
+            });
+        }
+        world.insert_resource(shadow);
+        Ok(Self(renderer))
+    }
+
+    /// Places the camera.
+    pub fn place(&mut self, view: &Viewpoint) {
+        self.0.set_view(view);
+    }
+
+    /// Sets the time; the light follows within the frame.
+    pub fn light(&mut self, sky: &SkySettings) {
+        let world = self.0.app().world_mut();
+        if world.get_resource() != Some(sky) {
+            world.insert_resource(sky.clone());
+        }
+    }
+
+    /// Draws a frame and waits for the device.
+    pub fn frame(&mut self) -> anyhow::Result<()> {
+        Ok(self.0.update()?)
+    }
+
+    /// The last frame.
+    pub fn read(&self) -> anyhow::Result<RgbImage> {
+        let picture = self.0.read()?;
+        RgbImage::from_raw(picture.width, picture.height, picture.pixels).context("a picture of another size")
+    }
+}
+
+fn full_casters(plant: &BakedPlant) -> BakedPlant {
+    let shadow_proxy = plant.plant.parts.iter().map(|part| part.mesh.clone()).collect();
+    BakedPlant { shadow_proxy, ..plant.clone() }
+}

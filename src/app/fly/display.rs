@@ -1,0 +1,61 @@
+//! Whether there is a display to open a window on.
+
+use std::panic::{self, AssertUnwindSafe};
+
+use super::AppError;
+
+/// Finds out before the long work whether a window is possible at all.
+///
+/// # Errors
+/// [`AppError::NoDisplay`] where the environment names none.
+pub fn check() -> Result<(), AppError> {
+    #[cfg(all(unix, not(any(target_os = "macos", target_os = "ios", target_os = "android"))))]
+    {
+        let named = |variable: &str| std::env::var_os(variable).is_some_and(|value| !value.is_empty());
+        return named_display(named("DISPLAY"), named("WAYLAND_DISPLAY"));
+    }
+    #[allow(unreachable_code)]
+    Ok(())
+}
+
+/// The program speaks X11; a Wayland desktop offers it through Xwayland, which sets `DISPLAY` too.
+#[cfg_attr(not(all(unix, not(target_os = "macos"))), allow(dead_code))]
+fn named_display(x11: bool, wayland: bool) -> Result<(), AppError> {
+    let details = match (x11, wayland) {
+        (true, _) => return Ok(()),
+        (false, true) => "WAYLAND_DISPLAY is set, but DISPLAY is not, and this program needs Xwayland",
+        (false, false) => "neither DISPLAY nor WAYLAND_DISPLAY is set",
+    };
+    Err(AppError::NoDisplay { details: details.to_owned() })
+}
+
+/// Builds a Bevy app with a window. Bevy's window plugin panics where the display that the environment names does not
+/// answer or a library of it is missing; that becomes an error here.
+///
+/// # Errors
+/// [`AppError::NoDisplay`].
+pub fn open<T>(build: impl FnOnce() -> T) -> Result<T, AppError> {
+    let hook = panic::take_hook();
+    panic::set_hook(Box::new(|_| {}));
+    let outcome = panic::catch_unwind(AssertUnwindSafe(build));
+    panic::set_hook(hook);
+    outcome.map_err(|payload| {
+        let text = payload.downcast_ref::<String>().map(String::as_str).or(payload.downcast_ref::<&str>().copied());
+        let display = std::env::var("DISPLAY").map(|name| format!(" `{name}`")).unwrap_or_default();
+        let reason = text.map(|text| format!(" ({text})")).unwrap_or_default();
+        AppError::NoDisplay { details: format!("the display{display} does not answer{reason}") }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn x11_is_needed() {
+        assert!(named_display(true, false).is_ok() && named_display(true, true).is_ok());
+        let error = |wayland| named_display(false, wayland).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(error(true).contains("Xwayland"));
+        assert!(error(false).contains("canopy render") && error(false).contains("xvfb-run"));
+    }
+}

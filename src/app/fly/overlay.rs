@@ -1,0 +1,196 @@
+//! What lies over the picture: numbers, help, messages.
+
+use bevy::ecs::system::{Local, Res, ResMut};
+use bevy_egui::{
+    EguiContexts,
+    egui::{Align2, Area, Color32, Context, CornerRadius, Frame, Grid, Id, Margin, RichText, Stroke, Ui, Visuals},
+};
+
+use super::{controls::HELP, session::Session, timing::FrameTimes};
+use crate::render::{
+    components::Daylight,
+    report::{FrameReport, PassOutcome},
+};
+
+/// Points between an overlay and the window's edge.
+const EDGE: f32 = 8.0;
+/// Points of the overlays' text.
+const SMALL: f32 = 12.0;
+/// Colour of what stands before a value.
+const NAME: Color32 = Color32::from_gray(185);
+const FRAME_TIME: &str = "Time from one frame's completion on the device to the next one's, over the last 120 frames: \
+                          what the CPU needs, what the device needs, and the wait for the screen. Half of the frames \
+                          take no longer than p50, 95 of 100 no longer than p95.";
+const TREES: &str = "Trees that the view draws. One in the band between the levels counts in both.";
+const TRIANGLES: &str = "Triangles of the view: trees and ground, without shadow maps.";
+const SUN: &str = "Elevation of the sun's centre above the horizon, refraction included, in the light that is drawn.";
+const POSITION: &str = "Metres east (x) and south (z) of the terrain's centre, and above the datum of its heights. \
+                        With height above ground, bearing and pitch this is what --camera takes.";
+
+/// Draws the overlays; a frame that becomes a picture has none.
+pub fn draw_overlays(
+    mut contexts: EguiContexts,
+    mut session: ResMut<Session>,
+    frames: Res<FrameTimes>,
+    report: Res<FrameReport>,
+    daylight: Option<Res<Daylight>>,
+    mut dressed: Local<bool>,
+) {
+    let Ok(context) = contexts.ctx_mut() else { return };
+    if !*dressed {
+        let mut visuals = Visuals::dark();
+        visuals.override_text_color = Some(Color32::from_gray(235));
+        context.set_visuals(visuals);
+        *dressed = true;
+    }
+    if std::mem::take(&mut session.picturing) {
+        return;
+    }
+    if session.help {
+        panel(context, "canopy_help", Align2::CENTER_CENTER, [0.0, 0.0], help);
+    } else if session.overlay {
+        panel(context, "canopy_numbers", Align2::LEFT_TOP, [EDGE, EDGE], |ui| {
+            let sun = daylight.as_ref().map(|light| light.0.sun_direction.y.clamp(-1.0, 1.0).asin().to_degrees());
+            numbers(ui, &session, &frames, sun);
+            passes(ui, &report);
+        });
+    }
+    if let Some(message) = session.message() {
+        // An area remembers its size by its name: each message has its own.
+        panel(context, message, Align2::CENTER_BOTTOM, [0.0, -2.0 * EDGE], |ui| {
+            ui.label(message);
+        });
+    }
+}
+
+fn panel(context: &Context, name: &str, align: Align2, offset: [f32; 2], contents: impl FnOnce(&mut Ui)) {
+    let widest = context.viewport_rect().width() - 4.0 * EDGE;
+    Area::new(Id::new(name)).anchor(align, offset).default_width(widest).fade_in(false).show(context, |ui| {
+        // Rows as high as their text, not as a button.
+        ui.spacing_mut().interact_size.y = 0.0;
+        Frame::new()
+            .fill(Color32::from_black_alpha(180))
+            .stroke(Stroke::NONE)
+            .corner_radius(CornerRadius::same(4))
+            .inner_margin(Margin::same(8))
+            .show(ui, |ui| {
+                ui.set_max_width(widest);
+                contents(ui);
+            });
+    });
+}
+
+fn small(text: impl Into<String>) -> RichText {
+    RichText::new(text).size(SMALL)
+}
+
+fn numbers(ui: &mut Ui, session: &Session, frames: &FrameTimes, sun: Option<f32>) {
+    let milliseconds = |share| frames.percentile(share).map_or("-".to_owned(), |s| format!("{:.1}", s * 1e3));
+    let (forest, terrain) = (frames.forest, frames.terrain);
+    let clock = match session.clock.rate() {
+        _ if session.paused => "paused".to_owned(),
+        0.0 => "stands".to_owned(),
+        rate => format!("{rate}x"),
+    };
+    let position = session.pilot.position;
+    let flight = match &session.tour {
+        Some(tour) if session.touring => format!("on the path, {:.1} s", tour.seconds()),
+        _ => format!("free, {:.1} m/s", session.pilot.speed),
+    };
+    let mut rows = vec![
+        (
+            "frame",
+            format!("p50 {} ms, p95 {} ms of {} frames", milliseconds(0.5), milliseconds(0.95), frames.frames()),
+            FRAME_TIME,
+        ),
+        ("trees", format!("{} models, {} crosses", grouped(forest.models), grouped(forest.crosses)), TREES),
+        ("triangles", grouped(forest.triangles + terrain.triangles), TRIANGLES),
+        ("ground", format!("{} tiles", grouped(terrain.tiles)), "Terrain tiles that the view draws."),
+        (
+            "time",
+            format!("{}, clock {clock}", session.clock.now().format("%Y-%m-%d %H:%M:%S %:z")),
+            "Local time with its offset from UTC.",
+        ),
+        ("position", format!("x {:.1}, z {:.1}, height {:.1} m", position.x, position.z, position.y), POSITION),
+        (
+            "view",
+            format!(
+                "{:.1} m above ground, bearing {:.0}\u{b0}, pitch {:.0}\u{b0}",
+                session.above_ground(),
+                session.pilot.bearing(),
+                session.pilot.pitch.to_degrees()
+            ),
+            POSITION,
+        ),
+        ("flight", flight, "Speed of free flight without Shift; the wheel changes it."),
+    ];
+    if let Some(sun) = sun {
+        rows.insert(
+            5,
+            ("sun", format!("{:.1}\u{b0} {} the horizon", sun.abs(), if sun < 0.0 { "below" } else { "above" }), SUN),
+        );
+    }
+    let states = [(session.underground, "under the ground"), (session.tinted, "tinted by level")];
+    let states: Vec<&str> = states.iter().filter(|(on, _)| *on).map(|(_, name)| *name).collect();
+    if !states.is_empty() {
+        rows.push(("options", states.join(", "), "Keys U and T."));
+    }
+    Grid::new("canopy_rows").num_columns(2).spacing([10.0, 2.0]).show(ui, |ui| {
+        for (name, value, tip) in rows {
+            ui.label(small(name).color(NAME)).on_hover_text(tip);
+            ui.label(small(value)).on_hover_text(tip);
+            ui.end_row();
+        }
+    });
+}
+
+fn passes(ui: &mut Ui, report: &FrameReport) {
+    Grid::new("canopy_passes").num_columns(2).spacing([10.0, 0.0]).show(ui, |ui| {
+        for (pass, outcome) in report.outcomes() {
+            let (text, color) = match outcome {
+                PassOutcome::Ran(on) => (format!("ran: {on}"), Color32::from_rgb(190, 225, 180)),
+                PassOutcome::Skipped(why) => (format!("skipped: {why}"), NAME),
+            };
+            ui.label(RichText::new(pass).size(SMALL - 2.0).color(NAME));
+            ui.label(RichText::new(text).size(SMALL - 2.0).color(color));
+            ui.end_row();
+        }
+    });
+}
+
+fn help(ui: &mut Ui) {
+    Grid::new("canopy_keys").num_columns(2).spacing([16.0, 2.0]).show(ui, |ui| {
+        for (key, what) in HELP {
+            ui.label(small(key).strong());
+            ui.label(small(what));
+            ui.end_row();
+        }
+    });
+}
+
+/// A number with its digits in groups of three.
+fn grouped(number: usize) -> String {
+    let digits = number.to_string();
+    let first = digits.len() % 3;
+    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
+    for (place, digit) in digits.chars().enumerate() {
+        if place > 0 && place % 3 == first {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digits_come_in_threes() {
+        for (number, text) in [(0, "0"), (12, "12"), (123, "123"), (1234, "1,234"), (300_000, "300,000")] {
+            assert_eq!(grouped(number), text);
+        }
+        assert_eq!(grouped(12_345_678), "12,345,678");
+    }
+}

@@ -1,0 +1,306 @@
+//! The state of a flight and what changes it: commands, held keys, time.
+
+use std::path::PathBuf;
+
+use chrono::{DateTime, TimeDelta, Utc};
+
+use super::{
+    clock::SceneClock,
+    controls::Command,
+    motion::{Controls, Pilot},
+    tour::Tour,
+};
+use crate::{
+    app::{error::AppError, stage::Stage},
+    scene::{FlyOptions, LocalTime, Pose, View, Viewpoint},
+};
+
+use bevy::ecs::resource::Resource;
+
+/// Simulated seconds that the drawn light may lag behind a running clock: the sun moves 0.02 degrees in them, and
+/// the shadow of a tree of 20 m some 7 mm. Computing the light anew costs more than a frame of a fast device.
+const LIGHT_LAG: TimeDelta = TimeDelta::seconds(5);
+/// Seconds for which a message stays.
+const MESSAGE_SECONDS: f64 = 6.0;
+
+/// A flight through a stage.
+#[derive(Resource)]
+pub struct Session {
+    /// What is flown through.
+    pub stage: Stage,
+    /// Its scene file.
+    pub scene_file: PathBuf,
+    /// The camera.
+    pub pilot: Pilot,
+    /// The scripted flight, for scenes that have a path.
+    pub tour: Option<Tour>,
+    /// Whether the camera follows it.
+    pub touring: bool,
+    /// The clock.
+    pub clock: SceneClock,
+    /// Whether clock and scripted flight stand.
+    pub paused: bool,
+    /// Whether the camera may go under the ground.
+    pub underground: bool,
+    /// Whether trees are tinted by their level of detail.
+    pub tinted: bool,
+    /// Whether the small overlay is shown.
+    pub overlay: bool,
+    /// Whether the help is shown.
+    pub help: bool,
+    /// Whether this frame becomes a picture, so that nothing may lie over it.
+    pub picturing: bool,
+    message: Option<(String, f64)>,
+    lit: Option<DateTime<Utc>>,
+    start: Start,
+}
+
+/// Where and when a flight begins.
+#[derive(Clone, Debug)]
+struct Start {
+    pose: Pose,
+    tour: Option<Tour>,
+    touring: bool,
+    time: LocalTime,
+}
+
+impl Session {
+    /// The flight through `stage` that `options` ask for.
+    ///
+    /// # Errors
+    /// [`AppError::Plan`] for a start on a path that the scene does not have.
+    pub fn new(stage: Stage, options: &FlyOptions) -> Result<Self, AppError> {
+        let tour = Tour::new(&stage.scene, options.view)?;
+        let touring = matches!(options.view, View::Along(_));
+        let pose = match options.view {
+            View::Pose(pose) => pose,
+            View::Scene | View::Along(_) => stage.scene.camera.start,
+        };
+        let time = options.at.unwrap_or(stage.scene.place.time);
+        let start = Start { pose, tour, touring, time };
+        let mut session = Self {
+            pilot: Pilot::at(&viewpoint(&stage, pose)),
+            tour: start.tour.clone(),
+            touring,
+            clock: SceneClock::new(time, options.clock),
+            paused: false,
+            underground: options.underground,
+            tinted: false,
+            overlay: true,
+            help: false,
+            picturing: false,
+            message: None,
+            lit: None,
+            start,
+            scene_file: options.scene.clone(),
+            stage,
+        };
+        session.fly(&Controls::default(), 0.0);
+        session.say("H shows all keys".to_owned());
+        Ok(session)
+    }
+
+    /// The camera, ready to draw with.
+    pub fn view(&self) -> Viewpoint {
+        self.pilot.viewpoint(self.stage.scene.camera.field_of_view.to_radians())
+    }
+
+    /// Metres of the camera above the ground below it.
+    pub fn above_ground(&self) -> f64 {
+        self.pilot.position.y - self.stage.terrain.height(self.pilot.position.x, self.pilot.position.z)
+    }
+
+    /// The instant whose light is drawn.
+    pub fn lit(&self) -> DateTime<Utc> {
+        self.lit.unwrap_or_else(|| self.clock.now().to_utc())
+    }
+
+    /// The instant whose light is to be drawn now, where it is not the one that is drawn already.
+    pub fn relight(&mut self) -> Option<DateTime<Utc>> {
+        let now = self.clock.now().to_utc();
+        let runs = !self.paused && self.clock.rate() > 0.0;
+        let lag = self.lit.map_or(TimeDelta::MAX, |lit| (now - lit).abs());
+        let due = if runs { lag >= LIGHT_LAG } else { lag > TimeDelta::zero() };
+        due.then(|| {
+            self.lit = Some(now);
+            now
+        })
+    }
+
+    /// Shows a message for some seconds.
+    pub fn say(&mut self, message: String) {
+        self.message = Some((message, MESSAGE_SECONDS));
+    }
+
+    /// The message to show, if any.
+    pub fn message(&self) -> Option<&str> {
+        self.message.as_ref().map(|(message, _)| message.as_str())
+    }
+
+    /// Flies and lets time pass for `seconds`.
+    pub fn fly(&mut self, controls: &Controls, seconds: f64) {
+        if let Some((_, left)) = &mut self.message {
+            *left -= seconds;
+            if *left <= 0.0 {
+                self.message = None;
+            }
+        }
+        let elapsed = if self.paused { 0.0 } else { seconds };
+        self.clock.advance(elapsed);
+        if self.touring && controls.travels() {
+            self.touring = false;
+        }
+        match self.tour.as_mut().filter(|_| self.touring) {
+            Some(tour) => {
+                tour.advance(elapsed);
+                let pose = tour.pose();
+                self.pilot.rest_at(&viewpoint(&self.stage, pose));
+                self.pilot.fly(&Controls { notches: controls.notches, ..Controls::default() }, seconds);
+            }
+            None => self.pilot.fly(controls, seconds),
+        }
+        if !self.underground {
+            self.pilot.stay_above(self.stage.terrain.height(self.pilot.position.x, self.pilot.position.z));
+        }
+    }
+
+    /// Carries out a command, as far as it concerns the flight; what concerns the window is done there.
+    pub fn carry_out(&mut self, command: Command) {
+        match command {
+            Command::Leave => {}
+            Command::Picture => self.picturing = true,
+            Command::Tour if self.tour.is_none() => {
+                self.say("this scene has no camera path; add `camera: (path: [...])` to its file".to_owned());
+            }
+            Command::Tour => self.touring = !self.touring,
+            Command::Pause => self.paused = !self.paused,
+            Command::Tint => self.tinted = !self.tinted,
+            Command::Underground => self.underground = !self.underground,
+            Command::Help => self.help = !self.help,
+            Command::Overlay => self.overlay = !self.overlay,
+            Command::Home => {
+                let start = self.start.clone();
+                self.pilot.rest_at(&viewpoint(&self.stage, start.pose));
+                (self.tour, self.touring) = (start.tour, start.touring);
+                self.clock.set(start.time);
+            }
+            Command::Minutes(minutes) => self.clock.step(TimeDelta::minutes(minutes)),
+            Command::Days(days) => self.clock.step_days(days),
+            Command::Months(months) => self.clock.step_months(months),
+            Command::Faster => self.clock.faster(),
+            Command::Slower => self.clock.slower(),
+        }
+    }
+}
+
+fn viewpoint(stage: &Stage, pose: Pose) -> Viewpoint {
+    let (x, _, z) = pose.position;
+    pose.viewpoint(stage.terrain.height(x, z), stage.scene.camera.field_of_view)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use glam::DVec3;
+
+    use super::*;
+    use crate::scene::Silent;
+
+    const SCENE: &str = "(
+        terrain: Noise(size: 400, amplitude: 40, seed: 3),
+        place: (latitude: 47.5, longitude: 9.2, time: \"2026-06-21T15:30+02:00\"),
+        camera: (start: (position: (5, 30, 7), yaw: 90), path: [
+            (seconds: 0, position: (-50, 20, 0), yaw: 0, pitch: 0),
+            (seconds: 8, position: (50, 20, 0), yaw: 0, pitch: 0),
+        ]),
+    )";
+
+    fn session(view: View, clock: f64) -> Result<Session, Box<dyn std::error::Error>> {
+        let mut file = tempfile::Builder::new().suffix(".ron").tempfile()?;
+        file.write_all(SCENE.as_bytes())?;
+        let options = FlyOptions {
+            scene: file.path().to_owned(),
+            size: (64, 36),
+            at: None,
+            view,
+            clock,
+            underground: false,
+            seed: None,
+            adapter: None,
+            quiet: true,
+            explain: false,
+        };
+        let stage = Stage::build(&options.scene, None, &mut Silent)?;
+        Ok(Session::new(stage, &options)?)
+    }
+
+    fn down() -> Controls {
+        Controls { travel: DVec3::NEG_Y, hurry: true, ..Controls::default() }
+    }
+
+    #[test]
+    fn the_ground_holds_unless_asked() -> Result<(), Box<dyn std::error::Error>> {
+        let mut session = session(View::Scene, 0.0)?;
+        assert!((session.above_ground() - 30.0).abs() < 1e-9);
+        for _ in 0..10 {
+            session.fly(&down(), 0.5);
+        }
+        assert!((session.above_ground() - super::super::motion::EYE_HEIGHT).abs() < 1e-9);
+        session.carry_out(Command::Underground);
+        session.fly(&down(), 0.5);
+        assert!(session.above_ground() < 0.0);
+        session.carry_out(Command::Underground);
+        session.fly(&Controls::default(), 0.01);
+        assert!(session.above_ground() >= super::super::motion::EYE_HEIGHT - 1e-9);
+        Ok(())
+    }
+
+    #[test]
+    fn a_tour_pauses_and_any_travel_leaves_it() -> Result<(), Box<dyn std::error::Error>> {
+        let mut session = session(View::Scene, 60.0)?;
+        session.carry_out(Command::Tour);
+        session.fly(&Controls::default(), 0.5);
+        let there = session.pilot.position;
+        assert!(session.touring && there.x > -50.0 && (session.above_ground() - 20.0).abs() < 1e-9);
+        session.carry_out(Command::Pause);
+        let time = session.clock.now();
+        session.fly(&Controls::default(), 0.5);
+        assert_eq!((session.pilot.position, session.clock.now()), (there, time));
+        session.fly(&down(), 0.1);
+        assert!(!session.touring && session.pilot.position.y < there.y);
+        session.carry_out(Command::Home);
+        assert_eq!((session.pilot.position.x, session.pilot.position.z), (5.0, 7.0));
+        assert!((session.pilot.bearing() - 90.0).abs() < 1e-9);
+        Ok(())
+    }
+
+    #[test]
+    fn a_start_along_the_path_flies_at_once() -> Result<(), Box<dyn std::error::Error>> {
+        let mut session = session(View::Along(4.0), 0.0)?;
+        assert!(session.touring && session.pilot.position.x.abs() < 1e-6);
+        session.fly(&Controls::default(), 1.0);
+        assert!(session.pilot.position.x > 5.0);
+        session.carry_out(Command::Home);
+        session.fly(&Controls::default(), 0.0);
+        assert!(session.touring && session.pilot.position.x.abs() < 1e-6);
+        Ok(())
+    }
+
+    #[test]
+    fn light_follows_steps_at_once_and_a_running_clock_in_steps() -> Result<(), Box<dyn std::error::Error>> {
+        let mut session = session(View::Scene, 0.0)?;
+        assert!(session.relight().is_some());
+        assert!(session.relight().is_none());
+        session.carry_out(Command::Minutes(10));
+        assert_eq!(session.relight(), Some(session.clock.now().to_utc()));
+        session.carry_out(Command::Faster);
+        session.fly(&Controls::default(), 1.0);
+        assert!(session.relight().is_none());
+        for _ in 0..4 {
+            session.fly(&Controls::default(), 1.0);
+        }
+        assert_eq!(session.relight(), Some(session.clock.now().to_utc()));
+        Ok(())
+    }
+}

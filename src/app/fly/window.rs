@@ -1,0 +1,148 @@
+//! The window's side: the mouse is caught and freed, keys become commands, the camera's entity follows the flight.
+
+use bevy::{
+    app::AppExit,
+    camera::Camera3d,
+    ecs::{
+        message::{MessageReader, MessageWriter},
+        query::With,
+        system::{Commands, Res, ResMut, Single},
+    },
+    input::{
+        ButtonInput, ButtonState,
+        keyboard::{KeyCode, KeyboardInput},
+        mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll, MouseButton, MouseScrollUnit},
+    },
+    prelude::Transform,
+    render::view::Msaa,
+    time::{Real, Time},
+    window::{CursorGrabMode, CursorOptions, PrimaryWindow, WindowFocused},
+};
+use bevy_egui::input::EguiWantsInput;
+
+use super::{
+    controls::{self, Command},
+    session::Session,
+};
+use crate::{
+    app::camera,
+    render::{
+        components::{CanopyCamera, CanopyOrigin, ViewOptions},
+        daylight::SkySettings,
+    },
+};
+
+/// Pixels of a touchpad's scrolling that are one notch of a wheel.
+const PIXELS_A_NOTCH: f64 = 100.0;
+
+/// Puts the stage and the camera into the world.
+pub fn set_up(mut commands: Commands, session: Res<Session>) {
+    let stage = &session.stage;
+    commands.spawn(stage.ground());
+    if let Some(forest) = stage.forest() {
+        commands.spawn(forest);
+    }
+    commands.insert_resource(stage.shadow());
+    commands.spawn((
+        Camera3d::default(),
+        CanopyCamera,
+        Msaa::from_samples(stage.scene.quality.msaa),
+        camera::TONEMAPPING,
+        camera::projection(session.view().field_of_view),
+    ));
+}
+
+/// Catches the mouse on a click, and frees it when the window loses the focus.
+pub fn catch_mouse(
+    mut cursor: Single<&mut CursorOptions, With<PrimaryWindow>>,
+    buttons: Res<ButtonInput<MouseButton>>,
+    overlay: Res<EguiWantsInput>,
+    mut focus: MessageReader<WindowFocused>,
+) {
+    if buttons.just_pressed(MouseButton::Left) && !overlay.wants_any_pointer_input() {
+        set_caught(&mut cursor, true);
+    }
+    if focus.read().any(|message| !message.focused) {
+        set_caught(&mut cursor, false);
+    }
+}
+
+fn caught(cursor: &CursorOptions) -> bool {
+    cursor.grab_mode != CursorGrabMode::None
+}
+
+fn set_caught(cursor: &mut CursorOptions, caught: bool) {
+    // Where a system cannot lock the mouse to its place, winit confines it to the window instead.
+    cursor.grab_mode = if caught { CursorGrabMode::Locked } else { CursorGrabMode::None };
+    cursor.visible = !caught;
+}
+
+/// Carries out what the pressed keys ask for.
+pub fn obey(
+    mut keys: MessageReader<KeyboardInput>,
+    held: Res<ButtonInput<KeyCode>>,
+    mut session: ResMut<Session>,
+    mut cursor: Single<&mut CursorOptions, With<PrimaryWindow>>,
+    mut exit: MessageWriter<AppExit>,
+) {
+    let shift = held.any_pressed([KeyCode::ShiftLeft, KeyCode::ShiftRight]);
+    for key in keys.read().filter(|key| key.state == ButtonState::Pressed) {
+        let Some(command) = controls::command(key.key_code, &key.logical_key, shift, key.repeat) else { continue };
+        match command {
+            Command::Leave if caught(&cursor) => set_caught(&mut cursor, false),
+            Command::Leave => {
+                exit.write(AppExit::Success);
+            }
+            _ => session.carry_out(command),
+        }
+    }
+}
+
+/// Flies for the time since the last frame.
+pub fn fly(
+    time: Res<Time<Real>>,
+    keys: Res<ButtonInput<KeyCode>>,
+    motion: Res<AccumulatedMouseMotion>,
+    wheel: Res<AccumulatedMouseScroll>,
+    cursor: Single<&CursorOptions, With<PrimaryWindow>>,
+    mut session: ResMut<Session>,
+) {
+    let seconds = time.delta_secs_f64();
+    let mouse = if caught(&cursor) { motion.delta.as_dvec2() } else { glam::DVec2::ZERO };
+    let notches = match wheel.unit {
+        MouseScrollUnit::Line => f64::from(wheel.delta.y),
+        MouseScrollUnit::Pixel => f64::from(wheel.delta.y) / PIXELS_A_NOTCH,
+    };
+    // A key that was pressed and released between two slow frames still counts.
+    let held = |key| keys.pressed(key) || keys.just_pressed(key);
+    let controls = controls::controls(held, mouse, notches, seconds);
+    session.fly(&controls, seconds);
+}
+
+/// Brings camera, light and options in step with the flight; what stays the same is not touched.
+pub fn follow(
+    mut commands: Commands,
+    mut session: ResMut<Session>,
+    mut origin: ResMut<CanopyOrigin>,
+    mut options: ResMut<ViewOptions>,
+    mut camera: Single<&mut Transform, With<CanopyCamera>>,
+    sky: Option<Res<SkySettings>>,
+) {
+    let (place, transform) = camera::place(&session.view());
+    if *origin != place {
+        *origin = place;
+    }
+    if **camera != transform {
+        **camera = transform;
+    }
+    let wanted = ViewOptions { tint_levels: session.tinted };
+    if *options != wanted {
+        *options = wanted;
+    }
+    if let Some(instant) = session.relight() {
+        let wanted = session.stage.sky(instant);
+        if sky.is_none_or(|sky| *sky != wanted) {
+            commands.insert_resource(wanted);
+        }
+    }
+}

@@ -1,0 +1,265 @@
+//! Scenes: all that they refer to, read and built as for drawing, short of the bakes and the graphics device.
+
+use std::{ops::Range, path::Path, sync::Arc};
+
+use glam::Vec3;
+
+use super::{
+    inventory,
+    page::{Page, grouped, length, place},
+    plant, terrain,
+};
+use crate::{
+    app::{AppError, plants, stage, trees},
+    bake::{
+        BakedPlant,
+        billboard::{Cross, CrossTextures},
+    },
+    light::sun::{Observer, SunPosition},
+    plant::{PartKind, Plant, grow::GrowParameters},
+    scatter::{InventoryOptions, LengthUnit, Stand, read_inventory},
+    scene::{self, PlantSource, Progress, Scene, Species, Trees},
+    terrain::Terrain,
+};
+
+/// A scene; or the rules of a grown species, which are RON too.
+pub(super) fn describe_file(page: &mut Page, path: &Path) -> Result<(), AppError> {
+    let scene = match Scene::read(path) {
+        Ok(scene) => scene,
+        Err(error) => {
+            return match grown_species(path) {
+                Some(species) => {
+                    describe_species_file(page, path, &species);
+                    Ok(())
+                }
+                None => Err(error.into()),
+            };
+        }
+    };
+    describe(page, &scene, path)
+}
+
+fn grown_species(path: &Path) -> Option<GrowParameters> {
+    std::fs::read_to_string(path).ok().and_then(|text| GrowParameters::from_ron(&text).ok())
+}
+
+fn describe_species_file(page: &mut Page, path: &Path, species: &GrowParameters) {
+    page.title(format!("{}: rules of a grown species", path.display()));
+    page.inset(|page| {
+        page.row("name", &species.name);
+        page.row("height", format!("{:.1} m ± {:.1} m", species.height, species.height_variation));
+        page.row("used by", "a scene's species: plant: Grown(form: File(\"...\"))");
+    });
+}
+
+fn describe(page: &mut Page, scene: &Scene, path: &Path) -> Result<(), AppError> {
+    let mut heard = Heard::default();
+    let ground = stage::build_terrain(&scene.terrain, &mut heard)?;
+    let observer = stage::observer(scene, &ground, path)?;
+    let plan = plants::plan(scene)?;
+    let mut individuals = Vec::with_capacity(plan.sources.len());
+    for source in &plan.sources {
+        let (plant, warnings) = source.build()?;
+        heard.warnings.extend(warnings);
+        individuals.push(unbaked(plant));
+    }
+    let stand = trees::build_stand(scene, &plan, &individuals, &ground, &mut heard)?;
+
+    page.title(format!("{}: a scene", path.display()));
+    page.inset(|page| {
+        page.row("name", &scene.name);
+        page.row("seed", scene.seed);
+        describe_ground(page, scene, &ground);
+        for (species, variants) in scene.species.iter().zip(&plan.variants) {
+            describe_species(page, species, variants, &individuals);
+        }
+        describe_trees(page, scene, &plan.variants, &stand, &heard.notes)?;
+        describe_place(page, scene, &observer)?;
+        describe_camera(page, scene);
+        describe_quality(page, scene);
+        for warning in &heard.warnings {
+            page.row("note", warning);
+        }
+        Ok(())
+    })
+}
+
+/// Keeps what a reader says.
+#[derive(Default)]
+struct Heard {
+    warnings: Vec<String>,
+    notes: Vec<String>,
+}
+
+impl Progress for Heard {
+    fn begin(&mut self, _: &str, _: u64) {}
+
+    fn advance(&mut self, _: u64) {}
+
+    fn end(&mut self) {}
+
+    fn warn(&mut self, message: &str) {
+        self.warnings.push(message.to_owned());
+    }
+
+    fn note(&mut self, message: &str) {
+        self.notes.push(message.to_owned());
+    }
+}
+
+/// A plant as a stand needs it: of a baked plant it reads the height alone.
+fn unbaked(plant: Plant) -> BakedPlant {
+    let textures = CrossTextures { color: Vec::new(), properties: Vec::new() };
+    BakedPlant {
+        plant: Arc::new(plant),
+        ambient: Vec::new(),
+        shadow_proxy: Vec::new(),
+        cross: Cross { planes: Vec::new(), textures, transmission: Vec3::ZERO },
+    }
+}
+
+fn describe_ground(page: &mut Page, scene: &Scene, ground: &Terrain) {
+    let source = match &scene.terrain {
+        scene::Ground::File(file) => format!("the file {}", file.path.display()),
+        scene::Ground::Image(image) => format!("the picture {}", image.path.display()),
+        scene::Ground::Noise(noise) => format!("noise of seed {}", noise.seed),
+        scene::Ground::Flat(_) => "a plane".to_owned(),
+    };
+    page.row("terrain", source);
+    page.inset(|page| terrain::describe(page, ground));
+}
+
+fn describe_species(page: &mut Page, species: &Species, variants: &Range<u16>, individuals: &[BakedPlant]) {
+    let (low, high) = species.height;
+    page.row(
+        "species",
+        format!("{}: weight {}, {} to {} high", species.name, species.weight, length(low), length(high)),
+    );
+    page.inset(|page| {
+        let plants: Vec<&Plant> = variants
+            .clone()
+            .filter_map(|variant| individuals.get(usize::from(variant)))
+            .map(|baked| baked.plant.as_ref())
+            .collect();
+        match &species.plant {
+            PlantSource::Grown(grown) => {
+                let triangles = |kind: PartKind| {
+                    let counts = plants.iter().map(|plant| plant.triangle_count(kind));
+                    let (low, high) = counts.fold((usize::MAX, 0), |(low, high), n| (low.min(n), high.max(n)));
+                    match low.cmp(&high) {
+                        std::cmp::Ordering::Less => format!("{} to {}", grouped(low), grouped(high)),
+                        _ => grouped(high),
+                    }
+                };
+                page.row("individuals", format!("{} grown by rule, seed {} and on", plants.len(), grown.seed));
+                page.row(
+                    "triangles",
+                    format!("{} of wood, {} of foliage each", triangles(PartKind::Wood), triangles(PartKind::Foliage)),
+                );
+            }
+            PlantSource::Gltf(files) => {
+                for (file, plant) in files.files.iter().zip(plants) {
+                    page.row("individual", file.display());
+                    page.inset(|page| plant::describe(page, plant, &[]));
+                }
+            }
+        }
+    });
+}
+
+fn describe_trees(
+    page: &mut Page,
+    scene: &Scene,
+    variants: &[Range<u16>],
+    stand: &Stand,
+    notes: &[String],
+) -> Result<(), AppError> {
+    match &scene.trees {
+        Trees::None => {
+            page.row("trees", "none");
+            return Ok(());
+        }
+        Trees::Scattered(rules) => page.row(
+            "trees",
+            format!(
+                "{} scattered by {:?}: {} stems per hectare asked for, at least {} apart",
+                grouped(stand.trees.len()),
+                rules.sequence,
+                rules.stems_per_hectare,
+                length(rules.min_distance)
+            ),
+        ),
+        Trees::Inventory(file) => {
+            page.row("trees", format!("{} from the inventory {}", grouped(stand.trees.len()), file.path.display()));
+        }
+    }
+    page.inset(|page| {
+        for note in notes {
+            page.row("density", note);
+        }
+        for (species, variants) in scene.species.iter().zip(variants) {
+            let count = stand.trees.iter().filter(|tree| variants.contains(&tree.variant)).count();
+            page.row("of species", format!("{}: {}", species.name, grouped(count)));
+        }
+        if let Trees::Inventory(file) = &scene.trees {
+            let unit = |unit: scene::LengthUnit| match unit {
+                scene::LengthUnit::Metres => LengthUnit::Metre,
+                scene::LengthUnit::Centimetres => LengthUnit::Centimetre,
+                scene::LengthUnit::Millimetres => LengthUnit::Millimetre,
+            };
+            let options = InventoryOptions { dbh_unit: unit(file.dbh_unit), height_unit: unit(file.height_unit) };
+            inventory::describe(page, &read_inventory(&file.path, options)?);
+        }
+        Ok(())
+    })
+}
+
+fn describe_place(page: &mut Page, scene: &Scene, observer: &Observer) -> Result<(), AppError> {
+    page.row("place", place((observer.latitude_deg, observer.longitude_deg)));
+    let sun = SunPosition::at(scene.place.time.utc(), observer)?;
+    page.row(
+        "time",
+        format!(
+            "{}: the sun stands {:.1}° above the horizon, bearing {:.1}°",
+            scene.place.time,
+            sun.elevation.to_degrees(),
+            sun.azimuth.to_degrees()
+        ),
+    );
+    page.row("air", format!("visibility {}, moon {:?}", length(scene.place.visibility), scene.place.moon));
+    Ok(())
+}
+
+fn describe_camera(page: &mut Page, scene: &Scene) {
+    let (x, y, z) = scene.camera.start.position;
+    let start = &scene.camera.start;
+    page.row(
+        "camera",
+        format!(
+            "{x} m east, {y} m above the ground, {z} m south; bearing {}°, pitch {}°, field of view {}°",
+            start.yaw, start.pitch, scene.camera.field_of_view
+        ),
+    );
+    match scene::Path::new(&scene.camera.path) {
+        Some(path) => {
+            page.row("flight", format!("{} keys from {} s to {} s", scene.camera.path.len(), path.start(), path.end()))
+        }
+        None => page.row("flight", "none"),
+    }
+}
+
+fn describe_quality(page: &mut Page, scene: &Scene) {
+    let quality = &scene.quality;
+    page.row(
+        "quality",
+        format!(
+            "full models to {}, billboards from there to {}; {} cascades of {} texels to {}; {} samples a pixel",
+            length(quality.near_distance + quality.fade_band),
+            length(quality.view_distance),
+            quality.cascades,
+            quality.shadow_map_size,
+            length(quality.shadow_distance),
+            quality.msaa
+        ),
+    );
+}

@@ -1,0 +1,161 @@
+//! The shipped scenes, built, and what `canopy info` says of files.
+
+use std::path::{Path, PathBuf};
+
+use canopy::app::{AppError, info};
+
+use crate::support::{
+    glb::TreeFile,
+    stage::{Heard, built},
+};
+
+fn asset(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("assets").join(name)
+}
+
+#[track_caller]
+fn described(path: &Path) -> String {
+    match info(path) {
+        Ok(text) => text,
+        Err(error) => panic!("{error}"),
+    }
+}
+
+#[track_caller]
+fn assert_says(text: &str, says: &[&str]) {
+    for word in says {
+        assert!(text.contains(word), "no `{word}` in:\n{text}");
+    }
+}
+
+#[test]
+fn the_demo_is_wooded_like_a_forest() {
+    let mut heard = Heard::default();
+    let stage = built(&asset("scenes/demo.ron"), &mut heard);
+    assert_eq!(heard.warnings, Vec::<String>::new());
+    let trees = stage.stand.trees.len();
+    assert!(trees >= 300_000, "{trees} trees");
+    let extent = stage.terrain.extent();
+    assert!((5_500.0..7_000.0).contains(&extent.x) && (5_500.0..7_000.0).contains(&extent.y), "{extent}");
+    // Stems per hectare of the cells that lie on the terrain: at least 250 where trees stand, that is, in the cells
+    // that are neither meadow nor its rim.
+    let hectares = stage.stand.cell_size * stage.stand.cell_size * 1e-4;
+    let mut density: Vec<f64> = stage.stand.cells.iter().map(|cell| f64::from(cell.count) / hectares).collect();
+    density.sort_by(f64::total_cmp);
+    assert!(density[density.len() / 2] >= 250.0, "the median is {}", density[density.len() / 2]);
+    let noted = heard.notes.iter().find_map(|note| note.split_once(" stems per hectare"));
+    let noted: f64 = noted.and_then(|(number, _)| number.parse().ok()).expect("a note of the density");
+    assert!(noted >= 250.0, "{noted} stems per hectare of wooded ground");
+    // Trunks reach into the ground: no foot stands above it.
+    for tree in stage.stand.trees.iter().step_by(997) {
+        let foot = tree.position(stage.stand.cell_size);
+        let ground = stage.terrain.height(foot.x, foot.z);
+        assert!(foot.y <= ground + 0.02 && foot.y > ground - 3.0, "a foot at {foot}, the ground at {ground}");
+    }
+    assert!((36.0..37.0).contains(&stage.observer.latitude_deg), "{}", stage.observer.latitude_deg);
+    assert!((-85.0..-84.0).contains(&stage.observer.longitude_deg), "{}", stage.observer.longitude_deg);
+}
+
+#[test]
+fn the_inventory_stands_as_it_is_listed() {
+    let mut heard = Heard::default();
+    let stage = built(&asset("scenes/inventory.ron"), &mut heard);
+    assert_eq!(heard.warnings, Vec::<String>::new());
+    assert_eq!(stage.stand.trees.len(), 600);
+    let stand = stage.forest().expect("a forest");
+    assert_eq!(stand.plants.len(), 8);
+}
+
+#[test]
+fn info_says_what_the_shipped_files_hold() {
+    let demo = described(&asset("scenes/demo.ron"));
+    assert_says(
+        &demo,
+        &["Cumberland Mountains", "jacksboro_6km.tif", "broadleaf", "conifer", "stems per hectare", "36."],
+    );
+    let inventory = described(&asset("scenes/inventory.ron"));
+    assert_says(&inventory, &["600 from the inventory", "beech", "spruce", "Fagus sylvatica", "noise of seed 5"]);
+    let terrain = described(&asset("terrain/jacksboro_6km.tif"));
+    assert_says(&terrain, &["a terrain", "longitude and latitude", "no data", "° N", "° W", "m above the datum"]);
+    let table = described(&asset("inventories/mixed_stand.csv"));
+    assert_says(
+        &table,
+        &["600 trees", "dbh_cm: diameter at breast height in centimetres", "Picea abies", "per hectare"],
+    );
+    for species in ["species/broadleaf.ron", "species/conifer.ron"] {
+        assert_says(&described(&asset(species)), &["rules of a grown species", "height"]);
+    }
+}
+
+#[test]
+fn info_tells_what_would_be_ignored_and_why() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = |name: &str| folder.path().join(name);
+    let write = |name: &str, bytes: &[u8]| std::fs::write(path(name), bytes).expect("a temporary file");
+
+    write("tree.glb", &TreeFile::default().bytes());
+    assert_says(
+        &described(&path("tree.glb")),
+        &["336: 16 of wood, 320 of foliage", "high", "colour texture 64 x 64", "alpha test at 0.50"],
+    );
+    write("bald.glb", &TreeFile { leaves: false, ..TreeFile::default() }.bytes());
+    assert_says(&described(&path("bald.glb")), &["16: 16 of wood, 0 of foliage", "no foliage"]);
+
+    write("stand.csv", b"x,y,dbh,vigour\n1,2,30,good\n3,5,,poor\n");
+    assert_says(
+        &described(&path("stand.csv")),
+        &[
+            "2 trees",
+            "vigour: ignored",
+            "centimetres (assumed",
+            "of 1 of 2: 30.0 to 30.0 cm",
+            "height        not known",
+        ],
+    );
+
+    write(
+        "holes.asc",
+        b"ncols 3\nnrows 2\nxllcorner 10\nyllcorner 10\ncellsize 100\nNODATA_value -1\n5 -1 7\n8 9 11\n",
+    );
+    assert_says(&described(&path("holes.asc")), &["in 1 of 6 samples (16.67 %)", "3 x 2", "5.0 m to 11.0 m"]);
+
+    let heights = image::ImageBuffer::<image::Luma<u16>, _>::from_fn(4, 3, |x, y| image::Luma([(x * 1000 + y) as u16]));
+    heights.save(path("heights.png")).expect("a picture");
+    assert_says(
+        &described(&path("heights.png")),
+        &["4 x 3", "0 to 3002 of 65535", "says nothing about metres", "Image("],
+    );
+    image::RgbImage::new(4, 4).save(path("photo.png")).expect("a picture");
+    assert!(info(&path("photo.png")).is_err_and(|error| error.to_string().contains("16-bit greyscale")));
+
+    write("notes.txt", b"hello");
+    assert!(matches!(info(&path("notes.txt")), Err(AppError::UnknownKind { .. })));
+    write("broken.ron", b"(terrain: Flat(), place: (latitude: 95, longitude: 9))");
+    assert!(info(&path("broken.ron")).is_err_and(|error| error.to_string().contains("place.latitude")));
+    assert!(info(&path("absent.tif")).is_err_and(|error| error.to_string().contains("absent.tif")));
+}
+
+#[test]
+fn info_of_the_real_data() {
+    let Some(folder) = std::env::var_os("CANOPY_DATA").map(PathBuf::from) else {
+        println!("skipped: CANOPY_DATA is not set");
+        return;
+    };
+    for (file, says) in [
+        ("trees/oak-medium.glb", &["of wood", "of foliage", "colour texture"][..]),
+        ("trees/pine-medium.glb", &["of wood", "of foliage"]),
+        ("dem/jacksboro.tif", &["longitude and latitude", "° N"]),
+        ("dem/bci_50ha_elevation.asc", &["samples", "slopes"]),
+        ("stands/longleaf_pine.csv", &["trees", "extent"]),
+        ("stands/bci_50ha_trees.csv", &["trees", "species"]),
+    ] {
+        let path = folder.join(file);
+        if path.exists() {
+            let text = described(&path);
+            println!("{text}");
+            assert_says(&text, says);
+        } else {
+            println!("skipped: no {file}");
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! Whole pictures: against references, against each other, and that each depends on its arguments alone.
+
+use canopy::{
+    app::{Picture, Stage},
+    render::components::{CanopyOrigin, Forest},
+    scene::Viewpoint,
+};
+use glam::{DVec2, DVec3};
+
+use super::{DUSK, NIGHT, NOON, SIZE, draw, renderer, showing};
+use crate::support::{
+    glb::TreeFile,
+    gpu::gpu,
+    image::{SAME, compare, difference, keep, luminance, mean_color},
+    stage::{BROADLEAF, PLACE, build, grove, instant, project, quality, trees_at, view},
+};
+
+fn over_the_grove(stage: &Stage) -> Viewpoint {
+    view(stage, (-20.0, 7.0, 62.0), 14.0, -3.0)
+}
+
+#[track_caller]
+fn whole(picture: &Picture) -> f64 {
+    luminance(mean_color(picture, |_, _| true))
+}
+
+#[test]
+fn noon_dusk_and_night_look_like_their_references() {
+    let gpu = gpu();
+    let built = grove(4);
+    let view = over_the_grove(&built.stage);
+    let mut renderer = showing(&built.stage);
+    let [noon, dusk, night] = [NOON, DUSK, NIGHT].map(|at| draw(&mut renderer, &built.stage, &view, at));
+    for (picture, name) in [(&noon, "noon"), (&dusk, "dusk"), (&night, "night")] {
+        keep(picture, name);
+    }
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+
+    // A night is dark, blue, and still readable.
+    assert!(whole(&night) < 0.5 * whole(&noon), "night {} noon {}", whole(&night), whole(&noon));
+    assert!(whole(&night) > 0.002, "{}", whole(&night));
+    let [r, _, b] = mean_color(&night, |_, _| true);
+    assert!(b > 1.2 * r, "red {r} blue {b}");
+    // The rim of the sky is warm at dusk, not at noon.
+    let warmth = |picture: &Picture| {
+        let [r, _, b] = mean_color(picture, |_, row| row < SIZE.1 / 5);
+        r / b
+    };
+    assert!(warmth(&dusk) > 1.15 * warmth(&noon), "dusk {} noon {}", warmth(&dusk), warmth(&noon));
+    // A control: another hour is another picture.
+    assert!(difference(&dusk, &noon) > 4.0 * SAME, "{}", difference(&dusk, &noon));
+
+    for (picture, name) in [(&noon, "noon"), (&dusk, "dusk"), (&night, "night")] {
+        compare(picture, name, SAME);
+    }
+}
+
+#[test]
+fn an_inventory_looks_like_its_reference() {
+    let gpu = gpu();
+    let places: Vec<DVec2> =
+        (0..36).map(|i| DVec2::new(f64::from(i % 6) * 9.0 - 22.0, f64::from(i / 6) * -11.0 + 10.0)).collect();
+    let built = trees_at(&places, 1);
+    assert_eq!(built.stage.stand.trees.len(), 36);
+    let view = view(&built.stage, (-6.0, 9.0, 44.0), 8.0, -9.0);
+    let picture = draw(&mut showing(&built.stage), &built.stage, &view, NOON);
+    keep(&picture, "inventory");
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+    compare(&picture, "inventory", SAME);
+}
+
+#[test]
+fn a_gltf_tree_looks_like_its_reference() {
+    let gpu = gpu();
+    let quality = quality(1);
+    let built = build(
+        &format!(
+            "(seed: 3, terrain: Flat(size: 200), species: [(name: \"ball\", plant: Gltf(files: [\"ball.glb\"]), \
+             height: (7.9, 8.1))], trees: Inventory(path: \"trees.csv\"), {PLACE}, {quality})"
+        ),
+        &[("ball.glb", &TreeFile::default().bytes()), ("trees.csv", b"x,y\n-5,12\n5,5\n-9,-20\n9,-48\n0,-90\n")],
+    );
+    assert_eq!(built.warnings, Vec::<String>::new());
+    let view = view(&built.stage, (0.0, 3.0, 22.0), 0.0, 4.0);
+    let picture = draw(&mut showing(&built.stage), &built.stage, &view, NOON);
+    keep(&picture, "gltf_tree");
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+    compare(&picture, "gltf_tree", SAME);
+}
+
+#[test]
+fn a_scene_without_trees_looks_like_its_reference() {
+    let gpu = gpu();
+    let quality = quality(4);
+    let built = build(
+        &format!(
+            "(terrain: Noise(size: 200, amplitude: 9, wavelength: 90, base: 300, seed: 3), species: [{BROADLEAF}], \
+             trees: Scattered(elevation: (5000, 6000)), {PLACE}, {quality})"
+        ),
+        &[],
+    );
+    assert!(built.stage.forest().is_none());
+    assert!(built.warnings.iter().any(|warning| warning.contains("no place for any tree")), "{:?}", built.warnings);
+    let picture = draw(&mut showing(&built.stage), &built.stage, &over_the_grove(&built.stage), NOON);
+    keep(&picture, "zero_trees");
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+    compare(&picture, "zero_trees", SAME);
+}
+
+#[test]
+fn crowns_are_lit_and_the_ground_below_them_is_dark() {
+    let _gpu = gpu();
+    let places: Vec<DVec2> =
+        (0..25).map(|i| DVec2::new(f64::from(i % 5) * 5.0 - 10.0, f64::from(i / 5) * 5.0 - 10.0)).collect();
+    let built = trees_at(&places, 4);
+    let stage = &built.stage;
+    // From the south, where the noon sun stands, at the southern rim of the stand.
+    let from = view(stage, (0.0, 5.0, 34.0), 0.0, 0.0);
+    let picture = draw(&mut showing(stage), stage, &from, NOON);
+    keep(&picture, "crowns");
+    let around = |point: DVec3, reach: f64| {
+        let at = project(&from, SIZE, point).expect("before the camera");
+        luminance(mean_color(&picture, |column, row| {
+            (DVec2::new(f64::from(column), f64::from(row)) - at).abs().max_element() <= reach
+        }))
+    };
+    let crown = around(DVec3::new(0.0, 8.5, 10.0), 6.0);
+    let inside = around(DVec3::new(2.5, 1.2, 5.0), 3.0);
+    let meadow = around(DVec3::new(0.0, 0.0, 22.0), 3.0);
+    assert!(crown > 1.5 * inside, "crown {crown}, inside {inside}");
+    assert!(meadow > 1.5 * inside, "meadow {meadow}, inside {inside}");
+}
+
+#[test]
+fn a_picture_depends_on_its_arguments_alone() {
+    let _gpu = gpu();
+    let built = grove(4);
+    let stage = &built.stage;
+    let here = over_the_grove(stage);
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let bytes = |picture: &Picture, name: &str| {
+        let path = folder.path().join(name);
+        picture.save(&path, &[("Software", "test".to_owned())]).expect("a picture on disk");
+        std::fs::read(path).expect("the picture")
+    };
+    let fresh = draw(&mut showing(stage), stage, &here, DUSK);
+    let twice = draw(&mut showing(stage), stage, &here, DUSK);
+    assert_eq!(bytes(&fresh, "a.png"), bytes(&twice, "b.png"), "two renderers differ");
+
+    let mut travelled = showing(stage);
+    draw(&mut travelled, stage, &view(stage, (30.0, 2.0, -40.0), 200.0, 5.0), NOON);
+    draw(&mut travelled, stage, &view(stage, (4000.0, 90.0, 900.0), 100.0, -20.0), NIGHT);
+    let after = draw(&mut travelled, stage, &here, DUSK);
+    assert!(after == fresh, "the frames before show: mean FLIP {}", difference(&after, &fresh));
+    let still = super::again(&mut travelled);
+    assert!(still == fresh, "a resting picture changes: mean FLIP {}", difference(&still, &fresh));
+}
+
+/// A picture of the grove's trees alone, with the whole scene moved by `offset` metres.
+fn moved(stage: &Stage, offset: DVec3) -> Picture {
+    let mut renderer = renderer(4);
+    let mut view = over_the_grove(stage);
+    view.position += offset;
+    renderer.set_instant(stage, instant(NOON));
+    renderer.set_view(&view);
+    let forest = Forest { origin: offset, ..stage.forest().expect("a forest") };
+    let world = renderer.app().world_mut();
+    world.spawn(forest);
+    world.insert_resource(stage.shadow());
+    assert!((world.resource::<CanopyOrigin>().0 - view.position).length() < 2048.0, "the origin follows the camera");
+    super::again(&mut renderer)
+}
+
+#[test]
+fn a_million_metres_out_nothing_jitters() {
+    let _gpu = gpu();
+    let built = grove(4);
+    let (near, far) = (moved(&built.stage, DVec3::ZERO), moved(&built.stage, DVec3::new(1.0e6, 0.0, -1.0e6)));
+    keep(&far, "million");
+    // What differs are the shadow maps' texels, which lie on a grid of their own.
+    assert!(difference(&far, &near) < 0.01, "mean FLIP {}", difference(&far, &near));
+    let sky = [200, 200, 200];
+    assert!(near.pixels.chunks(3).any(|pixel| pixel[1] < sky[1] / 2), "no tree is in the picture");
+}
+
+#[test]
+fn nothing_flickers_as_the_sun_sets() {
+    let gpu = gpu();
+    let built = grove(1);
+    let stage = &built.stage;
+    let view = over_the_grove(stage);
+    let mut renderer = showing(stage);
+    let mut before: Option<(f64, f64)> = None;
+    // From 3 degrees above the horizon to 8 below it: the key light changes from the sun to the moon.
+    for minute in (0..96).step_by(4) {
+        let at = format!("2026-06-21T{:02}:{:02}+01:00", 20 + minute / 60, minute % 60);
+        let picture = draw(&mut renderer, stage, &view, &at);
+        let light = whole(&picture);
+        let black = picture.pixels.chunks(3).filter(|pixel| *pixel == [0, 0, 0]).count() as f64
+            / f64::from(picture.width * picture.height);
+        assert!(light > 0.002, "{at}: mean luminance {light}");
+        assert!(black < 0.02, "{at}: {black} of the picture is black");
+        if let Some((light_before, _)) = before {
+            let step = light / light_before;
+            assert!((0.75..1.33).contains(&step), "{at}: {step} times as light as four minutes before");
+        }
+        before = Some((light, black));
+    }
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}

@@ -1,0 +1,125 @@
+//! The sun's shadow: that it is there, where it must be, whatever was drawn before.
+
+use std::sync::{Arc, OnceLock};
+
+use canopy::{
+    app::{Picture, Renderer, Stage},
+    light::{Atmosphere, AtmosphereParams, LightSettings, LightState, SunPosition},
+    render::components::{Daylight, Forest, SunShadowSettings},
+    scene::Viewpoint,
+};
+use glam::{DVec2, DVec3};
+
+use super::{NOON, SIZE, again, draw, renderer, showing};
+use crate::support::{
+    gpu::gpu,
+    image::{difference, keep, linear, luminance, mean_color},
+    stage::{grove, project, trees_at, view},
+};
+
+/// The light of a sun at this bearing and elevation, degrees.
+fn daylight(azimuth: f64, elevation: f64) -> Daylight {
+    static AIR: OnceLock<Atmosphere> = OnceLock::new();
+    let air = AIR.get_or_init(|| Atmosphere::new(AtmosphereParams::with_visibility_km(60.0)).expect("the air"));
+    let sun = SunPosition::from_degrees(azimuth, elevation).expect("a sun");
+    Daylight(Arc::new(LightState::new(air, sun, None, &LightSettings::default()).expect("its light")))
+}
+
+/// Straight down from 70 m over the middle.
+fn from_above(stage: &Stage) -> Viewpoint {
+    view(stage, (0.0, 70.0, 0.0), 0.0, -90.0)
+}
+
+#[track_caller]
+fn lit(renderer: &mut Renderer, view: &Viewpoint, light: Daylight, shadow: SunShadowSettings) -> Picture {
+    renderer.set_view(view);
+    renderer.app().world_mut().insert_resource(light);
+    renderer.app().world_mut().insert_resource(shadow);
+    again(renderer)
+}
+
+fn settings(cascades: usize) -> SunShadowSettings {
+    SunShadowSettings { map_size: 1024, cascades, finest_radius: 100.0, distance: 100.0, proxy_distance: 0.0 }
+}
+
+#[track_caller]
+fn patch(picture: &Picture, view: &Viewpoint, point: DVec3) -> f64 {
+    let at = project(view, SIZE, point).expect("before the camera");
+    luminance(mean_color(picture, |column, row| {
+        (DVec2::new(f64::from(column), f64::from(row)) + 0.5 - at).abs().max_element() <= 2.5
+    }))
+}
+
+#[test]
+fn a_tree_shades_the_ground_behind_it_and_no_other() {
+    let gpu = gpu();
+    let built = trees_at(&[DVec2::ZERO], 1);
+    let from = from_above(&built.stage);
+    let mut renderer = showing(&built.stage);
+    for (proxy_distance, name) in [(0.0, "cross"), (50.0, "model")] {
+        let light = daylight(180.0, 35.0);
+        let without = lit(&mut renderer, &from, light.clone(), settings(0));
+        let with = lit(&mut renderer, &from, light, SunShadowSettings { proxy_distance, ..settings(1) });
+        keep(&with, &format!("shadow-{name}"));
+        let share = |point: DVec3| patch(&with, &from, point) / patch(&without, &from, point);
+        // The crown's middle, seven metres up, falls ten metres north of the foot.
+        let (shade, south, east) =
+            (share(DVec3::new(0.0, 0.0, -10.0)), share(DVec3::new(0.0, 0.0, 12.0)), share(DVec3::new(14.0, 0.0, -2.0)));
+        assert!(shade < 0.75, "{name}: {shade} of the light is left in the shadow");
+        assert!((south - 1.0).abs() < 0.03 && (east - 1.0).abs() < 0.03, "{name}: {south} and {east} beside it");
+    }
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+#[test]
+fn the_shadow_of_a_cross_keeps_its_area_whatever_the_suns_bearing() {
+    let _gpu = gpu();
+    let built = trees_at(&[DVec2::ZERO], 1);
+    let from = from_above(&built.stage);
+    let mut renderer = renderer(1);
+    // A tree that casts and is not seen: nothing hides its shadow.
+    let unseen = Forest { view_distance: -1.0, ..built.stage.forest().expect("a forest") };
+    renderer.app().world_mut().spawn(unseen);
+    renderer.app().world_mut().spawn(canopy::render::components::Ground { cover: None, ..built.stage.ground() });
+    for elevation in [30.0, 55.0] {
+        let areas: Vec<f64> = (0..12)
+            .map(|step| {
+                let light = daylight(f64::from(step) * 30.0 + 7.0, elevation);
+                let without = lit(&mut renderer, &from, light.clone(), settings(0));
+                let with = lit(&mut renderer, &from, light, settings(1));
+                keep(&with, &format!("shadow-area-{elevation}-{step}"));
+                let lost = |(with, without): (&[u8], &[u8])| {
+                    1.0 - (luminance(linear(with)) / luminance(linear(without)).max(1e-6)).min(1.0)
+                };
+                with.pixels.chunks(3).zip(without.pixels.chunks(3)).map(lost).sum()
+            })
+            .collect();
+        let (low, high) = areas.iter().fold((f64::MAX, 0f64), |(low, high), &area| (low.min(area), high.max(area)));
+        assert!(low > 50.0, "at {elevation} degrees there is hardly a shadow: {areas:?}");
+        assert!(high / low < 1.1, "at {elevation} degrees the shadow's area varies by {}: {areas:?}", high / low);
+    }
+}
+
+#[test]
+fn a_kept_shadow_is_the_one_that_would_be_drawn() {
+    let _gpu = gpu();
+    let built = grove(4);
+    let stage = &built.stage;
+    let here = view(stage, (10.0, 4.0, 30.0), 350.0, -6.0);
+    let aside = Viewpoint { position: here.position + DVec3::new(0.05, 0.02, -0.04), ..here };
+    let mut kept = showing(stage);
+    draw(&mut kept, stage, &here, NOON);
+    let ran = |lines: &[String]| {
+        let cascades: Vec<_> = lines.iter().filter(|line| line.contains("sun_shadow cascade")).cloned().collect();
+        assert_eq!(cascades.len(), 2, "{lines:?}");
+        cascades.iter().filter(|line| line.contains(": ran")).count()
+    };
+    assert_eq!(ran(&kept.explain()), 2);
+    let picture = draw(&mut kept, stage, &aside, NOON);
+    assert_eq!(ran(&kept.explain()), 0, "{:?}", kept.explain());
+    let fresh = draw(&mut showing(stage), stage, &aside, NOON);
+    assert!(picture == fresh, "mean FLIP {}", difference(&picture, &fresh));
+    // A sun that moved is seen.
+    draw(&mut kept, stage, &aside, "2026-06-21T12:40+01:00");
+    assert_eq!(ran(&kept.explain()), 2, "{:?}", kept.explain());
+}

@@ -1,0 +1,212 @@
+//! Canopy in a Bevy world: beside ordinary meshes, with entities that come and go, and what it refuses.
+
+use std::sync::Arc;
+
+use bevy::{
+    asset::RenderAssetUsages,
+    camera::RenderTarget,
+    core_pipeline::prepass::MotionVectorPrepass,
+    prelude::*,
+    render::{RenderApp, render_resource::TextureFormat, view::Msaa},
+};
+use canopy::{
+    app::{Picture, Renderer, Stage},
+    render::{
+        components::{CanopyCamera, CastsCanopyShadow, Forest, SunShadowSettings},
+        forest::GpuForests,
+    },
+    scene::Viewpoint,
+};
+use glam::{DVec2, DVec3};
+
+use super::{NOON, SIZE, again, draw, showing};
+use crate::support::{
+    gpu::gpu,
+    image::{keep, luminance, mean_color},
+    stage::{Built, PLACE, build, grove, instant, project, quality, trees_at, view},
+};
+
+/// A red cube, `size` metres wide.
+fn cube(renderer: &mut Renderer, size: f32, place: DVec3) -> Entity {
+    let world = renderer.app().world_mut();
+    let mesh = world.resource_mut::<Assets<Mesh>>().add(Cuboid::new(size, size, size));
+    let red = StandardMaterial { base_color: Color::srgb(1.0, 0.0, 0.0), unlit: true, ..StandardMaterial::default() };
+    let material = world.resource_mut::<Assets<StandardMaterial>>().add(red);
+    world.spawn((Mesh3d(mesh), MeshMaterial3d(material), Transform::from_translation(place.as_vec3()))).id()
+}
+
+/// Pixels that are red as nothing in a forest is.
+fn red(picture: &Picture) -> usize {
+    let is_red = |pixel: &&[u8]| f32::from(pixel[0]) > 2.0 * f32::from(pixel[1].max(pixel[2])) && pixel[0] > 60;
+    picture.pixels.chunks(3).filter(is_red).count()
+}
+
+fn forests(renderer: &mut Renderer) -> Vec<Entity> {
+    let world = renderer.app().world_mut();
+    world.query_filtered::<Entity, With<Forest>>().iter(world).collect()
+}
+
+fn despawn_forests(renderer: &mut Renderer) {
+    for forest in forests(renderer) {
+        renderer.app().world_mut().despawn(forest);
+    }
+}
+
+/// Draws what is there twice: what was spawned is on the device in the second frame.
+#[track_caller]
+fn settled(renderer: &mut Renderer, stage: &Stage, view: &Viewpoint) -> Picture {
+    renderer.set_instant(stage, instant(NOON));
+    renderer.set_view(view);
+    again(renderer);
+    again(renderer)
+}
+
+#[test]
+fn meshes_and_trees_hide_each_other() {
+    let gpu = gpu();
+    let built = trees_at(&[DVec2::ZERO], 1);
+    let stage = &built.stage;
+    // Once with the tree as a full model, once as a cross.
+    for distance in [18.0, 70.0] {
+        let from = view(stage, (0.0, 6.0, distance), 0.0, 0.0);
+        let mut renderer = showing(stage);
+        let behind = cube(&mut renderer, 4.0, DVec3::new(0.0, 7.0, -6.0));
+        let hidden = settled(&mut renderer, stage, &from);
+        keep(&hidden, &format!("cube-behind-{distance}"));
+        renderer.app().world_mut().despawn(behind);
+        let before = cube(&mut renderer, 2.0, DVec3::new(0.0, 7.0, 8.0));
+        let whole = settled(&mut renderer, stage, &from);
+        keep(&whole, &format!("cube-before-{distance}"));
+
+        despawn_forests(&mut renderer);
+        let without = settled(&mut renderer, stage, &from);
+        assert_eq!(red(&whole), red(&without), "at {distance} m a tree covers a cube that stands before it");
+        renderer.app().world_mut().despawn(before);
+        cube(&mut renderer, 4.0, DVec3::new(0.0, 7.0, -6.0));
+        let free = settled(&mut renderer, stage, &from);
+        assert!(red(&free) > 100 && red(&without) > 20, "{} and {} red pixels", red(&free), red(&without));
+        assert!(
+            red(&hidden) * 2 < red(&free),
+            "at {distance} m {} of {} pixels of a cube are seen through a tree",
+            red(&hidden),
+            red(&free)
+        );
+    }
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+fn bare() -> Built {
+    let quality = quality(1);
+    build(&format!("(terrain: Flat(size: 200), {PLACE}, {quality})"), &[])
+}
+
+#[test]
+fn a_mesh_casts_its_shadow_onto_the_ground() {
+    let gpu = gpu();
+    let built = bare();
+    let stage = &built.stage;
+    let from = view(stage, (0.0, 40.0, 30.0), 0.0, -50.0);
+    let mut renderer = showing(stage);
+    renderer.app().world_mut().insert_resource(SunShadowSettings {
+        map_size: 1024,
+        cascades: 1,
+        distance: 80.0,
+        ..Default::default()
+    });
+    let cube = cube(&mut renderer, 4.0, DVec3::new(0.0, 12.0, 0.0));
+    let without = settled(&mut renderer, stage, &from);
+    renderer.app().world_mut().entity_mut(cube).insert(CastsCanopyShadow);
+    let with = settled(&mut renderer, stage, &from);
+    keep(&with, "cube-shadow");
+    let sun = renderer.app().world().resource::<canopy::render::components::Daylight>().0.key_direction.as_dvec3();
+    let spot = DVec3::new(0.0, 12.0, 0.0) - sun * (12.0 / sun.y);
+    let share = |point: DVec3| {
+        let at = project(&from, SIZE, point).expect("before the camera");
+        let mean = |picture: &Picture| {
+            luminance(mean_color(picture, |column, row| {
+                (DVec2::new(f64::from(column), f64::from(row)) + 0.5 - at).abs().max_element() <= 1.5
+            }))
+        };
+        mean(&with) / mean(&without)
+    };
+    assert!(share(spot) < 0.6, "{} of the light is left in the shadow", share(spot));
+    let beside = share(spot + DVec3::new(7.0, 0.0, 0.0));
+    assert!((beside - 1.0).abs() < 0.02, "{beside} beside it");
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+#[test]
+fn a_forest_that_is_despawned_frees_what_it_held() {
+    let gpu = gpu();
+    let built = grove(1);
+    let stage = &built.stage;
+    let from = view(stage, (0.0, 10.0, 60.0), 0.0, -5.0);
+    let mut renderer = showing(stage);
+    let second = Forest { origin: DVec3::new(0.0, 30.0, 0.0), ..stage.forest().expect("a forest") };
+    renderer.app().world_mut().spawn(second);
+    settled(&mut renderer, stage, &from);
+    let on_device =
+        |renderer: &mut Renderer| renderer.app().sub_app(RenderApp).world().resource::<GpuForests>().iter().count();
+    assert_eq!(on_device(&mut renderer), 2, "several forests in one world");
+    assert!(Arc::strong_count(&stage.stand) > 1 && Arc::strong_count(&stage.plants) > 1);
+    despawn_forests(&mut renderer);
+    settled(&mut renderer, stage, &from);
+    assert_eq!(on_device(&mut renderer), 0);
+    assert_eq!((Arc::strong_count(&stage.stand), Arc::strong_count(&stage.plants)), (1, 1));
+    let grounds: Vec<Entity> = {
+        let world = renderer.app().world_mut();
+        world.query_filtered::<Entity, With<canopy::render::components::Ground>>().iter(world).collect()
+    };
+    for ground in grounds {
+        renderer.app().world_mut().despawn(ground);
+    }
+    settled(&mut renderer, stage, &from);
+    assert_eq!(Arc::strong_count(&stage.terrain), 1, "the ground is held after it was despawned");
+    assert_eq!(stage.cover.as_ref().map(Arc::strong_count), Some(1), "the cover is held");
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+#[test]
+fn a_second_camera_is_refused() {
+    let gpu = gpu();
+    let built = grove(4);
+    let stage = &built.stage;
+    let from = view(stage, (0.0, 10.0, 60.0), 0.0, -5.0);
+    let mut renderer = showing(stage);
+    let alone = draw(&mut renderer, stage, &from, NOON);
+    let world = renderer.app().world_mut();
+    let target = Image::new_target_texture(64, 64, TextureFormat::Rgba8UnormSrgb, None);
+    let target =
+        world.resource_mut::<Assets<Image>>().add(Image { asset_usage: RenderAssetUsages::RENDER_WORLD, ..target });
+    world.spawn((
+        Camera3d::default(),
+        Camera { order: 1, ..Camera::default() },
+        RenderTarget::from(target),
+        CanopyCamera,
+        Msaa::Off,
+        Transform::from_xyz(3.0, 320.0, 5.0),
+    ));
+    let beside = settled(&mut renderer, stage, &from);
+    let told = gpu.messages();
+    assert!(told.iter().any(|message| message.contains("2 cameras have a CanopyCamera")), "{told:?}");
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(beside == alone, "the first camera's picture changed");
+}
+
+#[test]
+fn motion_vectors_are_refused() {
+    let gpu = gpu();
+    let built = grove(1);
+    let stage = &built.stage;
+    let from = view(stage, (0.0, 10.0, 60.0), 0.0, -5.0);
+    let mut renderer = showing(stage);
+    draw(&mut renderer, stage, &from, NOON);
+    let world = renderer.app().world_mut();
+    let camera = world.query_filtered::<Entity, With<CanopyCamera>>().iter(world).next().expect("a camera");
+    world.entity_mut(camera).insert(MotionVectorPrepass);
+    let picture = settled(&mut renderer, stage, &from);
+    let told = gpu.messages();
+    assert!(told.iter().any(|message| message.contains("motion vectors") && message.contains("Use MSAA")), "{told:?}");
+    let first = &picture.pixels[..3];
+    assert!(picture.pixels.chunks(3).all(|pixel| pixel == first), "something was drawn");
+}

@@ -1,0 +1,305 @@
+//! Every shader in every variant through naga, and every GPU struct against its Rust twin. Needs no graphics device.
+
+use std::{
+    collections::{BTreeMap, BTreeSet, HashMap},
+    mem::offset_of,
+    path::Path,
+};
+
+use canopy::{
+    light::atmosphere::SkyView,
+    render::{
+        forest::{ForestViewUniform, PartUniform, PlaneUniform, PlantVertex, VariantUniform},
+        frame::uniforms::{CascadeUniform, FrameUniform, LightUniform, MAX_CASCADES, NOISE_PERIOD, ShadowUniform},
+        shaders::SOURCES,
+        sun_shadow::CascadeViewUniform,
+        terrain::{GpuTile, GpuTileVertex},
+    },
+    scatter::PackedTree,
+    terrain::tiles::TILE_QUADS,
+};
+use naga::{
+    Module, ScalarKind, ShaderStage, TypeInner,
+    proc::Layouter,
+    valid::{Capabilities, ValidationFlags, Validator},
+};
+use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
+
+/// All that the pipelines switch on or off.
+const DEFINES: [&str; 2] = ["FOLIAGE", "ALPHA_TO_COVERAGE"];
+
+/// All combinations of [`DEFINES`].
+fn variants() -> impl Iterator<Item = Vec<&'static str>> {
+    (0..1u32 << DEFINES.len())
+        .map(|bits| DEFINES.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, define)| *define).collect())
+}
+
+fn is_library(source: &str) -> bool {
+    source.contains("#define_import_path")
+}
+
+/// The shader at `path` with `defines`, composed as Bevy does it.
+fn compose(path: &str, source: &str, defines: &[&str]) -> Result<Module, String> {
+    let defs: HashMap<String, ShaderDefValue> =
+        defines.iter().map(|define| ((*define).to_owned(), ShaderDefValue::Bool(true))).collect();
+    let mut composer = Composer::default();
+    for &(library, source) in SOURCES.iter().filter(|(_, source)| is_library(source)) {
+        let added = composer.add_composable_module(ComposableModuleDescriptor {
+            source,
+            file_path: library,
+            shader_defs: defs.clone(),
+            ..Default::default()
+        });
+        let added = added.map(|_| ());
+        added.map_err(|error| format!("{library} {defines:?}: {}", error.emit_to_string(&composer)))?;
+    }
+    composer
+        .make_naga_module(NagaModuleDescriptor { source, file_path: path, shader_defs: defs, ..Default::default() })
+        .map_err(|error| format!("{path} {defines:?}: {}", error.emit_to_string(&composer)))
+}
+
+/// Every shader with entry points in every variant.
+fn modules() -> Vec<(String, Module)> {
+    let mut modules = Vec::new();
+    for &(path, source) in SOURCES.iter().filter(|(_, source)| !is_library(source)) {
+        for defines in variants() {
+            match compose(path, source, &defines) {
+                Ok(module) => modules.push((format!("{path} {defines:?}"), module)),
+                Err(message) => panic!("{message}"),
+            }
+        }
+    }
+    modules
+}
+
+#[test]
+fn every_shader_is_valid_in_every_variant() {
+    let modules = modules();
+    assert!(modules.len() >= 4 * 7, "{} modules are fewer than there are passes", modules.len());
+    for (name, module) in modules {
+        // No capability beyond the core: what every device has.
+        let checked = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module);
+        if let Err(error) = checked {
+            panic!("{name}: {}", error.into_inner());
+        }
+        let stages: BTreeSet<_> = module.entry_points.iter().map(|entry| (entry.name.as_str(), entry.stage)).collect();
+        let drawn = stages.contains(&("vertex", ShaderStage::Vertex));
+        let computed = stages.iter().any(|(_, stage)| *stage == ShaderStage::Compute);
+        assert!(drawn || computed, "{name} has no entry point that a pipeline uses: {stages:?}");
+    }
+}
+
+#[test]
+fn the_table_of_sources_is_the_folder_of_shaders() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
+    let on_disk: BTreeSet<String> = crate::support::program::listing(&folder)
+        .into_iter()
+        .filter(|path| path.extension().is_some_and(|extension| extension == "wgsl"))
+        .filter_map(|path| path.strip_prefix(&folder).ok().map(|path| path.display().to_string()))
+        .collect();
+    let embedded: BTreeSet<String> = SOURCES.iter().map(|(path, _)| (*path).to_owned()).collect();
+    assert_eq!(embedded, on_disk);
+    for (path, source) in SOURCES {
+        for line in source.lines().filter_map(|line| line.trim().strip_prefix("#if")) {
+            let name = line.trim_start_matches("def").trim_start_matches("ndef").trim();
+            assert!(
+                DEFINES.contains(&name),
+                "{path} depends on `{name}`, which no test switches on: add it to DEFINES"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_broken_shader_is_found() {
+    let broken = "@vertex fn vertex() -> @builtin(position) vec4<f32> { return vec3(0.0); }";
+    assert!(compose("broken.wgsl", broken, &[]).is_err());
+}
+
+/// Size of a struct, and offset and size of each of its members, in bytes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Layout {
+    size: u32,
+    members: Vec<(String, u32, u32)>,
+}
+
+/// The name that a type has in its own file.
+fn own_name(name: &str) -> &str {
+    name.split("X_naga_oil_mod_X").next().unwrap_or(name)
+}
+
+/// All structs of all shaders by name, with where they were found. A name that two shaders use differently is in it
+/// twice.
+fn layouts() -> BTreeMap<String, Vec<(String, Layout)>> {
+    let mut found: BTreeMap<String, Vec<(String, Layout)>> = BTreeMap::new();
+    for (place, module) in modules() {
+        let mut layouter = Layouter::default();
+        if let Err(error) = layouter.update(module.to_ctx()) {
+            panic!("{place}: {error}");
+        }
+        for (_, kind) in module.types.iter() {
+            let (Some(name), TypeInner::Struct { members, span }) = (&kind.name, &kind.inner) else { continue };
+            let members =
+                members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset, layouter[m.ty].size)).collect();
+            let layout = Layout { size: *span, members };
+            let known = found.entry(own_name(name).to_owned()).or_default();
+            if known.iter().all(|(_, other)| *other != layout) {
+                known.push((place.clone(), layout));
+            }
+        }
+    }
+    found
+}
+
+/// Compares the WGSL struct `$wgsl` with the Rust struct `$rust`, member by member.
+macro_rules! twin {
+    ($layouts:expr, $wgsl:literal, $rust:ty { $($member:ident),+ $(,)? }) => {{
+        let known = $layouts.get($wgsl).map_or(&[][..], Vec::as_slice);
+        assert_eq!(known.len(), 1, "{}: no struct of that name, or several: {known:?}", $wgsl);
+        let ours = Layout {
+            size: size_of::<$rust>() as u32,
+            members: vec![$((
+                stringify!($member).to_owned(),
+                offset_of!($rust, $member) as u32,
+                member_size(|twin: &$rust| size_of_val(&twin.$member)) as u32,
+            )),+],
+        };
+        assert_eq!(ours, known[0].1, "{} and {}", stringify!($rust), $wgsl);
+    }};
+}
+
+/// Size of a member of a zeroed twin.
+fn member_size<T: bytemuck::Zeroable>(size: impl Fn(&T) -> usize) -> usize {
+    size(&T::zeroed())
+}
+
+#[test]
+fn gpu_structs_are_what_the_shaders_think() {
+    let layouts = layouts();
+    twin!(layouts, "Frame", FrameUniform { clip_from_relative, relative_from_clip, camera, viewport, flags });
+    twin!(
+        layouts,
+        "Light",
+        LightUniform {
+            key_direction,
+            key_illuminance,
+            sun_direction,
+            sun_radiance,
+            moon_direction,
+            moon_radiance,
+            sky,
+            fog,
+            sky_frame,
+            night,
+            star_frame,
+            stars,
+        }
+    );
+    twin!(layouts, "Cascade", CascadeUniform { map_from_relative, size });
+    twin!(layouts, "Shadow", ShadowUniform { cascades, count, ground });
+    twin!(layouts, "CascadeView", CascadeViewUniform { clip_from_anchor, direction });
+    twin!(
+        layouts,
+        "ForestView",
+        ForestViewUniform { anchor_cell, anchor_offset, anchor_y, cell_size, fade_start, fade_end }
+    );
+    twin!(layouts, "Plane", PlaneUniform { center, u, v, normal });
+    twin!(layouts, "Variant", VariantUniform { planes, size, transmission });
+    twin!(layouts, "Part", PartUniform { base_color, transmission });
+    twin!(layouts, "Tree", PackedTree { xz, y, cell, look });
+    twin!(layouts, "Tile", GpuTile { origin, spacing, first, morph_start, morph_end, clearance, level });
+    twin!(layouts, "TileVertex", GpuTileVertex { height, parent_height, normal, parent_normal });
+    assert_eq!(size_of::<PackedTree>(), 16, "a tree costs at most 16 bytes");
+}
+
+#[test]
+fn every_bound_struct_has_its_twin_tested() {
+    // Structs that no buffer holds, or (MeshPlace) that are one matrix.
+    let twins = [
+        "Frame",
+        "Light",
+        "Shadow",
+        "CascadeView",
+        "ForestView",
+        "Variant",
+        "Part",
+        "Tree",
+        "Tile",
+        "TileVertex",
+        "MeshPlace",
+    ];
+    for (place, module) in modules() {
+        for (_, variable) in module.global_variables.iter().filter(|(_, variable)| variable.binding.is_some()) {
+            let mut kind = &module.types[variable.ty];
+            while let TypeInner::Array { base, .. } = kind.inner {
+                kind = &module.types[base];
+            }
+            if let (Some(name), TypeInner::Struct { .. }) = (&kind.name, &kind.inner) {
+                assert!(twins.contains(&own_name(name)), "{place}: `{name}` is bound, but no test knows its twin");
+            }
+        }
+    }
+}
+
+#[test]
+fn plant_vertices_are_what_the_shaders_read() {
+    let layout = PlantVertex::layout();
+    assert_eq!(layout.array_stride, size_of::<PlantVertex>() as u64);
+    let mut inputs = 0;
+    for (place, module) in modules() {
+        if !place.starts_with("forest/model.wgsl") && !place.starts_with("sun_shadow/model.wgsl") {
+            continue;
+        }
+        let vertex =
+            module.entry_points.iter().find(|entry| entry.stage == ShaderStage::Vertex).expect("a vertex stage");
+        let mut members = Vec::new();
+        for argument in &vertex.function.arguments {
+            match (&argument.binding, &module.types[argument.ty].inner) {
+                (Some(binding), _) => members.push((binding.clone(), argument.ty)),
+                (None, TypeInner::Struct { members: inner, .. }) => {
+                    members.extend(inner.iter().filter_map(|m| m.binding.clone().map(|binding| (binding, m.ty))));
+                }
+                _ => {}
+            }
+        }
+        for (binding, kind) in members {
+            let naga::Binding::Location { location, .. } = binding else { continue };
+            let attribute = layout.attributes.iter().find(|attribute| attribute.shader_location == location);
+            let attribute = attribute.unwrap_or_else(|| panic!("{place}: no attribute {location}"));
+            let components = match module.types[kind].inner {
+                TypeInner::Vector { size, scalar } if scalar.kind == ScalarKind::Float => size as u32,
+                _ => panic!("{place}: attribute {location} is no vector of floats"),
+            };
+            let wanted = match attribute.format {
+                bevy::render::render_resource::VertexFormat::Float32x3 => 3,
+                bevy::render::render_resource::VertexFormat::Snorm8x4 => 4,
+                bevy::render::render_resource::VertexFormat::Float16x2 => 2,
+                other => panic!("{other:?}: say here how many components it has"),
+            };
+            assert_eq!(components, wanted, "{place}: attribute {location}");
+            inputs += 1;
+        }
+    }
+    assert!(inputs > 0);
+}
+
+/// Numbers of `const NAME: TYPE = ...;` in the shader at `path`.
+fn constant(path: &str, name: &str) -> Vec<f64> {
+    let source = SOURCES.iter().find(|(known, _)| *known == path).unwrap_or_else(|| panic!("no shader {path}")).1;
+    let start = format!("const {name}:");
+    let line = source.lines().find(|line| line.starts_with(&start)).unwrap_or_else(|| panic!("{path}: no `{start}`"));
+    let value = line.split_once('=').map_or("", |(_, value)| value);
+    let value = value.split_once('(').map_or(value, |(_, inner)| inner);
+    value.split(|c: char| !(c.is_ascii_digit() || ".-e".contains(c))).filter_map(|word| word.parse().ok()).collect()
+}
+
+#[test]
+fn constants_that_stand_twice_agree() {
+    assert_eq!(constant("common/sky.wgsl", "SKY_SIZE"), [SkyView::WIDTH as f64, SkyView::HEIGHT as f64]);
+    assert_eq!(constant("common/sky.wgsl", "HORIZON_ROW"), [SkyView::HORIZON_ROW as f64]);
+    assert_eq!(constant("common/frame.wgsl", "NOISE_PERIOD"), [NOISE_PERIOD]);
+    assert_eq!(constant("terrain/terrain.wgsl", "SIDE"), [(TILE_QUADS + 1) as f64]);
+    let frame = SOURCES.iter().find(|(path, _)| *path == "common/frame.wgsl").expect("frame.wgsl").1;
+    assert!(frame.contains(&format!("array<Cascade, {MAX_CASCADES}>")));
+    assert!(NOISE_PERIOD.log2().fract() == 0.0, "not a power of two: the noise would have a seam");
+}
