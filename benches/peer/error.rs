@@ -25,7 +25,7 @@ use super::{
 /// Pixels per degree of the usual observer: 0.7 m before a screen of 3840 pixels over 0.7 m.
 const PIXELS_PER_DEGREE: f32 = 67.0;
 /// Frames of the camera's way that are compared.
-const FRAMES: [usize; 3] = [0, 7, 14];
+const FRAMES: [usize; 2] = [0, 7];
 
 /// The table's head.
 pub const HEADING: &str = "\
@@ -45,7 +45,7 @@ pub fn compare(field: &Field, out: Option<&Path>) -> anyhow::Result<String> {
     let (mut ours, mut ours_full) = (Ours::new(field)?, Ours::new(&full)?);
     let (mut stock, mut stock_full) = (Stock::new(field)?, Stock::new(&full)?);
     let mut rows = Vec::new();
-    for frame in 0..=FRAMES[2] {
+    for frame in 0..=FRAMES[1] {
         let view = field.view(frame);
         let draw = |side: &mut Ours| {
             side.light(&sky);

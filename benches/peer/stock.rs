@@ -117,10 +117,7 @@ impl Stock {
             .world_mut()
             .spawn((
                 Camera3d::default(),
-                Camera {
-                    clear_color: ClearColorConfig::Custom(Color::srgb(0.62, 0.75, 0.9)),
-                    ..Camera::default()
-                },
+                Camera { clear_color: ClearColorConfig::Custom(Color::srgb(0.62, 0.75, 0.9)), ..Camera::default() },
                 RenderTarget::from(target.clone()),
                 Msaa::Off,
                 Tonemapping::TonyMcMapface,
@@ -286,10 +283,7 @@ fn levels(app: &mut App, field: &Field) -> Vec<Level> {
         let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(cross_mesh(&field.plant.cross));
         let atlas = atlas(&field.plant.cross.textures.color);
         let texture = add_texture(app, &atlas, ImageAddressMode::ClampToEdge);
-        let material = add_material(app, foliage(StandardMaterial {
-            base_color_texture: Some(texture),
-            ..matt()
-        }));
+        let material = add_material(app, foliage(StandardMaterial { base_color_texture: Some(texture), ..matt() }));
         levels.push(Level { mesh, material, range: Some(far) });
     }
     levels
@@ -316,8 +310,7 @@ fn part_material(app: &mut App, kind: PartKind, material: &PlantMaterial) -> Han
         };
         add_texture(app, &chain, ImageAddressMode::Repeat)
     });
-    let plain =
-        StandardMaterial { base_color: linear(material.base_color), base_color_texture: texture, ..matt() };
+    let plain = StandardMaterial { base_color: linear(material.base_color), base_color_texture: texture, ..matt() };
     let whole = match kind {
         PartKind::Foliage => foliage(plain),
         PartKind::Wood => StandardMaterial { cull_mode: Some(Face::Back), ..plain },

@@ -13,7 +13,7 @@ const ORIGIN_STEP: f64 = 1024.0;
 /// Metres to the near plane.
 const NEAR: f32 = 0.1;
 /// From the camera's exposed radiance to what a screen shows.
-pub const TONEMAPPING: Tonemapping = Tonemapping::TonyMcMapface;
+pub const TONEMAPPING: Tonemapping = Tonemapping::BlenderFilmic;
 
 /// The origin of the Bevy world near the camera, and the camera's transform relative to it.
 pub fn place(view: &Viewpoint) -> (CanopyOrigin, Transform) {

@@ -6,7 +6,6 @@ use bevy::{
     app::{App, PluginGroup, PluginsState},
     asset::{Assets, Handle, RenderAssetUsages},
     camera::{Camera, Camera3d, RenderTarget},
-    core_pipeline::tonemapping::Tonemapping,
     ecs::entity::Entity,
     image::Image,
     log::{Level, LogPlugin},
@@ -142,7 +141,7 @@ impl Renderer {
                 RenderTarget::from(target.clone()),
                 CanopyCamera,
                 Msaa::from_samples(msaa),
-                Tonemapping::BlenderFilmic,
+                camera::TONEMAPPING,
             ))
             .id();
         Ok(Self { app, camera, target, size, warm: false })

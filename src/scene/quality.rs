@@ -22,7 +22,8 @@ pub struct Quality {
     pub fade_band: f64,
     /// Samples per pixel, 1 or 4. 4: smooth leaf edges, slower. Default 4.
     pub msaa: u32,
-    /// Height of a cross plane's texture in texels, 32 to 2048. Higher: sharper far trees, memory. Default 256.
+    /// Edge of a cross plane's picture in texels, 64 to 1024, rounded up to a power of two. Higher: sharper far trees, memory.
+    /// Default 256.
     pub cross_resolution: u32,
     /// Distance in metres beyond which no tree is drawn, 100 to 200000. Default 20000.
     pub view_distance: f64,
@@ -62,7 +63,7 @@ impl Quality {
         if self.msaa != 1 && self.msaa != 4 {
             check.problem("quality.msaa", format!("is {}", self.msaa), "write 1 (off) or 4");
         }
-        check.count("quality.cross_resolution", self.cross_resolution, 32..=2048);
+        check.count("quality.cross_resolution", self.cross_resolution, 64..=1024);
         check.number("quality.view_distance", self.view_distance, 100.0..=200_000.0, "m");
         check.number("quality.terrain_error", self.terrain_error, 0.25..=32.0, "pixels");
     }

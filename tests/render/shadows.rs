@@ -25,9 +25,9 @@ fn daylight(azimuth: f64, elevation: f64) -> Daylight {
     Daylight(Arc::new(LightState::new(air, sun, None, &LightSettings::default()).expect("its light")))
 }
 
-/// Straight down from 70 m over the middle.
+/// Straight down from 45 m over the middle: 75 m by 42 m of ground.
 fn from_above(stage: &Stage) -> Viewpoint {
-    view(stage, (0.0, 70.0, 0.0), 0.0, -90.0)
+    view(stage, (0.0, 45.0, 0.0), 0.0, -90.0)
 }
 
 #[track_caller]

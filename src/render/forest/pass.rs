@@ -29,8 +29,9 @@ pub fn forest_pass(
     cache: Res<PipelineCache>,
     mut ctx: RenderContext,
 ) {
+    let frame = frame.of(view.entity());
     let (target, depth, _) = view.into_inner();
-    let (Some(frame), Some([wood, foliage, crosses])) = (&frame.0, pipelines.current) else { return };
+    let (Some(frame), Some([wood, foliage, crosses])) = (frame, pipelines.current) else { return };
     let something = forests.iter().any(|(entity, _)| {
         prepared.get(entity).is_some_and(|forest| forest.lists.model_count() + forest.lists.cross_count() > 0)
     });

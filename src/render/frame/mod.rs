@@ -95,9 +95,16 @@ pub struct PreparedFrame {
     pub view: Option<PreparedView>,
 }
 
-/// Group 0 of this frame; `None` while a part of it is missing.
+/// Group 0 of this frame and the view that it belongs to; nothing while a part of it is missing.
 #[derive(Resource, Default)]
-pub struct FrameBindGroup(pub Option<BindGroup>);
+pub struct FrameBindGroup(Option<(Entity, BindGroup)>);
+
+impl FrameBindGroup {
+    /// Group 0 for the view `entity`; `None` for every view but the one that Canopy draws.
+    pub fn of(&self, entity: Entity) -> Option<&BindGroup> {
+        self.0.as_ref().filter(|(view, _)| *view == entity).map(|(_, group)| group)
+    }
+}
 
 #[derive(Resource)]
 struct FrameBuffers {
@@ -249,7 +256,7 @@ fn prepare_bind_group(
     queue.write_buffer(&buffers.frame, 0, bytemuck::bytes_of(&frame_uniform));
     queue.write_buffer(&buffers.light, 0, bytemuck::bytes_of(&light_uniform));
     queue.write_buffer(&buffers.shadow, 0, bytemuck::bytes_of(&shadow_uniform));
-    group.0 = Some(device.create_bind_group(
+    let made = device.create_bind_group(
         "canopy_frame",
         &pipelines.get_bind_group_layout(&layout.0),
         &BindGroupEntries::sequential((
@@ -262,5 +269,6 @@ fn prepare_bind_group(
             &buffers.shadow_sampler,
             &ground.view,
         )),
-    ));
+    );
+    group.0 = Some((view.entity, made));
 }

@@ -175,9 +175,10 @@ fn sky_pass(
     cache: Res<PipelineCache>,
     mut ctx: RenderContext,
 ) {
+    let frame = frame.of(view.entity());
     let (target, depth, _) = view.into_inner();
     let (Some(frame), Some(pipeline)) =
-        (&frame.0, pipelines.current.and_then(|id| cache.get_render_pipeline(id)))
+        (frame, pipelines.current.and_then(|id| cache.get_render_pipeline(id)))
     else {
         return;
     };

@@ -103,7 +103,7 @@ impl MeshCasters {
         )
     }
 
-    /// Draws all casters; group 0 is the cascade.
+    /// Draws all casters; group 0 is the cascade. `false` while one of them is not ready yet.
     pub fn draw<'a>(
         &'a self,
         pass: &mut TrackedRenderPass<'a>,
@@ -111,13 +111,15 @@ impl MeshCasters {
         meshes: &'a RenderAssets<RenderMesh>,
         allocator: &'a MeshAllocator,
         cache: &'a PipelineCache,
-    ) {
+    ) -> bool {
+        let mut complete = true;
         for (index, caster) in self.casters.iter().enumerate() {
             let (Some(mesh), Some(vertices), Some(pipeline)) = (
                 meshes.get(caster.mesh),
                 allocator.mesh_vertex_slice(&caster.mesh),
                 cache.get_render_pipeline(caster.pipeline),
             ) else {
+                complete = false;
                 continue;
             };
             pass.set_render_pipeline(pipeline);
@@ -133,6 +135,7 @@ impl MeshCasters {
                 RenderMeshBufferInfo::NonIndexed => pass.draw(vertices.range.clone(), 0..1),
             }
         }
+        complete
     }
 }
 

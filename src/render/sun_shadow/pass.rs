@@ -89,13 +89,13 @@ pub fn sun_shadow_pass(
                 pass.draw(range.start * VERTICES_A_CROSS..range.end * VERTICES_A_CROSS, 0..1);
             }
         }
-        if let Some(group) = &mesh_group {
-            casters.draw(&mut pass, group, &meshes, &allocator, &cache);
-        }
+        let complete = mesh_group
+            .as_ref()
+            .is_none_or(|group| casters.draw(&mut pass, group, &meshes, &allocator, &cache));
         span.end(&mut pass);
         drop(pass);
         if let Some(drawn) = maps.drawn.get_mut(work.index) {
-            *drawn = Some(work.key);
+            *drawn = complete.then_some(work.key);
         }
     }
 }

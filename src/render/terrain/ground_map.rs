@@ -55,8 +55,7 @@ struct Shown {
 
 impl FromWorld for GroundMap {
     fn from_world(world: &mut World) -> Self {
-        let (texture, view) = create(world.resource::<RenderDevice>(), (1, 1));
-        Self { view, mean_cover: 0.0, texture, size: (1, 1), extent: DVec2::ONE, shows: None }
+        Self::empty(world.resource::<RenderDevice>(), world.resource::<RenderQueue>())
     }
 }
 
@@ -76,6 +75,14 @@ fn create(device: &RenderDevice, size: (u32, u32)) -> (Texture, TextureView) {
 }
 
 impl GroundMap {
+    /// The map without a ground: nothing hides the light, and no crowns cover anything.
+    fn empty(device: &RenderDevice, queue: &RenderQueue) -> Self {
+        let (texture, view) = create(device, (1, 1));
+        let texel = [f16::from_f32(-6.0e4), f16::ZERO];
+        gpu::write_level(queue, &texture, 0, 0, 1, 1, 4, bytemuck::cast_slice(&[texel]));
+        Self { view, mean_cover: 0.0, texture, size: (1, 1), extent: DVec2::ONE, shows: None }
+    }
+
     /// Camera-relative origin and inverse size of the map, for a camera at `camera` (scene metres).
     pub fn placement(&self, camera: DVec3) -> [f32; 4] {
         let origin = -0.5 * self.extent - DVec2::new(camera.x, camera.z);
@@ -91,7 +98,14 @@ pub fn prepare_ground_map(
     report: Res<FrameReport>,
     mut map: ResMut<GroundMap>,
 ) {
-    let (Some((_, ground)), Some(daylight)) = (&scene.ground, &scene.daylight) else { return };
+    let Some((_, ground)) = &scene.ground else {
+        // A ground that was despawned is let go, its shadow with it.
+        if map.shows.is_some() {
+            *map = GroundMap::empty(&device, &queue);
+        }
+        return;
+    };
+    let Some(daylight) = &scene.daylight else { return };
     let light = daylight.0.key_direction;
     let same_ground = map.shows.as_ref().is_some_and(|shown| {
         Arc::ptr_eq(&shown.terrain, &ground.terrain)

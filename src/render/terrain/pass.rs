@@ -22,9 +22,10 @@ pub fn terrain_pass(
     cache: Res<PipelineCache>,
     mut ctx: RenderContext,
 ) {
+    let frame = frame.of(view.entity());
     let (target, depth, _) = view.into_inner();
     let (Some(frame), Some(tiles), Some(pipeline)) = (
-        &frame.0,
+        frame,
         &terrain.bind_group,
         pipelines.current.and_then(|id| cache.get_render_pipeline(id)),
     ) else {

@@ -1,0 +1,187 @@
+//! Question: what does a user wait for between `canopy render` and the picture on disk?
+//!
+//! The steps of the program on the demo scene, timed one by one in a process of their own for each turn, so that
+//! nothing is warm but what is warm for a user too: the files in the page cache, the baked plants, the driver's shader
+//! cache. The first turn warms these and is not reported.
+//!
+//! What a first frame costs beyond a second one of another view and hour (new shadow maps, new terrain tiles, a new
+//! sky) is what only ever happens once: pipelines, and the upload of plants and trees.
+//!
+//! Run `cargo bench --bench startup -- --help` for the arguments; benches/README.md has results.
+
+use std::{path::PathBuf, process::Command, time::Instant};
+
+use anyhow::{Context, ensure};
+use canopy::{
+    app::{Renderer, Stage},
+    scene::{Pictures, Progress, RenderOptions, RenderPlan, Scene, Still, View, Viewpoint},
+};
+use chrono::TimeDelta;
+use clap::Parser;
+
+/// The time to the first picture, by its steps.
+#[derive(Parser, Debug)]
+#[command(name = "startup")]
+struct Arguments {
+    /// The scene.
+    #[arg(long, default_value = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/scenes/demo.ron"))]
+    scene: PathBuf,
+    /// Picture size in pixels.
+    #[arg(long, default_value = "1280x720", value_parser = parse_size)]
+    size: (u32, u32),
+    /// Reported turns.
+    #[arg(long, default_value_t = 3)]
+    turns: usize,
+    /// The other picture's shift, metres.
+    #[arg(long, default_value_t = 700.0)]
+    shift: f64,
+    /// One turn in this process: what the other processes of a run are.
+    #[arg(long, hide = true)]
+    turn: bool,
+    /// Cargo says so to every benchmark; nothing depends on it.
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
+fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let pair = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    pair.filter(|&(w, h): &(u32, u32)| w > 0 && h > 0).ok_or_else(|| format!("`{text}` is not like 1280x720"))
+}
+
+fn main() -> anyhow::Result<()> {
+    let arguments = Arguments::parse();
+    if arguments.turn {
+        return turn(&arguments);
+    }
+    let mut turns = Vec::new();
+    for warm in (0..=arguments.turns).map(|index| index > 0) {
+        let started = Instant::now();
+        let output = Command::new(std::env::current_exe()?).args(std::env::args_os().skip(1)).arg("--turn").output()?;
+        let whole = started.elapsed().as_secs_f64();
+        let text = String::from_utf8(output.stdout)?;
+        ensure!(output.status.success(), "a turn failed: {}", String::from_utf8_lossy(&output.stderr));
+        let mut steps = text.lines().map(parse_step).collect::<anyhow::Result<Vec<_>>>()?;
+        // What comes after the picture is not what a user waits for, so the process is charged up to there.
+        let after = steps.iter().filter(|(name, _)| name.starts_with(AFTER)).map(|(_, time)| time).sum::<f64>();
+        let inside: f64 = steps.iter().filter(|(name, _)| !name.starts_with(AFTER)).map(|(_, time)| time).sum();
+        steps.insert(0, ("process: loading the program, and its end".to_owned(), (whole - after - inside).max(0.0)));
+        if warm {
+            turns.push(steps);
+        }
+    }
+    print_table(&turns);
+    Ok(())
+}
+
+/// Steps that come after the picture is on disk.
+const AFTER: &str = "(after)";
+const FIRST_FRAME: &str = "first frame, with uploads and pipelines";
+const SECOND_FRAME: &str = "(after) a frame of another place and hour";
+
+fn parse_step(line: &str) -> anyhow::Result<(String, f64)> {
+    let (seconds, name) = line.split_once('\t').context("a turn printed something else than its steps")?;
+    Ok((name.to_owned(), seconds.parse()?))
+}
+
+/// Takes the time of the steps that a stage's notes do not tell apart.
+struct Steps {
+    last: Instant,
+    open: Option<String>,
+}
+
+impl Steps {
+    fn done(&mut self, name: &str) {
+        println!("{:.6}\t{name}", self.last.elapsed().as_secs_f64());
+        self.last = Instant::now();
+    }
+}
+
+impl Progress for Steps {
+    fn begin(&mut self, what: &str, _steps: u64) {
+        self.done("loading: scene file and the rest");
+        self.open = Some(what.to_owned());
+    }
+
+    fn advance(&mut self, _steps: u64) {}
+
+    fn end(&mut self) {
+        if let Some(what) = self.open.take() {
+            self.done(&format!("loading: {}", what.to_lowercase()));
+        }
+    }
+
+    fn warn(&mut self, _message: &str) {}
+
+    fn note(&mut self, _message: &str) {}
+}
+
+fn turn(arguments: &Arguments) -> anyhow::Result<()> {
+    let folder = tempfile::tempdir()?;
+    let mut steps = Steps { last: Instant::now(), open: None };
+    let stage = Stage::build(&arguments.scene, None, &mut steps)?;
+    steps.done("loading: scene file and the rest");
+    let mut renderer = Renderer::new(arguments.size, None, stage.scene.quality.msaa)?;
+    steps.done("Bevy and the device");
+    renderer.show(&stage);
+    let view = first_view(arguments, &stage.scene, &stage)?;
+    let instant = stage.scene.place.time.utc();
+    renderer.set_instant(&stage, instant);
+    renderer.set_view(&view);
+    renderer.update()?;
+    steps.done(FIRST_FRAME);
+    let picture = renderer.read()?;
+    steps.done("reading the picture back");
+    picture.save(&folder.path().join("picture.png"), &[])?;
+    steps.done("writing the PNG");
+    let elsewhere = Viewpoint { position: view.position - arguments.shift * view.forward().with_y(0.0), ..view };
+    renderer.set_instant(&stage, instant + TimeDelta::minutes(90));
+    renderer.set_view(&elsewhere);
+    renderer.update()?;
+    steps.done(SECOND_FRAME);
+    Ok(())
+}
+
+fn first_view(arguments: &Arguments, scene: &Scene, stage: &Stage) -> anyhow::Result<Viewpoint> {
+    let options = RenderOptions {
+        scene: arguments.scene.clone(),
+        pictures: Pictures::Stills(vec![Still { out: "picture.png".into(), at: None }]),
+        view: View::Scene,
+        size: arguments.size,
+        seed: None,
+        adapter: None,
+        quiet: true,
+        explain: false,
+    };
+    let plan = RenderPlan::new(&options, scene, &|x, z| stage.terrain.height(x, z))?;
+    Ok(plan.frames.first().context("the scene has no picture")?.view)
+}
+
+fn print_table(turns: &[Vec<(String, f64)>]) {
+    let mut names: Vec<&str> = Vec::new();
+    for (name, _) in turns.iter().flatten() {
+        if !names.contains(&name.as_str()) {
+            names.push(name);
+        }
+    }
+    let median_of = |name: &str| {
+        let mut times: Vec<f64> = turns
+            .iter()
+            .map(|steps| steps.iter().filter(|(step, _)| step == name).map(|(_, time)| time).sum())
+            .collect();
+        times.sort_by(f64::total_cmp);
+        times.get(times.len() / 2).copied().unwrap_or(f64::NAN)
+    };
+    let whole: f64 = names.iter().filter(|name| !name.starts_with(AFTER)).map(|name| median_of(name)).sum();
+    println!("| step | seconds, median of {} | share |\n|---|--:|--:|", turns.len());
+    for name in &names {
+        let time = median_of(name);
+        if name.starts_with(AFTER) {
+            println!("| {name} | {time:.2} | - |");
+        } else {
+            println!("| {name} | {time:.2} | {:.0} % |", 100.0 * time / whole);
+        }
+    }
+    println!("| **to the picture on disk** | **{whole:.2}** | |");
+    let once = median_of(FIRST_FRAME) - median_of(SECOND_FRAME);
+    println!("\nOf the first frame, {once:.2} s happen only once: pipelines, and the upload of plants and trees.");
+}
