@@ -78,8 +78,8 @@ struct Arguments {
     /// Runs one side alone, for a profiler; no ratios then.
     #[arg(long)]
     only: Option<Side>,
-    /// Trees of the stand whose pictures are compared with full models; 0 for none. Stock Bevy takes a minute a frame
-    /// for 1,000 full models and their shadow.
+    /// Trees of the stand whose pictures are compared with full models; 0 for none. Full models and their shadows are
+    /// slow without a GPU: choose fewer there.
     #[arg(long, default_value_t = 1_000)]
     error_trees: u32,
     /// Cargo says so to every benchmark; nothing depends on it.

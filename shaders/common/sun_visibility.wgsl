@@ -16,11 +16,13 @@ fn terrain_visibility(map: vec2<f32>, height_above_ground: f32) -> f32 {
     return smoothstep(-6.0, 6.0, height_above_ground + 0.5 - map.x);
 }
 
-fn cascade_visibility(index: i32, relative: vec3<f32>, normal: vec3<f32>) -> f32 {
+// `bias` is 1 for solid surfaces; less where the position is known to lie off the caster.
+fn cascade_visibility(index: i32, relative: vec3<f32>, normal: vec3<f32>, bias: f32) -> f32 {
     let texel = shadow.cascades[index].size.x;
     let slope = 1.0 - abs(dot(normal, light.key_direction.xyz));
     // Offset along the normal by the reach of the filter, and along the ray by one texel.
-    let position = relative + normal * (texel * (0.6 + 1.6 * slope)) + light.key_direction.xyz * (texel * 1.2);
+    let offset = normal * (0.6 + 1.6 * slope) + light.key_direction.xyz * 1.2;
+    let position = relative + offset * (texel * bias);
     let map = shadow.cascades[index].map_from_relative * vec4(position, 1.0);
     let uv = map.xy * vec2(0.5, -0.5) + 0.5;
     let step = shadow.count.y;
@@ -34,19 +36,19 @@ fn cascade_visibility(index: i32, relative: vec3<f32>, normal: vec3<f32>) -> f32
 }
 
 // x: visibility from the cascades, y: weight of that knowledge (0 beyond the last cascade).
-fn cascaded_visibility(relative: vec3<f32>, normal: vec3<f32>) -> vec2<f32> {
+fn cascaded_visibility(relative: vec3<f32>, normal: vec3<f32>, bias: f32) -> vec2<f32> {
     let count = i32(shadow.count.x);
     let distance = length(relative);
     for (var i = 0; i < count; i += 1) {
         let radius = shadow.cascades[i].size.y;
         if distance < radius {
-            let near = cascade_visibility(i, relative, normal);
+            let near = cascade_visibility(i, relative, normal, bias);
             let blend = smoothstep(0.85 * radius, radius, distance);
             if blend <= 0.0 {
                 return vec2(near, 1.0);
             }
             if i + 1 < count {
-                return vec2(mix(near, cascade_visibility(i + 1, relative, normal), blend), 1.0);
+                return vec2(mix(near, cascade_visibility(i + 1, relative, normal, bias), blend), 1.0);
             }
             return vec2(near, 1.0 - blend);
         }

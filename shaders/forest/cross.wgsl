@@ -105,8 +105,10 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         // The picture stands for a round crown: what faces the light lies before the plane that casts the shadow, what
         // turns away from it behind.
         let bulge = normal * (0.55 * in.crown.w * foliage);
-        let near = cascaded_visibility(in.relative + bulge, normal);
-        visibility *= mix(1.0, near.x, near.y);
+        let near = cascaded_visibility(in.relative + bulge, normal, 0.25);
+        // Beyond the maps, the crown's own shadow: its far side lies behind all of its leaves.
+        let own = mix(1.0, smoothstep(-0.55, 0.35, dot(normal, light.key_direction.xyz)), foliage);
+        visibility *= mix(own, near.x, near.y);
     }
     visibility *= mix(1.0, leaf_visibility(properties.b), foliage);
     var color = shade(surface, visibility);

@@ -114,7 +114,7 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
     surface.ambient = scattered(in.look.x) * stand_ambient(in.look.z, map.y);
     var visibility = terrain_visibility(map, in.look.y);
     if visibility > 0.0 {
-        let near = cascaded_visibility(in.relative, normal);
+        let near = cascaded_visibility(in.relative, normal, 1.0);
         visibility *= mix(1.0, near.x, near.y);
     }
 #ifdef FOLIAGE

@@ -26,13 +26,12 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     let plane = variants[tree.variant].planes[plane_index];
     var u = turn(plane.u.xyz, tree.yaw);
     let v = turn(plane.v.xyz, tree.yaw);
-    var center = turn(plane.center.xyz, tree.yaw);
+    let center = turn(plane.center.xyz, tree.yaw);
     if upright {
-        // Face the light's azimuth about the trunk's axis.
+        // Face the light's azimuth about the crown's axis, so that both pictures shade the same place.
         let across = cascade.direction.zx * vec2(1.0, -1.0);
         let axis = across / max(length(across), 1e-6);
         u = vec3(axis.x, 0.0, axis.y) * length(plane.u.xyz);
-        center = vec3(0.0, center.y, 0.0);
     }
     var out: Varying;
     out.clip = clamp_caster(tree.position + (center + corner.x * u + corner.y * v) * tree.scale);

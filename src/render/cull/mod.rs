@@ -45,6 +45,12 @@ impl Frustum {
         self.planes.iter().all(|plane| plane.xyz().dot(middle) + plane.w + plane.xyz().abs().dot(half) >= 0.0)
     }
 
+    /// Whether a camera-relative sphere that is swept from `start` to `end` may be seen.
+    pub fn sees_swept_sphere(&self, start: Vec3, end: Vec3, radius: f32) -> bool {
+        let above = |plane: &Vec4, point: Vec3| plane.xyz().dot(point) + plane.w;
+        self.planes.iter().all(|plane| above(plane, start).max(above(plane, end)) >= -radius)
+    }
+
     /// Whether the camera-relative sphere may be seen.
     pub fn sees_sphere(&self, center: Vec3, radius: f32) -> bool {
         self.planes.iter().all(|plane| plane.xyz().dot(center) + plane.w >= -radius)
@@ -165,21 +171,50 @@ pub fn cull_view(
     DrawLists::assemble(models, crosses)
 }
 
+/// What a view can see of shadows: a caster counts only if the volume that it shades can be seen.
+#[derive(Clone, Debug)]
+pub struct SeenShadows<'a> {
+    /// The camera in scene metres.
+    pub camera: DVec3,
+    /// Its frustum, relative to it.
+    pub frustum: &'a Frustum,
+    /// Lowest ground in scene metres: a shadow goes no farther down.
+    pub lowest: f64,
+}
+
+impl SeenShadows<'_> {
+    /// Whether the shadow of a caster in the sphere (scene metres) may be seen, for a light in `direction` (unit).
+    fn includes(&self, center: DVec3, radius: f64, direction: DVec3) -> bool {
+        let drop = (center.y + radius - self.lowest).max(0.0);
+        let length = drop / direction.y.max(0.02);
+        let start = (center - self.camera).as_vec3();
+        let end = (center - direction * length - self.camera).as_vec3();
+        self.frustum.sees_swept_sphere(start, end, radius as f32)
+    }
+}
+
 /// Casters of one cascade, whose box lies in scene metres; `origin` is the stand's own origin there.
 ///
-/// Trees within `proxy_distance` metres of the box's centre cast as proxies, the others as billboards.
+/// Trees within `proxy_distance` metres of the box's centre cast as proxies, the others as billboards. With `seen`,
+/// casters whose shadow no pixel of the view can show are left out.
 pub fn cull_cascade(
     stand: &PackedStand,
     sizes: &[VariantSize],
     origin: DVec3,
     cascade: &CascadeBox,
     proxy_distance: f64,
+    seen: Option<&SeenShadows>,
 ) -> DrawLists {
     let mut models = vec![Vec::new(); sizes.len()];
     let mut crosses = Vec::new();
     let center = cascade.center - origin;
+    let reach = cascade.reach();
+    let casts = |min: DVec3, max: DVec3| {
+        let (middle, radius) = (0.5 * (min + max), 0.5 * (max - min).length());
+        reach.includes(min, max) && seen.is_none_or(|seen| seen.includes(middle, radius, cascade.direction))
+    };
     for cell in &stand.cells {
-        if !cascade.is_reached_from(cell.min + origin, cell.max + origin) {
+        if !casts(cell.min + origin, cell.max + origin) {
             continue;
         }
         for tree in cell.first..cell.first + cell.count {
@@ -190,7 +225,7 @@ pub fn cull_cascade(
             let foot = packed.position(stand.cell_size);
             let (radius, height) = (f64::from(size.radius) * scale, f64::from(size.height) * scale);
             let (min, max) = (foot - DVec3::new(radius, 0.0, radius), foot + DVec3::new(radius, height, radius));
-            if !cascade.is_reached_from(min + origin, max + origin) {
+            if !casts(min + origin, max + origin) {
                 continue;
             }
             let offset = foot - center;

@@ -95,7 +95,7 @@ pub fn sun_shadow_pass(
         span.end(&mut pass);
         drop(pass);
         if let Some(drawn) = maps.drawn.get_mut(work.index) {
-            *drawn = complete.then_some(work.key);
+            *drawn = complete.then_some(work.content);
         }
     }
 }

@@ -21,7 +21,7 @@ use bevy::{
     shader::ShaderDefVal,
 };
 use bytemuck::{Pod, Zeroable};
-use glam::DVec3;
+use glam::{DVec2, DVec3, Mat4};
 
 use super::{
     cascades::{CascadeBox, cascade_radii},
@@ -31,7 +31,7 @@ use crate::{
     plant::PartKind,
     render::{
         components::SunShadowSettings,
-        cull::{DrawLists, cull_cascade},
+        cull::{DrawLists, SeenShadows, cull_cascade},
         extract::ExtractedScene,
         forest::{ForestLayouts, GpuForests, PlantVertex, forest_view, instance_bind_group},
         frame::{
@@ -89,6 +89,14 @@ pub struct CascadeKey {
     meshes: u64,
 }
 
+/// What a layer shows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DrawnCascade {
+    key: CascadeKey,
+    /// Camera and view that the casters were chosen for; `None` if all of them are there.
+    seen_by: Option<(DVec3, Mat4)>,
+}
+
 /// What is drawn into one cascade of one forest.
 pub struct CascadeForest {
     /// Which forest.
@@ -104,7 +112,7 @@ pub struct CascadeWork {
     /// Which layer.
     pub index: usize,
     /// What the map will show.
-    pub key: CascadeKey,
+    pub content: DrawnCascade,
     /// Casters.
     pub forests: Vec<CascadeForest>,
 }
@@ -124,7 +132,7 @@ pub struct ShadowMaps {
     /// Cascades of this frame, finest first.
     pub cascades: Vec<CascadeBox>,
     /// What each layer shows.
-    pub drawn: Vec<Option<CascadeKey>>,
+    pub drawn: Vec<Option<DrawnCascade>>,
     /// Cascades to draw in this frame.
     pub work: Vec<CascadeWork>,
     /// Group 0 of the casters.
@@ -261,23 +269,32 @@ pub fn prepare_shadows(
             meshes: meshes.state(),
         };
         let name = format!("sun_shadow cascade {index}");
-        if maps.drawn[index].as_ref() == Some(&key) {
+        let this_view = (view.camera, view.clip_from_relative);
+        let known = maps.drawn[index].as_ref().filter(|drawn| drawn.key == key);
+        if known.is_some_and(|drawn| drawn.seen_by.is_none_or(|seen_by| seen_by == this_view)) {
             report.skipped(name, "light, box and casters rest");
             continue;
         }
+        // A new map is drawn for this view only: while the light moves, it will not live to see another. If it does, it
+        // is completed once and kept. What this view shows is the same either way.
+        let lowest = lowest_receiver(&scene, view.camera, place.radius);
+        let seen = known.is_none().then(|| SeenShadows { camera: view.camera, frustum: &view.frustum, lowest });
+        let content = DrawnCascade { key, seen_by: seen.as_ref().map(|_| this_view) };
         let uniform = CascadeViewUniform {
             clip_from_anchor: place.clip_from_anchor().to_cols_array_2d(),
             direction: place.direction.as_vec3().extend(0.0).to_array(),
         };
         queue.write_buffer(&maps.cascade_uniforms, index as u64 * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));
-        let mut work = CascadeWork { index, key, forests: Vec::new() };
+        let mut work = CascadeWork { index, content, forests: Vec::new() };
         for (entity, forest) in forests.iter() {
             let lists = cull_cascade(
                 &forest.forest.stand,
                 &forest.sizes,
                 forest.forest.origin,
                 &place,
-                settings.proxy_distance,
+                // Where the finest map serves; a coarser one could not show the difference.
+                if index == 0 { settings.proxy_distance } else { 0.0 },
+                seen.as_ref(),
             );
             let buffers = maps.casters.entry(entity).or_insert_with(|| CasterBuffers {
                 uniform: gpu::uniform_slots(&device, "canopy_caster_views", MAX_CASCADES as u64),
@@ -310,6 +327,15 @@ pub fn prepare_shadows(
             size: std::num::NonZeroU64::new(size_of::<CascadeViewUniform>() as u64),
         })),
     ));
+}
+
+/// Height in scene metres below which nothing within `radius` metres of the camera can be in shadow.
+fn lowest_receiver(scene: &ExtractedScene, camera: DVec3, radius: f64) -> f64 {
+    let middle = DVec2::new(camera.x, camera.z);
+    let ground = scene.ground.as_ref().map(|(_, ground)| {
+        f64::from(ground.terrain.height_bounds(middle - radius, middle + radius).0)
+    });
+    ground.unwrap_or(f64::NEG_INFINITY).max(camera.y - radius)
 }
 
 /// Pipelines of the casters: wood, foliage, crosses.
