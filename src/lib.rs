@@ -56,8 +56,7 @@ pub mod prelude {
         lod::FadeBand,
         render::{
             components::{
-                CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, SunShadowSettings,
-                ViewOptions,
+                CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, SunShadowSettings, ViewOptions,
             },
             daylight::{FollowsDaylight, SkySettings},
         },

@@ -106,9 +106,10 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         // turns away from it behind.
         let bulge = normal * (0.55 * in.crown.w * foliage);
         let near = cascaded_visibility(in.relative + bulge, normal, 0.25);
-        // Beyond the maps, the crown's own shadow: its far side lies behind all of its leaves.
-        let own = mix(1.0, smoothstep(-0.55, 0.35, dot(normal, light.key_direction.xyz)), foliage);
-        visibility *= mix(own, near.x, near.y);
+        // The crown's own shadow: its far side lies behind all of its leaves, of which the maps know one picture.
+        let side = dot(normal, light.key_direction.xyz);
+        let own = mix(1.0, smoothstep(-0.6, 0.3, side), foliage);
+        visibility *= mix(own, near.x * mix(0.5, 1.0, own), near.y);
     }
     visibility *= mix(1.0, leaf_visibility(properties.b), foliage);
     var color = shade(surface, visibility);

@@ -69,15 +69,21 @@ fn noise(xz: vec2<f32>, period: f32) -> vec4<f32> {
     return textureSample(noise_texture, noise_sampler, xz / period);
 }
 
+// The same, turned by the angle of a 3-4-5 triangle: periods of 1024 * 3 / (5 k) and 1024 * 4 / (5 k) metres keep it
+// seamless. Mixed with the other it hides the repetition of both.
+fn noise_turned(xz: vec2<f32>, period: f32) -> vec4<f32> {
+    return noise(vec2(0.6 * xz.x - 0.8 * xz.y, 0.8 * xz.x + 0.6 * xz.y), period);
+}
+
 @fragment
 fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let smooth_normal = normalize(in.normal);
     let xz = frame.camera.xz + in.relative.xz;
     let distance = length(in.relative);
     let wide = noise(xz, 512.0);
-    let middle = noise(xz, 64.0);
-    let fine = noise(xz, 8.0);
-    let grain = noise(xz, 2.0);
+    let middle = 0.5 + 0.72 * (noise(xz, 64.0) + noise_turned(xz, 51.2) - 1.0);
+    let fine = 0.5 + 0.72 * (noise(xz, 8.0) + noise_turned(xz, 12.8) - 1.0);
+    let grain = 0.5 + 0.72 * (noise(xz, 2.0) + noise_turned(xz, 3.2) - 1.0);
 
     let map = ground_map(in.relative);
     let uv = (in.relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;

@@ -7,6 +7,10 @@ use bevy::{
 
 use super::error::AppError;
 
+/// Of these only errors are worth the user's while: that a driver is slow, lacks bindless textures, or that a display
+/// does not know its size in millimetres, is none.
+pub const LOG_FILTER: &str = "wgpu=error,naga=error,winit=error,bevy_egui=error,bevy_render::renderer=error";
+
 /// Names of all adapters, one line each, best first.
 ///
 /// # Errors

@@ -74,7 +74,9 @@ pub enum AppError {
         details: String,
     },
     /// A picture that the device cannot hold.
-    #[error("a picture of {width}x{height} is beyond this device's limit of {limit} pixels a side; choose a smaller --size")]
+    #[error(
+        "a picture of {width}x{height} is beyond this device's limit of {limit} pixels a side; choose a smaller --size"
+    )]
     TooLarge {
         /// Width asked for.
         width: u32,

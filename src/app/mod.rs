@@ -4,6 +4,7 @@ mod adapter;
 mod camera;
 mod error;
 mod fly;
+mod ground;
 mod headless;
 mod info;
 mod notes;

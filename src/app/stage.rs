@@ -2,10 +2,10 @@
 
 use std::{path::Path, sync::Arc, time::Instant};
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{error::AppError, plants, trees};
+use super::{error::AppError, ground, plants, trees};
 use crate::{
     bake::{BakeSource, BakedPlant, bake_plant, cache::Cache},
     light::{MoonSetting, sun::Observer},
@@ -16,11 +16,7 @@ use crate::{
     },
     scatter::{CoverMap, PackedStand, VariantBounds, cover_map, packed::DEFAULT_CELL_SIZE},
     scene::{self, Progress, Quality, Scene},
-    terrain::{
-        HeightField, NoiseKind, NoiseTerrain, ReadOptions, Surroundings, Terrain,
-        read::{Crop, ImageScale},
-        read_terrain,
-    },
+    terrain::Terrain,
 };
 
 /// Metres a texel of the cover map.
@@ -56,7 +52,7 @@ impl Stage {
         }
         let started = Instant::now();
         progress.begin("Terrain", 0);
-        let terrain = Arc::new(build_terrain(&scene.terrain, progress)?);
+        let terrain = Arc::new(ground::build_terrain(&scene.terrain, progress)?);
         progress.end();
         progress.note(&format!("terrain: {:.2} s", started.elapsed().as_secs_f64()));
         let observer = observer(&scene, &terrain, path)?;
@@ -153,62 +149,6 @@ fn variant_bounds(plant: &BakedPlant) -> VariantBounds {
         let size = bounds.size();
         VariantBounds { radius: (0.5 * size.x.max(size.z)).max(0.01), height: bounds.max.y.max(0.01) }
     })
-}
-
-pub(super) fn build_terrain(ground: &scene::Ground, progress: &mut dyn Progress) -> Result<Terrain, AppError> {
-    let surroundings = Surroundings::Mirror;
-    let read = |path: &Path, options: ReadOptions, progress: &mut dyn Progress| -> Result<Terrain, AppError> {
-        let (terrain, warnings) = read_terrain(path, &options)?;
-        for warning in warnings {
-            progress.warn(&format!("{}: {warning}", path.display()));
-        }
-        Ok(terrain)
-    };
-    Ok(match ground {
-        scene::Ground::File(file) => {
-            let crop =
-                file.crop.map(|c| Crop { west: c.west, south: c.south, east: c.east, north: c.north });
-            let terrain = read(&file.path, ReadOptions { crop, surroundings, ..ReadOptions::default() }, progress)?;
-            exaggerated(terrain, file.exaggeration)?
-        }
-        scene::Ground::Image(image) => {
-            let scale = ImageScale { spacing: image.spacing, lowest: image.low, highest: image.high };
-            let options = ReadOptions { image_scale: Some(scale), surroundings, ..ReadOptions::default() };
-            read(&image.path, options, progress)?
-        }
-        scene::Ground::Noise(noise) => {
-            let spacing = noise.spacing_m();
-            let samples = ((noise.size / spacing).round() as usize + 1).max(2);
-            let field = NoiseTerrain {
-                columns: samples,
-                rows: samples,
-                spacing: noise.size / (samples - 1) as f64,
-                seed: noise.seed,
-                kind: if noise.ridged { NoiseKind::Ridged } else { NoiseKind::Rolling },
-                octaves: noise.octaves as usize,
-                amplitude: noise.amplitude,
-                wavelength: noise.wavelength,
-                persistence: noise.roughness,
-                base: noise.base,
-            }
-            .height_field()?;
-            Terrain::new(field, None, surroundings)
-        }
-        scene::Ground::Flat(flat) => {
-            let field = HeightField::new(2, 2, DVec2::splat(flat.size), vec![0.0; 4])?;
-            Terrain::new(field, None, surroundings)
-        }
-    })
-}
-
-fn exaggerated(terrain: Terrain, factor: f64) -> Result<Terrain, AppError> {
-    if factor == 1.0 {
-        return Ok(terrain);
-    }
-    let field = terrain.field();
-    let heights = field.heights().iter().map(|height| (f64::from(*height) * factor) as f32).collect();
-    let field = HeightField::new(field.columns(), field.rows(), field.spacing(), heights)?;
-    Ok(Terrain::new(field, terrain.reference().cloned(), terrain.surroundings()))
 }
 
 fn bake(

@@ -6,8 +6,8 @@ use super::{error::AppError, plants::PlantPlan};
 use crate::{
     bake::BakedPlant,
     scatter::{
-        Allometry, Area, ClearingNoise, Coordinates, Ground, Inventory, InventoryOptions, InventorySpecies, LengthUnit, PlacementRules,
-        Sequence, SizeRule, SpeciesRule, Stand, place, read_inventory, stand_from_inventory,
+        Allometry, Area, ClearingNoise, Coordinates, Ground, Inventory, InventoryOptions, InventorySpecies, LengthUnit,
+        PlacementRules, Sequence, SizeRule, SpeciesRule, Stand, place, read_inventory, stand_from_inventory,
     },
     scene::{self, Anchor, InventoryTrees, Progress, ScatteredTrees, Scene, Species, Trees},
     terrain::{CoordinateSystem, GeoReference, Terrain},

@@ -112,16 +112,10 @@ impl Plant {
 
     /// The box around the vertices of the parts that `select` accepts, or `None` where there are none.
     pub fn bounds_of(&self, select: impl Fn(PartKind) -> bool) -> Option<Bounds> {
-        let mut points = self
-            .parts
-            .iter()
-            .filter(|part| select(part.kind))
-            .flat_map(|part| part.mesh.positions.iter().copied());
+        let mut points =
+            self.parts.iter().filter(|part| select(part.kind)).flat_map(|part| part.mesh.positions.iter().copied());
         let first = points.next()?;
-        Some(points.fold(Bounds { min: first, max: first }, |b, p| Bounds {
-            min: b.min.min(p),
-            max: b.max.max(p),
-        }))
+        Some(points.fold(Bounds { min: first, max: first }, |b, p| Bounds { min: b.min.min(p), max: b.max.max(p) }))
     }
 
     /// Height above the foot in metres (0 for an empty plant).
@@ -131,11 +125,7 @@ impl Plant {
 
     /// Number of triangles of the parts of `kind`.
     pub fn triangle_count(&self, kind: PartKind) -> usize {
-        self.parts
-            .iter()
-            .filter(|part| part.kind == kind)
-            .map(|part| part.mesh.triangles.len())
-            .sum()
+        self.parts.iter().filter(|part| part.kind == kind).map(|part| part.mesh.triangles.len()).sum()
     }
 
     /// Scales the plant about its foot by `factor` (> 0), in place.

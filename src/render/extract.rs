@@ -10,9 +10,7 @@ use bevy::{
 };
 use glam::DVec3;
 
-use super::components::{
-    CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, SunShadowSettings, ViewOptions,
-};
+use super::components::{CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, SunShadowSettings, ViewOptions};
 
 /// The main world's side of a frame.
 #[derive(Resource, Default)]

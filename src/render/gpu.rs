@@ -120,10 +120,8 @@ pub fn texture_array(
             }
         }
     }
-    let view = texture.create_view(&TextureViewDescriptor {
-        dimension: Some(TextureViewDimension::D2Array),
-        ..Default::default()
-    });
+    let view = texture
+        .create_view(&TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..Default::default() });
     (texture, view)
 }
 
@@ -137,10 +135,7 @@ pub fn texture(
     smallest: u32,
 ) -> TextureView {
     let (texture, _) = texture_array(device, queue, label, format, &[chain], smallest);
-    texture.create_view(&TextureViewDescriptor {
-        dimension: Some(TextureViewDimension::D2),
-        ..Default::default()
-    })
+    texture.create_view(&TextureViewDescriptor { dimension: Some(TextureViewDimension::D2), ..Default::default() })
 }
 
 /// Writes one mip level of one layer; `texels` holds `width * height * texel_bytes` bytes.

@@ -170,11 +170,7 @@ pub fn columns_of(bytes: &[u8], name: &str, options: InventoryOptions) -> Result
 
 /// The records of a file.
 fn table(text: &str, separator: u8) -> csv::Reader<&[u8]> {
-    csv::ReaderBuilder::new()
-        .delimiter(separator)
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes())
+    csv::ReaderBuilder::new().delimiter(separator).comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes())
 }
 
 /// UTF-8 with or without a byte-order mark, else Latin-1.
@@ -336,8 +332,7 @@ impl Columns {
         }
         let dbh = self.dbh.filter(|column| column.index == index);
         let height = self.height.filter(|column| column.index == index);
-        dbh.map(|column| length("diameter at breast height", column))
-            .or(height.map(|column| length("height", column)))
+        dbh.map(|column| length("diameter at breast height", column)).or(height.map(|column| length("height", column)))
     }
 
     /// Possible values of x and y.

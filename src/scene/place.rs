@@ -20,7 +20,7 @@ pub struct Place {
     pub time: LocalTime,
     /// The moon that lights the night. Default `Full`.
     pub moon: Moon,
-    /// Distance in metres at which the air has taken all but 2 % of the contrast (Koschmieder 1924), 200 to 300000.
+    /// Distance in metres at which the air has taken all but 2 % of the contrast (Koschmieder 1924), 2000 to 250000.
     /// Lower is hazier. Default 40000.
     pub visibility: f64,
 }
@@ -65,6 +65,6 @@ impl Place {
                 "state both, or neither to take them from the terrain file",
             );
         }
-        check.number("place.visibility", self.visibility, 200.0..=300_000.0, "m");
+        check.number("place.visibility", self.visibility, 2_000.0..=250_000.0, "m");
     }
 }

@@ -48,7 +48,7 @@ pub enum TerrainError {
     /// It is not known what the file's horizontal coordinates mean.
     #[error(
         "{path}: unknown coordinate system ({problem}); write one into the file (`gdal_edit.py -a_srs EPSG:<code> FILE`) \
-         or state it in `ReadOptions::coordinate_system`", path = .path.display()
+         or state it in the scene's terrain, `coordinates: Utm(zone: 33)` (`ReadOptions::coordinate_system`)", path = .path.display()
     )]
     UnknownCoordinateSystem {
         /// The file.
@@ -59,7 +59,7 @@ pub enum TerrainError {
     /// A PNG has no metres, and none were given.
     #[error(
         "{path}: an image says nothing about metres; give its sample spacing and the heights of black and white in \
-         `ReadOptions::image_scale`", path = .path.display()
+         `terrain: Image(...)` in the scene (`ReadOptions::image_scale`)", path = .path.display()
     )]
     MissingImageScale {
         /// The file.

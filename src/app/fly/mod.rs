@@ -37,10 +37,6 @@ use crate::{
 };
 use session::Session;
 
-/// Of these only errors are worth the user's while: that a driver is slow, lacks bindless textures, or that a display
-/// does not know its size in millimetres, is none.
-const LOG_FILTER: &str = "wgpu=error,naga=error,winit=error,bevy_egui=error,bevy_render::renderer=error";
-
 /// Opens a window and flies until the user has enough. Blocks; must be called on the program's main thread.
 ///
 /// # Errors
@@ -78,7 +74,7 @@ fn build(session: Session, options: &FlyOptions, settings: WgpuSettings) -> App 
                 render_creation: RenderCreation::Automatic(Box::new(settings)),
                 ..RenderPlugin::default()
             })
-            .set(LogPlugin { level: Level::WARN, filter: LOG_FILTER.to_owned(), ..LogPlugin::default() }),
+            .set(LogPlugin { level: Level::WARN, filter: adapter::LOG_FILTER.to_owned(), ..LogPlugin::default() }),
     );
     app.add_plugins((CanopyPlugins, EguiPlugin::default(), timing::TimingPlugin))
         .insert_resource(session)

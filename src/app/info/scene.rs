@@ -10,7 +10,7 @@ use super::{
     plant, terrain,
 };
 use crate::{
-    app::{AppError, plants, stage, trees},
+    app::{AppError, ground::build_terrain, plants, stage, trees},
     bake::{
         BakedPlant,
         billboard::{Cross, CrossTextures},
@@ -54,7 +54,7 @@ fn describe_species_file(page: &mut Page, path: &Path, species: &GrowParameters)
 
 fn describe(page: &mut Page, scene: &Scene, path: &Path) -> Result<(), AppError> {
     let mut heard = Heard::default();
-    let ground = stage::build_terrain(&scene.terrain, &mut heard)?;
+    let ground = build_terrain(&scene.terrain, &mut heard)?;
     let observer = stage::observer(scene, &ground, path)?;
     let plan = plants::plan(scene)?;
     let mut individuals = Vec::with_capacity(plan.sources.len());

@@ -23,7 +23,7 @@ pub struct Frustum {
 }
 
 impl Frustum {
-    /// The side planes and the near plane of `clip_from_relative` (reversed or not: the far plane is left out).
+    /// The four side planes of `clip_from_relative`. They meet in the camera, so what lies behind it is outside of them.
     pub fn new(clip_from_relative: &Mat4) -> Self {
         let rows = clip_from_relative.transpose();
         let planes = [

@@ -27,7 +27,8 @@ impl PlantVertex {
         let normal = normal.try_normalize().unwrap_or(Vec3::Y);
         let snorm = |value: f32| (value.clamp(-1.0, 1.0) * 127.0).round() as i8;
         let ambient = if ambient.is_finite() { ambient.clamp(0.0, 1.0) } else { 1.0 };
-        let half = |value: f32| f16::from_f32(if value.is_finite() { value.clamp(-6.0e4, 6.0e4) } else { 0.0 }).to_bits();
+        let half =
+            |value: f32| f16::from_f32(if value.is_finite() { value.clamp(-6.0e4, 6.0e4) } else { 0.0 }).to_bits();
         Self {
             position: position.to_array(),
             normal_ambient: [snorm(normal.x), snorm(normal.y), snorm(normal.z), snorm(ambient)],

@@ -3,11 +3,7 @@
 use glam::{Mat3, Vec3};
 
 use super::uniforms::LightUniform;
-use crate::light::{
-    LightState,
-    sh::cosine_coefficient,
-    sun::SUN_ANGULAR_RADIUS,
-};
+use crate::light::{LightState, sh::cosine_coefficient, sun::SUN_ANGULAR_RADIUS};
 
 /// The largest value that is handed to a half-float target.
 const BRIGHTEST: f32 = 6.0e4;

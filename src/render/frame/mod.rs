@@ -166,14 +166,7 @@ impl Plugin for FramePlugin {
 pub fn prepare_frame(
     scene: Res<ExtractedScene>,
     cameras: Query<
-        (
-            Entity,
-            &ExtractedView,
-            &ExtractedCamera,
-            &Msaa,
-            Has<MotionVectorPrepass>,
-            Has<DeferredPrepass>,
-        ),
+        (Entity, &ExtractedView, &ExtractedCamera, &Msaa, Has<MotionVectorPrepass>, Has<DeferredPrepass>),
         With<CanopyCamera>,
     >,
     mut frame: ResMut<PreparedFrame>,
@@ -244,12 +237,7 @@ fn prepare_bind_group(
         relative_from_clip: view.clip_from_relative.inverse().to_cols_array_2d(),
         camera: [modulo(view.camera.x), view.camera.y as f32, modulo(view.camera.z), view.focal_pixels],
         viewport: [view.size.x, view.size.y, 1.0 / view.size.x, 1.0 / view.size.y],
-        flags: [
-            f32::from(view.samples > 1),
-            f32::from(scene.options.tint_levels),
-            ground.mean_cover,
-            0.0,
-        ],
+        flags: [f32::from(view.samples > 1), f32::from(scene.options.tint_levels), ground.mean_cover, 0.0],
     };
     let light_uniform = light::light_uniform(&daylight.0, view.exposure);
     let shadow_uniform = shadows.uniform(view.camera, ground.placement(view.camera));

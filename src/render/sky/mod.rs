@@ -55,11 +55,7 @@ impl FromWorld for SkyTexture {
     fn from_world(world: &mut World) -> Self {
         let texture = world.resource::<RenderDevice>().create_texture(&TextureDescriptor {
             label: Some("canopy_sky"),
-            size: Extent3d {
-                width: SkyView::WIDTH as u32,
-                height: SkyView::HEIGHT as u32,
-                depth_or_array_layers: 1,
-            },
+            size: Extent3d { width: SkyView::WIDTH as u32, height: SkyView::HEIGHT as u32, depth_or_array_layers: 1 },
             mip_level_count: 1,
             sample_count: 1,
             dimension: TextureDimension::D2,
@@ -177,9 +173,7 @@ fn sky_pass(
 ) {
     let frame = frame.of(view.entity());
     let (target, depth, _) = view.into_inner();
-    let (Some(frame), Some(pipeline)) =
-        (frame, pipelines.current.and_then(|id| cache.get_render_pipeline(id)))
-    else {
+    let (Some(frame), Some(pipeline)) = (frame, pipelines.current.and_then(|id| cache.get_render_pipeline(id))) else {
         return;
     };
     let diagnostics = ctx.diagnostic_recorder();

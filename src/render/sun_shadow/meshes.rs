@@ -14,7 +14,7 @@ use bevy::{
     mesh::{Mesh, VertexBufferLayout},
     platform::collections::HashMap,
     render::{
-        mesh::{RenderMesh, allocator::MeshAllocator, RenderMeshBufferInfo},
+        mesh::{RenderMesh, RenderMeshBufferInfo, allocator::MeshAllocator},
         render_asset::RenderAssets,
         render_phase::TrackedRenderPass,
         render_resource::{

@@ -43,9 +43,6 @@ impl Plugin for SunShadowPassPlugin {
                     .in_set(RenderSystems::PrepareResources)
                     .after(super::forest::prepare_forests),
             )
-            .add_systems(
-                Core3d,
-                pass::sun_shadow_pass.after(Core3dSystems::Prepass).before(Core3dSystems::MainPass),
-            );
+            .add_systems(Core3d, pass::sun_shadow_pass.after(Core3dSystems::Prepass).before(Core3dSystems::MainPass));
     }
 }

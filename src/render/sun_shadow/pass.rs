@@ -49,8 +49,8 @@ pub fn sun_shadow_pass(
     for work in maps.work.drain(..) {
         let Some(layer) = maps.layers.get(work.index) else { continue };
         let offset = work.index as u32 * UNIFORM_STRIDE as u32;
-        let mesh_group = (!casters.is_empty())
-            .then(|| casters.bind_group(&device, &cache, maps.cascades[work.index].center));
+        let mesh_group =
+            (!casters.is_empty()).then(|| casters.bind_group(&device, &cache, maps.cascades[work.index].center));
         let mut pass = ctx.begin_tracked_render_pass(RenderPassDescriptor {
             label: Some("canopy_sun_shadow"),
             color_attachments: &[],
@@ -89,9 +89,8 @@ pub fn sun_shadow_pass(
                 pass.draw(range.start * VERTICES_A_CROSS..range.end * VERTICES_A_CROSS, 0..1);
             }
         }
-        let complete = mesh_group
-            .as_ref()
-            .is_none_or(|group| casters.draw(&mut pass, group, &meshes, &allocator, &cache));
+        let complete =
+            mesh_group.as_ref().is_none_or(|group| casters.draw(&mut pass, group, &meshes, &allocator, &cache));
         span.end(&mut pass);
         drop(pass);
         if let Some(drawn) = maps.drawn.get_mut(work.index) {

@@ -180,10 +180,8 @@ fn create_maps(device: &RenderDevice, size: u32, count: usize) -> (TextureView, 
             ..Default::default()
         })
     };
-    let all = texture.create_view(&TextureViewDescriptor {
-        dimension: Some(TextureViewDimension::D2Array),
-        ..Default::default()
-    });
+    let all = texture
+        .create_view(&TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..Default::default() });
     (all, (0..count).map(layer).collect())
 }
 
@@ -197,11 +195,7 @@ impl ShadowMaps {
                 size: [cascade.texel as f32, cascade.radius as f32, 2.0 * cascade.half_depth as f32, 0.0],
             };
         }
-        ShadowUniform {
-            cascades,
-            count: [self.cascades.len() as f32, 1.0 / self.map_size as f32, 0.0, 0.0],
-            ground,
-        }
+        ShadowUniform { cascades, count: [self.cascades.len() as f32, 1.0 / self.map_size as f32, 0.0, 0.0], ground }
     }
 
     fn resize(&mut self, device: &RenderDevice, settings: &SunShadowSettings) {
@@ -304,14 +298,8 @@ pub fn prepare_shadows(
             queue.write_buffer(&buffers.uniform, index as u64 * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));
             let visible = &mut buffers.visible[index];
             visible.write(&device, &queue, &lists.visible);
-            let bind_group = instance_bind_group(
-                &device,
-                &pipelines,
-                &forest_layouts,
-                forest,
-                &buffers.uniform,
-                visible.buffer(),
-            );
+            let bind_group =
+                instance_bind_group(&device, &pipelines, &forest_layouts, forest, &buffers.uniform, visible.buffer());
             work.forests.push(CascadeForest { entity, lists, bind_group });
         }
         let trees: usize = work.forests.iter().map(|forest| forest.lists.visible.len()).sum();
@@ -332,9 +320,10 @@ pub fn prepare_shadows(
 /// Height in scene metres below which nothing within `radius` metres of the camera can be in shadow.
 fn lowest_receiver(scene: &ExtractedScene, camera: DVec3, radius: f64) -> f64 {
     let middle = DVec2::new(camera.x, camera.z);
-    let ground = scene.ground.as_ref().map(|(_, ground)| {
-        f64::from(ground.terrain.height_bounds(middle - radius, middle + radius).0)
-    });
+    let ground = scene
+        .ground
+        .as_ref()
+        .map(|(_, ground)| f64::from(ground.terrain.height_bounds(middle - radius, middle + radius).0));
     ground.unwrap_or(f64::NEG_INFINITY).max(camera.y - radius)
 }
 
@@ -372,7 +361,10 @@ impl FromWorld for CasterPipelines {
                 ..Default::default()
             }
         };
-        Self([Some(PartKind::Wood), Some(PartKind::Foliage), None].map(|kind| cache.queue_render_pipeline(describe(kind))))
+        Self(
+            [Some(PartKind::Wood), Some(PartKind::Foliage), None]
+                .map(|kind| cache.queue_render_pipeline(describe(kind))),
+        )
     }
 }
 

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use bevy::{
-    log::error_once,
     ecs::{
         resource::Resource,
         system::{Res, ResMut},
         world::{FromWorld, World},
     },
+    log::error_once,
     render::{
         render_resource::{
             Extent3d, Texture, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages, TextureView,

@@ -24,11 +24,9 @@ pub fn terrain_pass(
 ) {
     let frame = frame.of(view.entity());
     let (target, depth, _) = view.into_inner();
-    let (Some(frame), Some(tiles), Some(pipeline)) = (
-        frame,
-        &terrain.bind_group,
-        pipelines.current.and_then(|id| cache.get_render_pipeline(id)),
-    ) else {
+    let (Some(frame), Some(tiles), Some(pipeline)) =
+        (frame, &terrain.bind_group, pipelines.current.and_then(|id| cache.get_render_pipeline(id)))
+    else {
         return;
     };
     if terrain.count == 0 {

@@ -14,9 +14,9 @@ use bevy::{
         render_resource::{
             AddressMode, BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer,
             BufferDescriptor, BufferUsages, CachedRenderPipelineId, ColorTargetState, ColorWrites, Face, FilterMode,
-            FragmentState, MipmapFilterMode, MultisampleState, PipelineCache, PrimitiveState,
-            RenderPipelineDescriptor, Sampler, SamplerBindingType, SamplerDescriptor, ShaderStages, TextureFormat,
-            TextureSampleType, TextureView, VertexState,
+            FragmentState, MipmapFilterMode, MultisampleState, PipelineCache, PrimitiveState, RenderPipelineDescriptor,
+            Sampler, SamplerBindingType, SamplerDescriptor, ShaderStages, TextureFormat, TextureSampleType,
+            TextureView, VertexState,
             binding_types::{sampler, storage_buffer_read_only_sized, texture_2d},
         },
         renderer::{RenderDevice, RenderQueue},
@@ -274,8 +274,7 @@ pub fn prepare_tiles(
         pixel_error: ground.error_pixels,
         ..TileSettings::default()
     };
-    let known =
-        gpu.cache.as_ref().is_some_and(|c| Arc::ptr_eq(&c.terrain, &ground.terrain) && c.settings == settings);
+    let known = gpu.cache.as_ref().is_some_and(|c| Arc::ptr_eq(&c.terrain, &ground.terrain) && c.settings == settings);
     if !known {
         match TileTree::new(&ground.terrain, &settings) {
             Ok(tree) => {
@@ -302,9 +301,7 @@ pub fn prepare_tiles(
     let clearance = cache.tree.select(
         view.camera,
         f64::from(view.focal_pixels),
-        |min: DVec3, max: DVec3| {
-            view.frustum.sees_box((min - view.camera).as_vec3(), (max - view.camera).as_vec3())
-        },
+        |min: DVec3, max: DVec3| view.frustum.sees_box((min - view.camera).as_vec3(), (max - view.camera).as_vec3()),
         &mut chosen,
     );
     cache.reserve(&device, chosen.len());

@@ -1,0 +1,94 @@
+//! The ground of a scene: from a file, an image, noise, or flat.
+
+use std::path::Path;
+
+use glam::DVec2;
+
+use super::error::AppError;
+use crate::{
+    scene::{self, Coordinates, Progress},
+    terrain::{
+        CoordinateSystem, HeightField, NoiseKind, NoiseTerrain, ReadOptions, Surroundings, Terrain,
+        read::{Crop, ImageScale},
+        read_terrain,
+    },
+};
+
+/// Builds the ground that a scene asks for; what the readers decided on their own account becomes a warning.
+///
+/// # Errors
+/// [`AppError::Terrain`].
+pub fn build_terrain(ground: &scene::Ground, progress: &mut dyn Progress) -> Result<Terrain, AppError> {
+    let surroundings = Surroundings::Mirror;
+    let read = |path: &Path, options: ReadOptions, progress: &mut dyn Progress| -> Result<Terrain, AppError> {
+        let (terrain, warnings) = read_terrain(path, &options)?;
+        for warning in warnings {
+            progress.warn(&format!("{}: {warning}", path.display()));
+        }
+        Ok(terrain)
+    };
+    Ok(match ground {
+        scene::Ground::File(file) => {
+            let crop = file.crop.map(|c| Crop { west: c.west, south: c.south, east: c.east, north: c.north });
+            let options = ReadOptions {
+                crop,
+                coordinate_system: file.coordinates.map(coordinate_system),
+                surroundings: match file.surroundings {
+                    scene::Surroundings::Mirror => Surroundings::Mirror,
+                    scene::Surroundings::Border => Surroundings::Border,
+                },
+                ..ReadOptions::default()
+            };
+            let terrain = read(&file.path, options, progress)?;
+            exaggerated(terrain, file.exaggeration)?
+        }
+        scene::Ground::Image(image) => {
+            let scale = ImageScale { spacing: image.spacing, lowest: image.low, highest: image.high };
+            let options = ReadOptions { image_scale: Some(scale), surroundings, ..ReadOptions::default() };
+            read(&image.path, options, progress)?
+        }
+        scene::Ground::Noise(noise) => {
+            let spacing = noise.spacing_m();
+            let samples = ((noise.size / spacing).round() as usize + 1).max(2);
+            let field = NoiseTerrain {
+                columns: samples,
+                rows: samples,
+                spacing: noise.size / (samples - 1) as f64,
+                seed: noise.seed,
+                kind: if noise.ridged { NoiseKind::Ridged } else { NoiseKind::Rolling },
+                octaves: noise.octaves as usize,
+                amplitude: noise.amplitude,
+                wavelength: noise.wavelength,
+                persistence: noise.roughness,
+                base: noise.base,
+            }
+            .height_field()?;
+            Terrain::new(field, None, surroundings)
+        }
+        scene::Ground::Flat(flat) => {
+            let field = HeightField::new(2, 2, DVec2::splat(flat.size), vec![0.0; 4])?;
+            Terrain::new(field, None, surroundings)
+        }
+    })
+}
+
+fn exaggerated(terrain: Terrain, factor: f64) -> Result<Terrain, AppError> {
+    if factor == 1.0 {
+        return Ok(terrain);
+    }
+    let field = terrain.field();
+    let heights = field.heights().iter().map(|height| (f64::from(*height) * factor) as f32).collect();
+    let field = HeightField::new(field.columns(), field.rows(), field.spacing(), heights)?;
+    Ok(Terrain::new(field, terrain.reference().cloned(), terrain.surroundings()))
+}
+
+fn coordinate_system(coordinates: Coordinates) -> CoordinateSystem {
+    match coordinates {
+        Coordinates::Geographic => CoordinateSystem::Geographic,
+        Coordinates::Utm { zone, south } => CoordinateSystem::Utm { zone, south },
+        Coordinates::Epsg(code) => CoordinateSystem::from_epsg(code)
+            .unwrap_or(CoordinateSystem::Projected { epsg: Some(code), metres_per_unit: 1.0 }),
+        Coordinates::Projected { metres_per_unit } => CoordinateSystem::Projected { epsg: None, metres_per_unit },
+        Coordinates::Local => CoordinateSystem::Local,
+    }
+}
