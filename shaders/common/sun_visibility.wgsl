@@ -26,32 +26,32 @@ fn cascade_visibility(index: i32, relative: vec3<f32>, normal: vec3<f32>, bias: 
     let map = shadow.cascades[index].map_from_relative * vec4(position, 1.0);
     let uv = map.xy * vec2(0.5, -0.5) + 0.5;
     let step = shadow.count.y;
-    // Five bilinear comparisons on a rotated cross: a soft edge about three texels wide.
-    var sum = textureSampleCompareLevel(shadow_map, shadow_sampler, uv, index, map.z) * 2.0;
-    sum += textureSampleCompareLevel(shadow_map, shadow_sampler, uv + vec2(0.9, 0.4) * step, index, map.z);
-    sum += textureSampleCompareLevel(shadow_map, shadow_sampler, uv + vec2(-0.4, 0.9) * step, index, map.z);
-    sum += textureSampleCompareLevel(shadow_map, shadow_sampler, uv + vec2(-0.9, -0.4) * step, index, map.z);
-    sum += textureSampleCompareLevel(shadow_map, shadow_sampler, uv + vec2(0.4, -0.9) * step, index, map.z);
-    return sum / 6.0;
+    // Four bilinear comparisons on a rotated cross: a soft edge about three texels wide.
+    var sum = textureSampleCompareLevel(shadow_map, shadow_sampler, uv + vec2(0.9, 0.35) * step, index, map.z);
+    sum += textureSampleCompareLevel(shadow_map, shadow_sampler, uv + vec2(-0.35, 0.9) * step, index, map.z);
+    sum += textureSampleCompareLevel(shadow_map, shadow_sampler, uv + vec2(-0.9, -0.35) * step, index, map.z);
+    sum += textureSampleCompareLevel(shadow_map, shadow_sampler, uv + vec2(0.35, -0.9) * step, index, map.z);
+    return 0.25 * sum;
+}
+
+// Interleaved gradient noise [Jimenez 2014], 0..1, fixed to the pixel.
+fn pixel_noise(pixel: vec2<f32>) -> f32 {
+    return fract(52.9829189 * fract(dot(floor(pixel), vec2(0.06711056, 0.00583715))));
 }
 
 // x: visibility from the cascades, y: weight of that knowledge (0 beyond the last cascade).
-fn cascaded_visibility(relative: vec3<f32>, normal: vec3<f32>, bias: f32) -> vec2<f32> {
-    let count = i32(shadow.count.x);
+//
+// Each pixel reads one cascade: where two meet, noise decides which, over the last 15 % of the finer one's radius. Software
+// rasterisers run both sides of every branch, so the choice is arithmetic.
+fn cascaded_visibility(relative: vec3<f32>, normal: vec3<f32>, bias: f32, pixel: vec2<f32>) -> vec2<f32> {
+    let last = i32(shadow.count.x) - 1;
     let distance = length(relative);
-    for (var i = 0; i < count; i += 1) {
-        let radius = shadow.cascades[i].size.y;
-        if distance < radius {
-            let near = cascade_visibility(i, relative, normal, bias);
-            let blend = smoothstep(0.85 * radius, radius, distance);
-            if blend <= 0.0 {
-                return vec2(near, 1.0);
-            }
-            if i + 1 < count {
-                return vec2(mix(near, cascade_visibility(i + 1, relative, normal, bias), blend), 1.0);
-            }
-            return vec2(near, 1.0 - blend);
-        }
+    let jittered = distance / mix(0.85, 1.0, pixel_noise(pixel));
+    var index = 0;
+    for (var i = 0; i < last; i += 1) {
+        index += i32(jittered >= shadow.cascades[i].size.y);
     }
-    return vec2(1.0, 0.0);
+    let radius = shadow.cascades[max(last, 0)].size.y;
+    let known = select(0.0, 1.0 - smoothstep(0.85 * radius, radius, distance), last >= 0);
+    return vec2(cascade_visibility(index, relative, normal, bias), known);
 }

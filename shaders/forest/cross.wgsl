@@ -105,7 +105,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         // The picture stands for a round crown: what faces the light lies before the plane that casts the shadow, what
         // turns away from it behind.
         let bulge = normal * (0.55 * in.crown.w * foliage);
-        let near = cascaded_visibility(in.relative + bulge, normal, 0.25);
+        let near = cascaded_visibility(in.relative + bulge, normal, 0.25, in.clip.xy);
         // The crown's own shadow: its far side lies behind all of its leaves, of which the maps know one picture.
         let side = dot(normal, light.key_direction.xyz);
         let own = mix(1.0, smoothstep(-0.6, 0.3, side), foliage);

@@ -39,7 +39,7 @@ struct Variant {
 struct Instance {
     // Foot relative to the anchor, metres.
     position: vec3<f32>,
-    // Cosine and sine of the yaw, times nothing.
+    // Cosine and sine of the yaw.
     yaw: vec2<f32>,
     scale: f32,
     variant: u32,

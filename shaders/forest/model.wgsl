@@ -30,7 +30,6 @@ struct Varying {
     // Ambient visibility, height above the foot in metres, relative height in the crown, tint.
     @location(3) look: vec4<f32>,
     @location(4) threshold: f32,
-    @location(5) @interpolate(flat) variant: u32,
 }
 
 @vertex
@@ -46,7 +45,6 @@ fn vertex(in: Vertex, @builtin(instance_index) index: u32) -> Varying {
     let height = max(variants[tree.variant].size.x * tree.scale, 0.01);
     out.look = vec4(in.normal_ambient.w, local.y, local.y / height, tree.tint);
     out.threshold = model_threshold(length(tree.position.xz));
-    out.variant = tree.variant;
     return out;
 }
 
@@ -114,7 +112,7 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
     surface.ambient = scattered(in.look.x) * stand_ambient(in.look.z, map.y);
     var visibility = terrain_visibility(map, in.look.y);
     if visibility > 0.0 {
-        let near = cascaded_visibility(in.relative, normal, 1.0);
+        let near = cascaded_visibility(in.relative, normal, 1.0, in.clip.xy);
         visibility *= mix(1.0, near.x, near.y);
     }
 #ifdef FOLIAGE

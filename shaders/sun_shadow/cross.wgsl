@@ -4,7 +4,6 @@
 #import canopy::caster::{cascade, clamp_caster}
 
 @group(2) @binding(0) var color_pictures: texture_2d_array<f32>;
-@group(2) @binding(2) var picture_sampler: sampler;
 
 struct Varying {
     @builtin(position) clip: vec4<f32>,
@@ -40,9 +39,18 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     return out;
 }
 
+// One texel of the fitting level, as in model.wgsl.
+fn alpha(uv: vec2<f32>, layer: u32) -> f32 {
+    let size = vec2<f32>(textureDimensions(color_pictures));
+    let texels = max(fwidth(uv.x) * size.x, fwidth(uv.y) * size.y);
+    let level = clamp(i32(log2(max(texels, 1.0))), 0, i32(textureNumLevels(color_pictures)) - 1);
+    let place = clamp(uv, vec2(0.0), vec2(0.9999)) * vec2<f32>(textureDimensions(color_pictures, level));
+    return textureLoad(color_pictures, vec2<i32>(place), i32(layer), level).a;
+}
+
 @fragment
 fn fragment(in: Varying) {
-    if textureSample(color_pictures, picture_sampler, in.uv, in.layer).a < 0.5 {
+    if alpha(in.uv, in.layer) < 0.5 {
         discard;
     }
 }

@@ -3,7 +3,6 @@
 #import canopy::caster::{cascade, clamp_caster}
 
 @group(2) @binding(0) var color_texture: texture_2d<f32>;
-@group(2) @binding(2) var part_sampler: sampler;
 
 struct Varying {
     @builtin(position) clip: vec4<f32>,
@@ -24,9 +23,18 @@ fn vertex(
 }
 
 #ifdef FOLIAGE
+// One texel of the fitting level: a map's texel is coarser than what a filter would add, and most of the pass is this.
+fn alpha(uv: vec2<f32>) -> f32 {
+    let size = vec2<f32>(textureDimensions(color_texture));
+    let texels = max(fwidth(uv.x) * size.x, fwidth(uv.y) * size.y);
+    let level = clamp(i32(log2(max(texels, 1.0))), 0, i32(textureNumLevels(color_texture)) - 1);
+    let place = fract(uv) * vec2<f32>(textureDimensions(color_texture, level));
+    return textureLoad(color_texture, vec2<i32>(place), level).a;
+}
+
 @fragment
 fn fragment(in: Varying) {
-    if textureSample(color_texture, part_sampler, in.uv).a < 0.5 {
+    if alpha(in.uv) < 0.5 {
         discard;
     }
 }

@@ -130,7 +130,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
 
     var visibility = select(terrain_visibility(map, 0.0), 1.0, outside);
     if visibility > 0.0 {
-        let near = cascaded_visibility(in.relative, smooth_normal, 1.0);
+        let near = cascaded_visibility(in.relative, smooth_normal, 1.0, in.clip.xy);
         // Beyond the maps: the share of light that finds its way between the crowns.
         let sine = max(light.key_direction.w, 0.12);
         let between = select(pow(max(1.0 - 0.92 * cover, 0.02), 1.0 / sine), 1.0, outside);

@@ -9,7 +9,7 @@ use bevy::{
     ecs::{
         change_detection::DetectChanges,
         component::Component,
-        query::With,
+        query::{Added, With},
         resource::Resource,
         schedule::IntoScheduleConfigs,
         system::{Commands, Query, Res, ResMut},
@@ -139,9 +139,10 @@ fn expose_cameras(
 fn light_meshes(
     daylight: Option<Res<Daylight>>,
     mut lights: Query<(&mut DirectionalLight, &mut Transform), With<FollowsDaylight>>,
+    fresh: Query<(), Added<FollowsDaylight>>,
     mut ambient: Option<ResMut<GlobalAmbientLight>>,
 ) {
-    let Some(daylight) = daylight.filter(|daylight| daylight.is_changed()) else { return };
+    let Some(daylight) = daylight.filter(|daylight| daylight.is_changed() || !fresh.is_empty()) else { return };
     if lights.is_empty() {
         return;
     }

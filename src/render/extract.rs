@@ -1,10 +1,17 @@
 //! What the render world learns of the main world each frame: shared pointers and a few numbers, nothing copied.
 
 use bevy::{
-    asset::AssetId,
-    ecs::{entity::Entity, query::With, resource::Resource, system::Query, system::Res, system::ResMut},
+    asset::{AssetEvent, AssetId},
+    ecs::{
+        entity::Entity,
+        message::MessageReader,
+        query::With,
+        resource::Resource,
+        system::{Query, Res, ResMut},
+    },
     math::Affine3A,
     mesh::{Mesh, Mesh3d},
+    platform::collections::HashMap,
     render::Extract,
     transform::components::GlobalTransform,
 };
@@ -25,6 +32,8 @@ pub struct ExtractedScene {
     pub daylight: Option<Daylight>,
     /// Meshes that cast onto Canopy's passes, with their place in the Bevy world.
     pub casters: Vec<(AssetId<Mesh>, Affine3A)>,
+    /// How often each mesh was changed.
+    pub mesh_revisions: HashMap<AssetId<Mesh>, u64>,
     /// Shadow settings.
     pub shadow: SunShadowSettings,
     /// View options.
@@ -38,6 +47,7 @@ pub fn extract_scene(
     forests: Extract<Query<(Entity, &Forest)>>,
     grounds: Extract<Query<(Entity, &Ground)>>,
     casters: Extract<Query<(Entity, &Mesh3d, &GlobalTransform), With<CastsCanopyShadow>>>,
+    mut changes: Extract<MessageReader<AssetEvent<Mesh>>>,
     daylight: Extract<Option<Res<Daylight>>>,
     shadow: Extract<Res<SunShadowSettings>>,
     options: Extract<Res<ViewOptions>>,
@@ -50,6 +60,11 @@ pub fn extract_scene(
     scene.daylight = daylight.as_ref().map(|light| Daylight(light.0.clone()));
     let mut meshes: Vec<_> = casters.iter().collect();
     meshes.sort_by_key(|(entity, ..)| *entity);
+    for event in changes.read() {
+        if let AssetEvent::Modified { id } = event {
+            *scene.mesh_revisions.entry(*id).or_default() += 1;
+        }
+    }
     scene.casters.clear();
     scene.casters.extend(meshes.into_iter().map(|(_, mesh, place)| (mesh.0.id(), place.affine())));
     scene.shadow = **shadow;

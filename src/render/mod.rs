@@ -27,7 +27,8 @@ pub mod terrain;
 
 use bevy::{
     app::{App, Plugin},
-    render::{ExtractSchedule, RenderApp},
+    ecs::schedule::IntoScheduleConfigs,
+    render::{ExtractSchedule, Render, RenderApp, RenderSystems},
 };
 
 /// All passes.
@@ -43,7 +44,8 @@ impl Plugin for CanopyRenderPlugin {
             render_app
                 .insert_resource(report)
                 .init_resource::<extract::ExtractedScene>()
-                .add_systems(ExtractSchedule, extract::extract_scene);
+                .add_systems(ExtractSchedule, extract::extract_scene)
+                .add_systems(Render, report::finish_report.in_set(RenderSystems::Cleanup));
         }
         app.add_plugins((
             frame::FramePlugin,

@@ -2,10 +2,10 @@
 
 use std::{
     collections::BTreeMap,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
-use bevy::ecs::resource::Resource;
+use bevy::ecs::{resource::Resource, system::Res};
 
 /// What became of a pass in the last frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -16,28 +16,47 @@ pub enum PassOutcome {
     Skipped(String),
 }
 
+type Outcomes = BTreeMap<String, PassOutcome>;
+
+/// The frame being made, and the last whole one.
+#[derive(Debug, Default)]
+struct Pages {
+    open: Outcomes,
+    last: Outcomes,
+}
+
 /// Outcomes by pass, shared between the main and the render world.
 #[derive(Resource, Clone, Debug, Default)]
-pub struct FrameReport(Arc<Mutex<BTreeMap<String, PassOutcome>>>);
+pub struct FrameReport(Arc<Mutex<Pages>>);
 
 impl FrameReport {
     /// Records that `pass` ran.
     pub fn ran(&self, pass: impl Into<String>, on: impl Into<String>) {
-        self.record(pass.into(), PassOutcome::Ran(on.into()));
+        self.pages().open.insert(pass.into(), PassOutcome::Ran(on.into()));
     }
 
     /// Records that `pass` was skipped.
     pub fn skipped(&self, pass: impl Into<String>, why: impl Into<String>) {
-        self.record(pass.into(), PassOutcome::Skipped(why.into()));
+        self.pages().open.insert(pass.into(), PassOutcome::Skipped(why.into()));
     }
 
-    fn record(&self, pass: String, outcome: PassOutcome) {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(pass, outcome);
-    }
-
-    /// All outcomes, by the passes' names.
+    /// All outcomes of the last whole frame, by the passes' names.
     pub fn outcomes(&self) -> Vec<(String, PassOutcome)> {
-        let outcomes = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        outcomes.iter().map(|(pass, outcome)| (pass.clone(), outcome.clone())).collect()
+        self.pages().last.iter().map(|(pass, outcome)| (pass.clone(), outcome.clone())).collect()
     }
+
+    /// Ends a frame: what was recorded becomes what [`outcomes`](Self::outcomes) gives.
+    fn turn(&self) {
+        let mut pages = self.pages();
+        pages.last = std::mem::take(&mut pages.open);
+    }
+
+    fn pages(&self) -> MutexGuard<'_, Pages> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Ends the frame's page.
+pub fn finish_report(report: Res<FrameReport>) {
+    report.turn();
 }

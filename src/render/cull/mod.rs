@@ -12,7 +12,7 @@ use glam::{DVec3, Mat4, Vec3, Vec4, Vec4Swizzles};
 
 use crate::{
     lod::FadeBand,
-    render::sun_shadow::cascades::CascadeBox,
+    render::sun_shadow::cascades::{CascadeBox, LOWEST_SINE},
     scatter::{Cell, PackedStand},
 };
 
@@ -180,13 +180,16 @@ pub struct SeenShadows<'a> {
     pub frustum: &'a Frustum,
     /// Lowest ground in scene metres: a shadow goes no farther down.
     pub lowest: f64,
+    /// How far from its own place a visible point may look the map up, metres.
+    pub margin: f64,
 }
 
 impl SeenShadows<'_> {
     /// Whether the shadow of a caster in the sphere (scene metres) may be seen, for a light in `direction` (unit).
     fn includes(&self, center: DVec3, radius: f64, direction: DVec3) -> bool {
+        let radius = radius + self.margin;
         let drop = (center.y + radius - self.lowest).max(0.0);
-        let length = drop / direction.y.max(0.02);
+        let length = drop / direction.y.max(LOWEST_SINE);
         let start = (center - self.camera).as_vec3();
         let end = (center - direction * length - self.camera).as_vec3();
         self.frustum.sees_swept_sphere(start, end, radius as f32)

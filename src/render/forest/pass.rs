@@ -1,8 +1,9 @@
 //! The forest pass of a view.
 
 use bevy::{
-    ecs::system::Res,
+    ecs::{query::With, system::Res},
     render::{
+        camera::ExtractedCamera,
         diagnostic::RecordDiagnostics,
         render_resource::{IndexFormat, PipelineCache, RenderPassDescriptor, StoreOp},
         renderer::{RenderContext, ViewQuery},
@@ -21,7 +22,7 @@ const VERTICES_A_CROSS: u32 = 18;
 
 /// Draws every forest into the camera's colour and depth.
 pub fn forest_pass(
-    view: ViewQuery<(&ViewTarget, &ViewDepthTexture, &CanopyCamera)>,
+    view: ViewQuery<(&ViewTarget, &ViewDepthTexture, &ExtractedCamera), With<CanopyCamera>>,
     frame: Res<FrameBindGroup>,
     forests: Res<GpuForests>,
     prepared: Res<PreparedForests>,
@@ -30,7 +31,7 @@ pub fn forest_pass(
     mut ctx: RenderContext,
 ) {
     let frame = frame.of(view.entity());
-    let (target, depth, _) = view.into_inner();
+    let (target, depth, camera) = view.into_inner();
     let (Some(frame), Some([wood, foliage, crosses])) = (frame, pipelines.current) else { return };
     let something = forests.iter().any(|(entity, _)| {
         prepared.get(entity).is_some_and(|forest| forest.lists.model_count() + forest.lists.cross_count() > 0)
@@ -54,6 +55,9 @@ pub fn forest_pass(
         multiview_mask: None,
     });
     let span = diagnostics.pass_span(&mut pass, "canopy_forest");
+    if let Some(viewport) = &camera.viewport {
+        pass.set_camera_viewport(viewport);
+    }
     for (entity, forest) in forests.iter() {
         let Some(lists) = prepared.get(entity) else { continue };
         pass.set_bind_group(0, frame, &[]);

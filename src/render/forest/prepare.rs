@@ -31,6 +31,7 @@ use crate::{
         cull::{DrawLists, cull_view},
         frame::{FrameLayout, PreparedFrame},
         gpu::{self, GrowingBuffer},
+        report::FrameReport,
         shaders::CanopyShaders,
     },
 };
@@ -115,6 +116,7 @@ pub fn prepare_view_lists(
     device: Res<RenderDevice>,
     queue: Res<RenderQueue>,
     pipelines: Res<PipelineCache>,
+    report: Res<FrameReport>,
     mut prepared: ResMut<PreparedForests>,
     mut statistics: ResMut<ForestStatistics>,
 ) {
@@ -147,6 +149,12 @@ pub fn prepare_view_lists(
         visible.write(&device, &queue, &lists.visible);
         let bind_group = instance_bind_group(&device, &pipelines, &layouts, forest, &buffer, visible.buffer());
         prepared.0.insert(entity, PreparedForest { lists, bind_group, visible, uniform: buffer });
+    }
+    if statistics.models + statistics.crosses == 0 {
+        let why = if order.is_empty() { "the world has no forest" } else { "no tree is in view" };
+        report.skipped("forest", why);
+    } else {
+        report.ran("forest", format!("{} full models, {} crosses", statistics.models, statistics.crosses));
     }
 }
 

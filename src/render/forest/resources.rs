@@ -193,6 +193,8 @@ pub struct GpuForest {
     pub variants: Buffer,
     /// Size of each variant, for culling.
     pub sizes: Vec<VariantSize>,
+    /// Largest scale of any tree.
+    pub max_scale: f32,
     /// Parts by variant.
     pub parts: Vec<Vec<GpuPart>>,
     /// Group 2 of the crosses.
@@ -278,6 +280,7 @@ fn upload(
         trees: gpu::buffer_with::<PackedTree>(device, "canopy_trees", storage, &forest.stand.trees),
         variants: gpu::buffer_with(device, "canopy_variants", storage, &variants),
         sizes,
+        max_scale: forest.stand.cells.iter().map(|cell| cell.max_scale).fold(0.0, f32::max),
         parts,
         cross_bind_group: upload_crosses(&forest.plants, layouts, device, queue, pipelines),
         generation,
@@ -309,10 +312,19 @@ fn variant(index: usize, plant: &BakedPlant, size: &VariantSize) -> VariantUnifo
     }
 }
 
+/// What an image is used for: each use filters it otherwise.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum TextureUse {
+    Wood,
+    /// With the bits of the alpha test's threshold.
+    Foliage(u32),
+    Normal,
+}
+
 /// Textures that several parts share are uploaded once.
 #[derive(Default)]
 struct TextureShelf {
-    views: HashMap<(usize, bool), TextureView>,
+    views: HashMap<(usize, TextureUse), TextureView>,
 }
 
 impl TextureShelf {
@@ -328,8 +340,9 @@ impl TextureShelf {
             return gpu::texture(device, queue, "canopy_white", format, &plain([255; 4]), 1);
         };
         let foliage = kind == PartKind::Foliage;
+        let usage = if foliage { TextureUse::Foliage(material.alpha_cutoff.to_bits()) } else { TextureUse::Wood };
         self.views
-            .entry((Arc::as_ptr(image) as usize, foliage))
+            .entry((Arc::as_ptr(image) as usize, usage))
             .or_insert_with(|| {
                 let chain = if foliage {
                     alpha_tested_mips(&fade_alpha(image, material.alpha_cutoff))
@@ -348,7 +361,7 @@ impl TextureShelf {
             return gpu::texture(device, queue, "canopy_flat", format, &plain([128, 128, 255, 255]), 1);
         };
         self.views
-            .entry((Arc::as_ptr(image) as usize, false))
+            .entry((Arc::as_ptr(image) as usize, TextureUse::Normal))
             .or_insert_with(|| gpu::texture(device, queue, "canopy_normal", format, &normal_mips(image), 1))
             .clone()
     }

@@ -196,6 +196,13 @@ pub fn prepare_frame(
         );
         return;
     }
+    if view.clip_from_view.w_axis.w != 0.0 {
+        error_once!(
+            "a CanopyCamera is orthographic, but sky, fog and levels of detail are made for perspective: nothing of \
+             Canopy is drawn. Give the camera a perspective projection."
+        );
+        return;
+    }
     let (_, rotation, translation) = view.world_from_view.to_scale_rotation_translation();
     if !(translation.is_finite() && rotation.is_finite() && view.clip_from_view.is_finite()) {
         warn_once!("the camera's transform or projection is not finite: Canopy draws nothing until it is");

@@ -12,6 +12,7 @@ use bevy::{
         core_3d::{CORE_3D_DEPTH_FORMAT, main_opaque_pass_3d, main_transparent_pass_3d},
     },
     ecs::{
+        query::With,
         resource::Resource,
         schedule::IntoScheduleConfigs,
         system::{Res, ResMut},
@@ -20,6 +21,7 @@ use bevy::{
     platform::collections::HashMap,
     render::{
         GpuResourceAppExt, Render, RenderApp, RenderSystems,
+        camera::ExtractedCamera,
         diagnostic::RecordDiagnostics,
         render_resource::{
             CachedRenderPipelineId, ColorTargetState, ColorWrites, CompareFunction, DepthBiasState, DepthStencilState,
@@ -127,8 +129,12 @@ fn prepare_pipeline(
     layout: Res<FrameLayout>,
     shaders: Res<CanopyShaders>,
     cache: Res<PipelineCache>,
+    report: Res<FrameReport>,
     mut pipelines: ResMut<SkyPipelines>,
 ) {
+    if frame.view.is_some() {
+        report.ran("sky", "behind everything");
+    }
     pipelines.current = frame.view.as_ref().map(|view| {
         *pipelines.pipelines.entry((view.format, view.samples)).or_insert_with(|| {
             cache.queue_render_pipeline(RenderPipelineDescriptor {
@@ -165,14 +171,14 @@ fn prepare_pipeline(
 
 /// Fills what nothing else covers.
 fn sky_pass(
-    view: ViewQuery<(&ViewTarget, &ViewDepthTexture, &CanopyCamera)>,
+    view: ViewQuery<(&ViewTarget, &ViewDepthTexture, &ExtractedCamera), With<CanopyCamera>>,
     frame: Res<FrameBindGroup>,
     pipelines: Res<SkyPipelines>,
     cache: Res<PipelineCache>,
     mut ctx: RenderContext,
 ) {
     let frame = frame.of(view.entity());
-    let (target, depth, _) = view.into_inner();
+    let (target, depth, camera) = view.into_inner();
     let (Some(frame), Some(pipeline)) = (frame, pipelines.current.and_then(|id| cache.get_render_pipeline(id))) else {
         return;
     };
@@ -187,6 +193,9 @@ fn sky_pass(
         multiview_mask: None,
     });
     let span = diagnostics.pass_span(&mut pass, "canopy_sky");
+    if let Some(viewport) = &camera.viewport {
+        pass.set_camera_viewport(viewport);
+    }
     pass.set_render_pipeline(pipeline);
     pass.set_bind_group(0, frame, &[]);
     pass.draw(0..3, 0..1);

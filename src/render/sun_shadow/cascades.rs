@@ -26,7 +26,14 @@ pub struct CascadeBox {
     pub half_depth: f64,
     /// Metres a texel.
     pub texel: f64,
+    /// How far towards the light a caster may stand and still shade the box, metres from the centre.
+    pub reach_to_light: f64,
 }
+
+/// Farthest caster in metres, and the least sine of the light's elevation that the shadows' length is worked out for.
+const FARTHEST_CASTER: f64 = 12_000.0;
+/// Sine of the lowest light whose shadows are followed to their end.
+pub const LOWEST_SINE: f64 = 2e-3;
 
 impl CascadeBox {
     /// The box for a camera at `camera` (scene metres), served `radius` in metres, `map_size` texels,
@@ -38,11 +45,16 @@ impl CascadeBox {
         let texel = 2.0 * half_width / size;
         let step = (radius * STEP_SHARE / texel).floor().max(1.0) * texel;
         let half_depth = radius + caster_height + step;
-        let direction = rounded_direction(direction, 0.5 * texel, caster_height, 2.0 * half_depth);
+        let sine = direction.try_normalize().map_or(1.0, |d| d.y).max(LOWEST_SINE);
+        // The tallest tree's shadow at this light, and four boxes for trees that stand higher than the box. A power of
+        // two, so that it does not change with every breath of the light.
+        let shadow = half_depth + caster_height / sine;
+        let reach_to_light = shadow.max(4.0 * half_depth).log2().ceil().exp2().min(FARTHEST_CASTER).max(half_depth);
+        let direction = rounded_direction(direction, 0.5 * texel, caster_height, half_depth + shadow);
         let frame = light_frame(direction);
         let seen = frame.transpose() * camera;
         let center = frame * (seen / step).round() * step;
-        Self { center, direction, radius, half_width, half_depth, texel }
+        Self { center, direction, radius, half_width, half_depth, texel, reach_to_light }
     }
 
     /// Metres relative to [`center`](Self::center) to the map's clip space: xy in -1..1, reversed depth (1 at the
@@ -88,7 +100,7 @@ impl CasterReach {
         middle.x.abs() <= place.half_width + reach(frame.x_axis)
             && middle.y.abs() <= place.half_width + reach(frame.y_axis)
             && middle.z >= -place.half_depth - reach(frame.z_axis)
-            && middle.z <= 4.0 * place.half_depth + reach(frame.z_axis)
+            && middle.z <= place.reach_to_light + reach(frame.z_axis)
     }
 }
 
@@ -156,7 +168,7 @@ mod tests {
         fn the_rounded_light_lags_by_half_a_texel_at_most(direction in directions(), radius in 10.0f64..1000.0) {
             let height = 40.0;
             let cascade = CascadeBox::new(DVec3::ZERO, radius, 2048, direction, height);
-            let ray = (height / direction.y.max(1e-6)).min(2.0 * cascade.half_depth);
+            let ray = height / direction.y.max(LOWEST_SINE);
             let lag = direction.angle_between(cascade.direction) * ray;
             prop_assert!(lag <= 0.5 * cascade.texel * 1.01, "lag {lag} texel {}", cascade.texel);
         }

@@ -10,6 +10,7 @@ use bevy::{
         system::{Res, ResMut},
         world::{FromWorld, World},
     },
+    log::warn_once,
     math::Affine3A,
     mesh::{Mesh, VertexBufferLayout},
     platform::collections::HashMap,
@@ -159,6 +160,7 @@ pub fn prepare_mesh_casters(
         let Some(offset) = position.and_then(|index| layout.attributes.get(index)).map(|a| a.offset) else { continue };
         let topology = ready.primitive_topology();
         if offset != 0 || !matches!(topology, PrimitiveTopology::TriangleList) {
+            warn_once!("a mesh with CastsCanopyShadow is no list of triangles, or has no positions first: no shadow");
             continue;
         }
         let pipeline = *casters.pipelines.entry((layout.array_stride, topology)).or_insert_with(|| {
@@ -186,6 +188,7 @@ pub fn prepare_mesh_casters(
             })
         });
         mesh.hash(&mut state);
+        scene.mesh_revisions.get(mesh).hash(&mut state);
         let in_scene = scene.origin + place.translation.as_dvec3();
         in_scene.to_array().map(f64::to_bits).hash(&mut state);
         place.matrix3.to_cols_array().map(f32::to_bits).hash(&mut state);

@@ -31,7 +31,7 @@ use crate::{
     plant::PartKind,
     render::{
         components::SunShadowSettings,
-        cull::{DrawLists, SeenShadows, cull_cascade},
+        cull::{DrawLists, SeenShadows, VariantSize, cull_cascade},
         extract::ExtractedScene,
         forest::{ForestLayouts, GpuForests, PlantVertex, forest_view, instance_bind_group},
         frame::{
@@ -247,7 +247,11 @@ pub fn prepare_shadows(
         return;
     }
     maps.resize(&device, &settings);
-    let tallest = forests.iter().flat_map(|(_, forest)| &forest.sizes).map(|size| size.height).fold(10.0f32, f32::max);
+    let largest = |measure: fn(&VariantSize) -> f32| {
+        forests.iter().flat_map(move |(_, f)| f.sizes.iter().map(move |size| measure(size) * f.max_scale))
+    };
+    let tallest = largest(|size| size.height).fold(10.0f32, f32::max);
+    let widest = largest(|size| size.radius).fold(0.0f32, f32::max);
     let radii = cascade_radii(maps.layers.len(), settings.distance.max(1.0), settings.finest_radius.max(1.0));
     maps.cascades = radii
         .iter()
@@ -264,15 +268,20 @@ pub fn prepare_shadows(
         };
         let name = format!("sun_shadow cascade {index}");
         let this_view = (view.camera, view.clip_from_relative);
-        let known = maps.drawn[index].as_ref().filter(|drawn| drawn.key == key);
-        if known.is_some_and(|drawn| drawn.seen_by.is_none_or(|seen_by| seen_by == this_view)) {
+        let drawn = maps.drawn[index].as_ref();
+        let fits = |drawn: &DrawnCascade| drawn.key == key && drawn.seen_by.is_none_or(|seen_by| seen_by == this_view);
+        if drawn.is_some_and(fits) {
             report.skipped(name, "light, box and casters rest");
             continue;
         }
-        // A new map is drawn for this view only: while the light moves, it will not live to see another. If it does, it
-        // is completed once and kept. What this view shows is the same either way.
-        let lowest = lowest_receiver(&scene, view.camera, place.radius);
-        let seen = known.is_none().then(|| SeenShadows { camera: view.camera, frustum: &view.frustum, lowest });
+        // Under a new light the map is drawn for this view only: while the light moves, it will not live to see another.
+        // If it does, it is completed once and kept. What this view shows is the same either way, as the margin holds what
+        // the shaders add to a place before they look it up: a few texels, half a crown for crosses.
+        let same_light = drawn.is_some_and(|drawn| drawn.key.place.direction == key.place.direction);
+        let margin = 6.0 * place.texel + 0.6 * f64::from(widest);
+        let lowest = lowest_receiver(&scene, view.camera, place.radius) - margin;
+        let seen =
+            (!same_light).then(|| SeenShadows { camera: view.camera, frustum: &view.frustum, lowest, margin });
         let content = DrawnCascade { key, seen_by: seen.as_ref().map(|_| this_view) };
         let uniform = CascadeViewUniform {
             clip_from_anchor: place.clip_from_anchor().to_cols_array_2d(),

@@ -1,8 +1,9 @@
 //! The terrain pass of a view.
 
 use bevy::{
-    ecs::system::Res,
+    ecs::{query::With, system::Res},
     render::{
+        camera::ExtractedCamera,
         diagnostic::RecordDiagnostics,
         render_resource::{IndexFormat, PipelineCache, RenderPassDescriptor, StoreOp},
         renderer::{RenderContext, ViewQuery},
@@ -15,7 +16,7 @@ use crate::render::{components::CanopyCamera, frame::FrameBindGroup};
 
 /// Draws the ground into the camera's colour and depth.
 pub fn terrain_pass(
-    view: ViewQuery<(&ViewTarget, &ViewDepthTexture, &CanopyCamera)>,
+    view: ViewQuery<(&ViewTarget, &ViewDepthTexture, &ExtractedCamera), With<CanopyCamera>>,
     frame: Res<FrameBindGroup>,
     terrain: Res<GpuTerrain>,
     pipelines: Res<TerrainPipelines>,
@@ -23,7 +24,7 @@ pub fn terrain_pass(
     mut ctx: RenderContext,
 ) {
     let frame = frame.of(view.entity());
-    let (target, depth, _) = view.into_inner();
+    let (target, depth, camera) = view.into_inner();
     let (Some(frame), Some(tiles), Some(pipeline)) =
         (frame, &terrain.bind_group, pipelines.current.and_then(|id| cache.get_render_pipeline(id)))
     else {
@@ -43,6 +44,9 @@ pub fn terrain_pass(
         multiview_mask: None,
     });
     let span = diagnostics.pass_span(&mut pass, "canopy_terrain");
+    if let Some(viewport) = &camera.viewport {
+        pass.set_camera_viewport(viewport);
+    }
     pass.set_render_pipeline(pipeline);
     pass.set_bind_group(0, frame, &[]);
     pass.set_bind_group(1, tiles, &[]);
