@@ -64,6 +64,19 @@ pub enum AppError {
         /// Names of those that are there.
         present: String,
     },
+    /// The environment names another adapter than the request, and has the last word.
+    #[error(
+        "WGPU_ADAPTER_NAME is set to `{environment}` and overrides --adapter `{wanted}`, which is {chosen}; unset \
+         WGPU_ADAPTER_NAME"
+    )]
+    AdapterConflict {
+        /// Value of the variable.
+        environment: String,
+        /// What the request asks for.
+        wanted: String,
+        /// Name of the adapter that the request means.
+        chosen: String,
+    },
     /// No display to open a window on.
     #[error(
         "no window can be opened: {details}; use `canopy render` for pictures without one, or run this in a virtual \
@@ -96,6 +109,17 @@ pub enum AppError {
         /// Individuals.
         count: usize,
         /// Most there can be.
+        limit: usize,
+    },
+    /// More trees than the device's largest buffer holds.
+    #[error(
+        "the scene has {count} trees, but this device holds at most {limit}; lower the stems per hectare, take a \
+         smaller area or inventory, or choose another device with --adapter (see --list-adapters)"
+    )]
+    TooManyTrees {
+        /// Trees of the stand.
+        count: usize,
+        /// The most that the device holds.
         limit: usize,
     },
     /// Nobody knows where on earth the scene lies.

@@ -1,6 +1,11 @@
 //! Pictures without a window: the frames of a plan, one after another, each a function of its own arguments.
 
-use std::{path::Path, sync::Arc, time::Instant};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+    sync::{Arc, Mutex},
+    time::Instant,
+};
 
 use bevy::{
     app::{App, PluginGroup, PluginsState},
@@ -19,7 +24,7 @@ use bevy::{
             TexelCopyBufferLayout, TextureDimension, TextureFormat, TextureUsages,
         },
         renderer::{RenderDevice, RenderQueue},
-        settings::RenderCreation,
+        settings::{RenderCreation, WgpuSettings},
         texture::GpuImage,
         view::Msaa,
     },
@@ -36,7 +41,8 @@ use crate::{
         components::CanopyCamera,
         report::{FrameReport, PassOutcome},
     },
-    scene::{Progress, RenderOptions, RenderPlan, RenderReport, Viewpoint},
+    scatter::PackedTree,
+    scene::{Progress, RenderOptions, RenderPlan, RenderReport, Scene, Viewpoint},
 };
 
 /// Draws the pictures that `options` ask for.
@@ -44,12 +50,18 @@ use crate::{
 /// # Errors
 /// [`AppError`]; pictures that were finished before it stay, nothing half-written does.
 pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<RenderReport, AppError> {
+    // The scene's own errors come first, then the device's: both are found before the long work, and before anything is
+    // left behind.
+    Scene::read(&options.scene)?;
+    let settings = adapter::settings(options.adapter.as_deref())?;
+    adapter::check_size(&settings, options.size)?;
     let stage = Stage::build(&options.scene, options.seed, progress)?;
     let plan = RenderPlan::new(options, &stage.scene, &|x, z| stage.terrain.height(x, z))?;
     check_writable(&plan)?;
     let started = Instant::now();
     progress.begin("Renderer", 0);
-    let mut renderer = Renderer::new(options.size, options.adapter.as_deref(), stage.scene.quality.msaa)?;
+    let mut renderer = Renderer::with_settings(settings, options.size, stage.scene.quality.msaa)?;
+    renderer.check_trees(&stage)?;
     renderer.show(&stage);
     progress.end();
     progress.note(&format!("renderer: {:.2} s", started.elapsed().as_secs_f64()));
@@ -76,16 +88,18 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
     Ok(report)
 }
 
-/// Finds out before the long work whether its results can be kept.
+/// Finds out before the first picture is drawn whether all of them can be kept; makes the folders that are missing.
 fn check_writable(plan: &RenderPlan) -> Result<(), AppError> {
-    let Some(frame) = plan.frames.first() else { return Ok(()) };
-    let folder = match frame.file.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
+    let folder = |file: &Path| match file.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
+        _ => PathBuf::from("."),
     };
-    let failed = |source| AppError::Write { path: folder.to_owned(), source };
-    std::fs::create_dir_all(folder).map_err(failed)?;
-    tempfile::Builder::new().prefix(".canopy-").tempfile_in(folder).map_err(failed)?;
+    let folders: BTreeSet<PathBuf> = plan.frames.iter().map(|frame| folder(&frame.file)).collect();
+    for folder in &folders {
+        let failed = |source| AppError::Write { path: folder.clone(), source };
+        std::fs::create_dir_all(folder).map_err(failed)?;
+        tempfile::Builder::new().prefix(".canopy-").tempfile_in(folder).map_err(failed)?;
+    }
     Ok(())
 }
 
@@ -96,15 +110,20 @@ pub struct Renderer {
     target: Handle<Image>,
     size: (u32, u32),
     warm: bool,
+    /// First error that the device reported and nobody was told of yet.
+    fault: Arc<Mutex<Option<String>>>,
 }
 
 impl Renderer {
     /// A renderer for pictures of `size` pixels on the adapter whose name contains `adapter`, with `msaa` samples.
     ///
     /// # Errors
-    /// [`AppError::NoAdapter`], [`AppError::UnknownAdapter`], [`AppError::TooLarge`].
+    /// [`AppError::NoAdapter`], [`AppError::UnknownAdapter`], [`AppError::AdapterConflict`], [`AppError::TooLarge`].
     pub fn new(size: (u32, u32), adapter: Option<&str>, msaa: u32) -> Result<Self, AppError> {
-        let settings = adapter::settings(adapter)?;
+        Self::with_settings(adapter::settings(adapter)?, size, msaa)
+    }
+
+    fn with_settings(settings: WgpuSettings, size: (u32, u32), msaa: u32) -> Result<Self, AppError> {
         let mut app = App::new();
         app.add_plugins(
             DefaultPlugins
@@ -128,6 +147,7 @@ impl Renderer {
         }
         app.finish();
         app.cleanup();
+        let fault = report_faults(app.world().resource::<RenderDevice>());
         let limit = app.world().resource::<RenderDevice>().limits().max_texture_dimension_2d;
         if size.0 > limit || size.1 > limit || size.0 == 0 || size.1 == 0 {
             return Err(AppError::TooLarge { width: size.0, height: size.1, limit });
@@ -144,7 +164,24 @@ impl Renderer {
                 camera::TONEMAPPING,
             ))
             .id();
-        Ok(Self { app, camera, target, size, warm: false })
+        Ok(Self { app, camera, target, size, warm: false, fault })
+    }
+
+    /// Refuses a stand beyond the device's largest storage buffer, in which all trees lie.
+    fn check_trees(&self, stage: &Stage) -> Result<(), AppError> {
+        let limits = self.app.world().resource::<RenderDevice>().limits();
+        let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let limit = usize::try_from(bytes).unwrap_or(usize::MAX) / size_of::<PackedTree>();
+        let count = stage.stand.trees.len();
+        if count > limit { Err(AppError::TooManyTrees { count, limit }) } else { Ok(()) }
+    }
+
+    /// Fails with the first error that the device reported since the last time.
+    fn check_fault(&self) -> Result<(), AppError> {
+        match self.fault.lock().ok().and_then(|mut fault| fault.take()) {
+            Some(what) => Err(AppError::Render(what)),
+            None => Ok(()),
+        }
     }
 
     /// The Bevy app, to put further entities into its world.
@@ -181,6 +218,9 @@ impl Renderer {
     }
 
     /// Draws one frame and waits until the device has finished it.
+    ///
+    /// # Errors
+    /// [`AppError::Render`] with what the device says of this very frame.
     pub fn update(&mut self) -> Result<(), AppError> {
         if !self.warm {
             // The first update brings meshes, textures and shaders to the device, and draws nothing yet.
@@ -193,6 +233,8 @@ impl Renderer {
         self.app.update();
         let device = self.app.world().resource::<RenderDevice>();
         let waited = device.wgpu_device().poll(PollType::Wait { submission_index: None, timeout: None });
+        // What the device reported says more than that it could not be waited for.
+        self.check_fault()?;
         waited.map_err(|error| AppError::Render(error.to_string()))?;
         match self.app.should_exit() {
             Some(exit) if exit.is_error() => {
@@ -252,7 +294,7 @@ impl Renderer {
             Extent3d { width, height, depth_or_array_layers: 1 },
         );
         queue.submit([encoder.finish()]);
-        let outcome = Arc::new(std::sync::Mutex::new(None));
+        let outcome = Arc::new(Mutex::new(None));
         let told = outcome.clone();
         let slice = buffer.slice(..);
         slice.map_async(MapMode::Read, move |result| {
@@ -260,10 +302,9 @@ impl Renderer {
                 *slot = Some(result);
             }
         });
-        device
-            .wgpu_device()
-            .poll(PollType::Wait { submission_index: None, timeout: None })
-            .map_err(|error| failed(&error.to_string()))?;
+        let waited = device.wgpu_device().poll(PollType::Wait { submission_index: None, timeout: None });
+        self.check_fault()?;
+        waited.map_err(|error| failed(&error.to_string()))?;
         match outcome.lock().ok().and_then(|mut slot| slot.take()) {
             Some(Ok(())) => {}
             Some(Err(error)) => return Err(failed(&error.to_string())),
@@ -283,6 +324,21 @@ impl Renderer {
     pub fn ahead(view: &Viewpoint, metres: f64) -> DVec3 {
         view.position + view.forward() * metres
     }
+}
+
+/// Where the device's errors go from now on, the first of them.
+///
+/// Bevy's own handler, which this replaces, tells of an error only with the next frame; the one in which it arose would
+/// be kept as a broken picture.
+fn report_faults(device: &RenderDevice) -> Arc<Mutex<Option<String>>> {
+    let fault = Arc::new(Mutex::new(None));
+    let told = fault.clone();
+    device.wgpu_device().on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+        if let Ok(mut slot) = told.lock() {
+            slot.get_or_insert(error.to_string());
+        }
+    }));
+    fault
 }
 
 fn render_target(app: &mut App, (width, height): (u32, u32)) -> Handle<Image> {

@@ -21,8 +21,10 @@ use crate::{
 
 /// Metres a texel of the cover map.
 const COVER_TEXEL: f64 = 8.0;
-/// Share of a plant's half width that counts as its crown's radius.
+/// Share of a plant's half width, the greater of its two, that counts as its crown's radius.
 const CROWN_SHARE: f32 = 0.8;
+/// Extent of a plant without any surface, metres.
+const NO_PLANT: VariantBounds = VariantBounds { radius: 0.1, height: 0.1 };
 
 /// A scene, built.
 pub struct Stage {
@@ -70,10 +72,7 @@ impl Stage {
         let cover = if stand.trees.is_empty() {
             None
         } else {
-            let crowns: Vec<VariantBounds> = bounds
-                .iter()
-                .map(|bounds| VariantBounds { radius: bounds.radius * CROWN_SHARE, height: bounds.height })
-                .collect();
+            let crowns: Vec<VariantBounds> = plants.iter().map(crown).collect();
             Some(Arc::new(cover_map(&packed, &crowns, COVER_TEXEL, None)?))
         };
         progress.end();
@@ -144,11 +143,22 @@ pub(super) fn observer(scene: &Scene, terrain: &Terrain, path: &Path) -> Result<
     Ok(Observer::new(latitude, longitude, height)?)
 }
 
+/// What holds the plant whatever its yaw: it turns about the trunk's axis, which is seldom the middle of its box, and
+/// the box's corners reach farther than its sides.
 fn variant_bounds(plant: &BakedPlant) -> VariantBounds {
-    plant.plant.bounds().map_or(VariantBounds { radius: 0.1, height: 0.1 }, |bounds| {
-        let size = bounds.size();
-        VariantBounds { radius: (0.5 * size.x.max(size.z)).max(0.01), height: bounds.max.y.max(0.01) }
+    plant.plant.bounds().map_or(NO_PLANT, |bounds| {
+        let far = bounds.min.abs().max(bounds.max.abs());
+        VariantBounds { radius: far.x.hypot(far.z).max(0.01), height: bounds.max.y.max(0.01) }
     })
+}
+
+/// The disc of ground that the plant's crown covers, which is smaller than what holds every twig of it.
+fn crown(plant: &BakedPlant) -> VariantBounds {
+    let (half_width, height) = plant.plant.bounds().map_or((NO_PLANT.radius, NO_PLANT.height), |bounds| {
+        let size = bounds.size();
+        ((0.5 * size.x.max(size.z)).max(0.01), bounds.max.y.max(0.01))
+    });
+    VariantBounds { radius: half_width * CROWN_SHARE, height }
 }
 
 fn bake(

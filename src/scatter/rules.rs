@@ -5,8 +5,10 @@ use std::ops::Range;
 use super::stand::{Area, MAX_COORDINATE_M, MAX_SCALE, MIN_SCALE};
 use super::{ScatterError, hash};
 
-/// The most trees a stand holds: 2²⁶, some 3 GiB.
-pub const MAX_TREES: u32 = 1 << 26;
+/// The most trees that rules may ask for: 32 million, some 1.5 GiB while they are placed and 512 MB on the device.
+///
+/// A device may hold fewer, by its largest storage buffer.
+pub const MAX_TREES: u32 = 32_000_000;
 
 /// The largest share of the ground that discs of the least distance as diameter may cover.
 ///
