@@ -39,11 +39,11 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     return out;
 }
 
-// One texel of the fitting level, as in model.wgsl.
+// One texel, as in model.wgsl, but of a level that is twice as fine: a cross has few texels, and their sum must hold.
 fn alpha(uv: vec2<f32>, layer: u32) -> f32 {
     let size = vec2<f32>(textureDimensions(color_pictures));
     let texels = max(fwidth(uv.x) * size.x, fwidth(uv.y) * size.y);
-    let level = clamp(i32(log2(max(texels, 1.0))), 0, i32(textureNumLevels(color_pictures)) - 1);
+    let level = clamp(i32(log2(max(0.5 * texels, 1.0))), 0, i32(textureNumLevels(color_pictures)) - 1);
     let place = clamp(uv, vec2(0.0), vec2(0.9999)) * vec2<f32>(textureDimensions(color_pictures, level));
     return textureLoad(color_pictures, vec2<i32>(place), i32(layer), level).a;
 }

@@ -27,7 +27,7 @@ use super::stand::{Ground, Stand, Tree, XzPlane, sink};
 /// Points that one task evaluates: two rounds of the ternary table.
 const CHUNK: u64 = 4374;
 
-/// Candidates for each tree of the full area before a least distance is given up. 64 times 2²⁶ trees still have indices
+/// Candidates for each tree of the full area before a least distance is given up. 64 times 32 million trees still have indices
 /// of 32 bits.
 const MAX_EFFORT: u64 = 64;
 

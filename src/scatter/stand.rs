@@ -77,7 +77,7 @@ impl Area {
 /// One tree of a stand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tree {
-    /// The foot of the trunk: on the ground, or a little below it on a slope (see [`sink`]). Scene-local metres.
+    /// The foot of the trunk: on the ground, or a little below it on a slope (see `sink`). Scene-local metres.
     pub position: DVec3,
     /// Turn about the trunk, radians, 0 to 2π, counter-clockwise seen from above.
     pub yaw: f32,

@@ -121,6 +121,10 @@ fn a_kept_shadow_is_the_one_that_would_be_drawn() {
         cascades.iter().filter(|line| line.contains(": ran")).count()
     };
     assert_eq!(ran(&kept.explain()), 2);
+    // Under a new light the maps hold what the first view sees; the second completes them, the third finds them whole.
+    let between = Viewpoint { position: here.position + DVec3::new(0.02, 0.01, -0.02), ..here };
+    draw(&mut kept, stage, &between, NOON);
+    assert_eq!(ran(&kept.explain()), 2, "{:?}", kept.explain());
     let picture = draw(&mut kept, stage, &aside, NOON);
     assert_eq!(ran(&kept.explain()), 0, "{:?}", kept.explain());
     let fresh = draw(&mut showing(stage), stage, &aside, NOON);

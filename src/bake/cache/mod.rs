@@ -2,7 +2,7 @@
 //!
 //! The name of a file is the BLAKE3 hash of everything that the bake reads (meshes, materials, textures, settings)
 //! and of the version of the bakes: a changed input is another file, so nothing ever has to be invalidated. A file
-//! is believed only after its magic, version, key, length and checksum agree ([`codec`]); anything else counts as
+//! is believed only after its magic, version, key, length and checksum agree (`codec.rs`); anything else counts as
 //! absent and is computed and written again. Files appear whole or not at all (written beside, then renamed), so
 //! any number of processes may share a folder.
 //!

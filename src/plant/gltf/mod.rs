@@ -1,4 +1,4 @@
-//! glTF and GLB to [`Plant`](super::Plant).
+//! glTF and GLB to [`Plant`].
 //!
 //! Reads glTF 2.0 [Khronos 2021] as JSON or GLB, with buffers and images in the file, in data URIs or in files beside
 //! it. What is used of it: the default scene's triangles with position, normal and one set of texture coordinates;

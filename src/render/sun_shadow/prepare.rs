@@ -280,7 +280,7 @@ pub fn prepare_shadows(
         let same_light = drawn.is_some_and(|drawn| drawn.key.place.direction == key.place.direction);
         let margin = 6.0 * place.texel + 0.6 * f64::from(widest);
         let lowest = lowest_receiver(&scene, view.camera, place.radius) - margin;
-        let seen = (!same_light).then(|| SeenShadows { camera: view.camera, frustum: &view.frustum, lowest, margin });
+        let seen = (!same_light).then_some(SeenShadows { camera: view.camera, frustum: &view.frustum, lowest, margin });
         let content = DrawnCascade { key, seen_by: seen.as_ref().map(|_| this_view) };
         let uniform = CascadeViewUniform {
             clip_from_anchor: place.clip_from_anchor().to_cols_array_2d(),
