@@ -66,6 +66,8 @@ find_build_tools() {
 }
 
 find_vulkan() {
+    # With one software driver there is nothing to select, and Mesa's layer for it complains where no Wayland display is.
+    has_gpu || export NODEVICE_SELECT="${NODEVICE_SELECT:-1}"
     has_library libvulkan.so.1 || need_package libvulkan1
     # Who names the drivers knows better.
     if [[ -n "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}" ]]; then

@@ -6,7 +6,7 @@ use bevy::{
     ecs::{
         message::{MessageReader, MessageWriter},
         query::With,
-        system::{Commands, Res, ResMut, Single},
+        system::{Commands, Local, Res, ResMut, Single},
     },
     input::{
         ButtonInput, ButtonState,
@@ -84,10 +84,19 @@ pub fn obey(
     mut session: ResMut<Session>,
     mut cursor: Single<&mut CursorOptions, With<PrimaryWindow>>,
     mut exit: MessageWriter<AppExit>,
+    mut shift: Local<bool>,
 ) {
-    let shift = held.any_pressed([KeyCode::ShiftLeft, KeyCode::ShiftRight]);
-    for key in keys.read().filter(|key| key.state == ButtonState::Pressed) {
-        let Some(command) = controls::command(key.key_code, &key.logical_key, shift, key.repeat) else { continue };
+    const SHIFTS: [KeyCode; 2] = [KeyCode::ShiftLeft, KeyCode::ShiftRight];
+    for key in keys.read() {
+        let pressed = key.state == ButtonState::Pressed;
+        // In the order of the strokes: in one slow frame Shift may have come and gone again.
+        if SHIFTS.contains(&key.key_code) {
+            *shift = pressed;
+        }
+        if !pressed {
+            continue;
+        }
+        let Some(command) = controls::command(key.key_code, &key.logical_key, *shift, key.repeat) else { continue };
         match command {
             Command::Leave if caught(&cursor) => set_caught(&mut cursor, false),
             Command::Leave => {
@@ -96,6 +105,8 @@ pub fn obey(
             _ => session.carry_out(command),
         }
     }
+    // A window that lost the focus hears of no release.
+    *shift = held.any_pressed(SHIFTS);
 }
 
 /// Flies for the time since the last frame.
