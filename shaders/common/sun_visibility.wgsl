@@ -41,12 +41,12 @@ fn pixel_noise(pixel: vec2<f32>) -> f32 {
 
 // x: visibility from the cascades, y: weight of that knowledge (0 beyond the last cascade).
 //
-// Each pixel reads one cascade: where two meet, noise decides which, over the last 15 % of the finer one's radius. Software
+// Each pixel reads one cascade: where two meet, noise decides which, over the last 7 % of the finer one's radius. Software
 // rasterisers run both sides of every branch, so the choice is arithmetic.
 fn cascaded_visibility(relative: vec3<f32>, normal: vec3<f32>, bias: f32, pixel: vec2<f32>) -> vec2<f32> {
     let last = i32(shadow.count.x) - 1;
     let distance = length(relative);
-    let jittered = distance / mix(0.85, 1.0, pixel_noise(pixel));
+    let jittered = distance / mix(0.93, 1.0, pixel_noise(pixel));
     var index = 0;
     for (var i = 0; i < last; i += 1) {
         index += i32(jittered >= shadow.cascades[i].size.y);

@@ -109,7 +109,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         // The crown's own shadow: its far side lies behind all of its leaves, of which the maps know one picture.
         let side = dot(normal, light.key_direction.xyz);
         let own = mix(1.0, smoothstep(-0.6, 0.3, side), foliage);
-        visibility *= mix(own, near.x * mix(0.5, 1.0, own), near.y);
+        visibility *= mix(own, near.x * mix(0.75, 1.0, own), near.y);
     }
     visibility *= mix(1.0, leaf_visibility(properties.b), foliage);
     var color = shade(surface, visibility);
