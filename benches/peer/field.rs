@@ -125,9 +125,9 @@ impl Field {
             tree.tint = 0.0;
         }
         let size = plant.plant.bounds().map_or(glam::Vec3::ONE, |bounds| bounds.size());
-        let bounds = VariantBounds { radius: 0.5 * size.x.max(size.z), height: size.y };
+        let bounds = VariantBounds { radius: plant.plant.reach(), height: plant.plant.height() };
         let stand = PackedStand::new(&stand, DEFAULT_CELL_SIZE, &[bounds])?;
-        let crown = VariantBounds { radius: 0.8 * bounds.radius, ..bounds };
+        let crown = VariantBounds { radius: 0.8 * 0.5 * size.x.max(size.z), ..bounds };
         let cover = cover_map(&stand, &[crown], 8.0, None)?;
         Ok(Self {
             plant: plant.clone(),

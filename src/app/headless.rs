@@ -32,7 +32,6 @@ use bevy::{
     winit::WinitPlugin,
 };
 use chrono::{DateTime, Utc};
-use glam::DVec3;
 
 use super::{adapter, camera, error::AppError, notes::notes, picture::Picture, stage::Stage};
 use crate::{
@@ -318,11 +317,6 @@ impl Renderer {
             }
         }
         Ok(Picture { width, height, pixels })
-    }
-
-    /// Camera position of a viewpoint in scene metres, for tests that place things before it.
-    pub fn ahead(view: &Viewpoint, metres: f64) -> DVec3 {
-        view.position + view.forward() * metres
     }
 }
 

@@ -143,13 +143,12 @@ pub(super) fn observer(scene: &Scene, terrain: &Terrain, path: &Path) -> Result<
     Ok(Observer::new(latitude, longitude, height)?)
 }
 
-/// What holds the plant whatever its yaw: it turns about the trunk's axis, which is seldom the middle of its box, and
-/// the box's corners reach farther than its sides.
+/// What holds the plant whatever its yaw.
 fn variant_bounds(plant: &BakedPlant) -> VariantBounds {
-    plant.plant.bounds().map_or(NO_PLANT, |bounds| {
-        let far = bounds.min.abs().max(bounds.max.abs());
-        VariantBounds { radius: far.x.hypot(far.z).max(0.01), height: bounds.max.y.max(0.01) }
-    })
+    let plant = &plant.plant;
+    plant
+        .bounds()
+        .map_or(NO_PLANT, |_| VariantBounds { radius: plant.reach().max(0.01), height: plant.height().max(0.01) })
 }
 
 /// The disc of ground that the plant's crown covers, which is smaller than what holds every twig of it.

@@ -123,6 +123,15 @@ impl Plant {
         self.bounds().map_or(0.0, |b| b.max.y.max(0.0))
     }
 
+    /// Radius in metres of the upright cylinder about the trunk's axis that holds the plant whatever its yaw: the axis is
+    /// seldom the middle of the box, whose corners reach farther than its sides (0 for an empty plant).
+    pub fn reach(&self) -> f32 {
+        self.bounds().map_or(0.0, |b| {
+            let far = b.min.abs().max(b.max.abs());
+            far.x.hypot(far.z)
+        })
+    }
+
     /// Number of triangles of the parts of `kind`.
     pub fn triangle_count(&self, kind: PartKind) -> usize {
         self.parts.iter().filter(|part| part.kind == kind).map(|part| part.mesh.triangles.len()).sum()

@@ -288,11 +288,7 @@ fn upload(
 }
 
 fn variant_size(plant: &BakedPlant) -> VariantSize {
-    plant.plant.bounds().map_or(VariantSize { height: 0.0, radius: 0.0 }, |bounds| VariantSize {
-        height: bounds.max.y.max(0.0),
-        radius: Vec3::new(bounds.min.x.abs().max(bounds.max.x.abs()), 0.0, bounds.min.z.abs().max(bounds.max.z.abs()))
-            .length(),
-    })
+    VariantSize { height: plant.plant.height(), radius: plant.plant.reach() }
 }
 
 fn variant(index: usize, plant: &BakedPlant, size: &VariantSize) -> VariantUniform {
