@@ -7,9 +7,7 @@
 //! Kind to stock: wood has no normal map (it would need tangents), the sky is a clear colour, there is no fog, and the
 //! picture is not HDR; ours has all four.
 
-use std::sync::{Arc, Mutex};
-
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, bail};
 use bevy::{
     app::{App, PluginGroup, PluginsState},
     asset::{Assets, Handle, RenderAssetUsages},
@@ -31,10 +29,7 @@ use bevy::{
         RenderApp, RenderPlugin,
         pipelined_rendering::PipelinedRenderingPlugin,
         render_asset::RenderAssets,
-        render_resource::{
-            BufferDescriptor, BufferUsages, CommandEncoderDescriptor, Extent3d, Face, MapMode, PollType,
-            TexelCopyBufferInfo, TexelCopyBufferLayout, TextureDimension, TextureFormat, TextureUsages,
-        },
+        render_resource::{Extent3d, Face, PollType, TextureDimension, TextureFormat, TextureUsages},
         renderer::{RenderDevice, RenderQueue},
         texture::GpuImage,
         view::Msaa,
@@ -49,6 +44,7 @@ use canopy::{
         PartKind, PlantMaterial, PlantMesh,
         texture::{MipChain, alpha_tested_mips, color_mips, fade_alpha},
     },
+    render::readback::read_rgb,
     scene::Viewpoint,
 };
 use glam::{Quat, Vec2, Vec3};
@@ -191,41 +187,8 @@ impl Stock {
         let device = render_world.resource::<RenderDevice>();
         let images = render_world.resource::<RenderAssets<GpuImage>>();
         let image = images.get(&self.target).context("stock Bevy has drawn no picture")?;
+        let pixels = read_rgb(device, render_world.resource::<RenderQueue>(), &image.texture)?;
         let (width, height) = self.size;
-        let row = RenderDevice::align_copy_bytes_per_row(4 * width as usize);
-        let buffer = device.create_buffer(&BufferDescriptor {
-            label: Some("readback"),
-            size: row as u64 * u64::from(height),
-            usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
-            mapped_at_creation: false,
-        });
-        let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor::default());
-        encoder.copy_texture_to_buffer(
-            image.texture.as_image_copy(),
-            TexelCopyBufferInfo {
-                buffer: &buffer,
-                layout: TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row as u32), rows_per_image: None },
-            },
-            Extent3d { width, height, depth_or_array_layers: 1 },
-        );
-        render_world.resource::<RenderQueue>().submit([encoder.finish()]);
-        let outcome = Arc::new(Mutex::new(None));
-        let told = outcome.clone();
-        buffer.slice(..).map_async(MapMode::Read, move |result| {
-            if let Ok(mut slot) = told.lock() {
-                *slot = Some(result);
-            }
-        });
-        self.wait()?;
-        let mapped = outcome.lock().ok().and_then(|mut slot| slot.take());
-        mapped.ok_or_else(|| anyhow!("the device did not answer"))??;
-        let pixels = buffer
-            .slice(..)
-            .get_mapped_range()
-            .chunks_exact(row)
-            .flat_map(|line| line[..4 * width as usize].chunks_exact(4))
-            .flat_map(|pixel| [pixel[0], pixel[1], pixel[2]])
-            .collect();
         RgbImage::from_raw(width, height, pixels).context("a picture of another size")
     }
 }

@@ -19,10 +19,7 @@ use bevy::{
         RenderApp, RenderPlugin,
         pipelined_rendering::PipelinedRenderingPlugin,
         render_asset::RenderAssets,
-        render_resource::{
-            BufferDescriptor, BufferUsages, CommandEncoderDescriptor, Extent3d, MapMode, PollType, TexelCopyBufferInfo,
-            TexelCopyBufferLayout, TextureDimension, TextureFormat, TextureUsages,
-        },
+        render_resource::{Extent3d, PollType, TextureDimension, TextureFormat, TextureUsages},
         renderer::{RenderDevice, RenderQueue},
         settings::{RenderCreation, WgpuSettings},
         texture::GpuImage,
@@ -38,6 +35,7 @@ use crate::{
     CanopyPlugins,
     render::{
         components::CanopyCamera,
+        readback::read_rgb,
         report::{FrameReport, PassOutcome},
     },
     scatter::PackedTree,
@@ -54,7 +52,8 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
     Scene::read(&options.scene)?;
     let settings = adapter::settings(options.adapter.as_deref())?;
     adapter::check_size(&settings, options.size)?;
-    let stage = Stage::build(&options.scene, options.seed, progress)?;
+    let mut stage = Stage::build(&options.scene, options.seed, progress)?;
+    stage.set_samples(options.msaa);
     let plan = RenderPlan::new(options, &stage.scene, &|x, z| stage.terrain.height(x, z))?;
     check_writable(&plan)?;
     let started = Instant::now();
@@ -269,53 +268,18 @@ impl Renderer {
     /// # Errors
     /// [`AppError::Render`].
     pub fn read(&self) -> Result<Picture, AppError> {
-        let failed = |what: &str| AppError::Render(format!("the picture could not be read back: {what}"));
         let render_world = self.app.sub_app(RenderApp).world();
         let device = render_world.resource::<RenderDevice>();
         let queue = render_world.resource::<RenderQueue>();
         let images = render_world.resource::<RenderAssets<GpuImage>>();
-        let image = images.get(&self.target).ok_or_else(|| failed("it was never drawn"))?;
-        let (width, height) = self.size;
-        let row = RenderDevice::align_copy_bytes_per_row(4 * width as usize);
-        let buffer = device.create_buffer(&BufferDescriptor {
-            label: Some("canopy_readback"),
-            size: row as u64 * u64::from(height),
-            usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
-            mapped_at_creation: false,
-        });
-        let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor::default());
-        encoder.copy_texture_to_buffer(
-            image.texture.as_image_copy(),
-            TexelCopyBufferInfo {
-                buffer: &buffer,
-                layout: TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row as u32), rows_per_image: None },
-            },
-            Extent3d { width, height, depth_or_array_layers: 1 },
-        );
-        queue.submit([encoder.finish()]);
-        let outcome = Arc::new(Mutex::new(None));
-        let told = outcome.clone();
-        let slice = buffer.slice(..);
-        slice.map_async(MapMode::Read, move |result| {
-            if let Ok(mut slot) = told.lock() {
-                *slot = Some(result);
-            }
-        });
-        let waited = device.wgpu_device().poll(PollType::Wait { submission_index: None, timeout: None });
+        let image = images
+            .get(&self.target)
+            .ok_or_else(|| AppError::Render("the picture could not be read back: it was never drawn".to_owned()))?;
+        let pixels = read_rgb(device, queue, &image.texture);
+        // What the device reported says more than that nothing came back.
         self.check_fault()?;
-        waited.map_err(|error| failed(&error.to_string()))?;
-        match outcome.lock().ok().and_then(|mut slot| slot.take()) {
-            Some(Ok(())) => {}
-            Some(Err(error)) => return Err(failed(&error.to_string())),
-            None => return Err(failed("the device did not answer")),
-        }
-        let mapped = slice.get_mapped_range();
-        let mut pixels = Vec::with_capacity(3 * (width * height) as usize);
-        for line in mapped.chunks_exact(row) {
-            for pixel in line[..4 * width as usize].chunks_exact(4) {
-                pixels.extend_from_slice(&pixel[..3]);
-            }
-        }
+        let pixels = pixels.map_err(|error| AppError::Render(error.to_string()))?;
+        let (width, height) = self.size;
         Ok(Picture { width, height, pixels })
     }
 }

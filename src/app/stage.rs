@@ -83,6 +83,11 @@ impl Stage {
         Ok(Self { terrain, stand: Arc::new(packed), plants: Arc::new(plants), cover, observer, scene })
     }
 
+    /// Replaces the scene's samples per pixel (1 or 4) where `samples` says so.
+    pub fn set_samples(&mut self, samples: Option<u32>) {
+        self.scene.quality.msaa = samples.unwrap_or(self.scene.quality.msaa);
+    }
+
     /// The forest of the scene, or `None` without trees.
     pub fn forest(&self) -> Option<Forest> {
         let quality = &self.scene.quality;

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use canopy::scene::{LocalTime, Pose, parse_pose, parse_positive, parse_seconds, parse_size};
+use canopy::scene::{LocalTime, Pose, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size};
 use clap::{Args, Parser, Subcommand};
 
 /// Width and height of pictures and windows unless stated.
@@ -46,6 +46,9 @@ pub struct Common {
     /// Part of the name of the graphics adapter to use (see --list-adapters).
     #[arg(long, global = true, value_name = "NAME")]
     pub adapter: Option<String>,
+    /// Samples per pixel, 1 (rough leaf edges, faster) or 4, instead of what the scene asks for.
+    #[arg(long, global = true, value_name = "1|4", value_parser = parse_samples)]
+    pub msaa: Option<u32>,
     /// Say which passes ran, which were skipped, and why.
     #[arg(long, global = true)]
     pub explain: bool,

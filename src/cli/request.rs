@@ -22,6 +22,7 @@ pub fn fly_options(fly: Fly, common: &Common) -> FlyOptions {
         underground: fly.underground,
         seed: common.seed,
         adapter: common.adapter.clone(),
+        msaa: common.msaa,
         quiet: common.quiet,
         explain: common.explain,
     }
@@ -37,6 +38,7 @@ pub fn render_options(render: Render, common: &Common) -> Result<RenderOptions, 
         size: render.size,
         seed: common.seed,
         adapter: common.adapter.clone(),
+        msaa: common.msaa,
         quiet: common.quiet,
         explain: common.explain,
         scene: render.scene,
@@ -137,7 +139,8 @@ mod tests {
         let options = render("--at 2026-06-21T06:00Z --out a.png --at 2026-06-21T12:00Z --out b.PNG --quiet")?;
         let Pictures::Stills(stills) = options.pictures else { return Err("no stills".into()) };
         assert_eq!(stills[1], Still { out: "b.PNG".into(), at: Some("2026-06-21T12:00Z".parse()?) });
-        assert!(options.quiet && options.size == (1280, 720) && options.view == View::Scene);
+        assert!(options.quiet && options.size == (1280, 720) && options.view == View::Scene && options.msaa.is_none());
+        assert_eq!(render("--out a.png --msaa 1")?.msaa, Some(1));
         Ok(())
     }
 
@@ -172,6 +175,7 @@ mod tests {
             "--out a --frames 2 --from 2026-06-21T06:00Z",
             "--out a --frames 2 --at 2026-06-21T06:00Z --from 2026-06-21T06:00Z --to 2026-06-21T07:00Z",
             "--out a.png --seed -1",
+            "--out a.png --msaa 2",
             "--out a.png --unknown",
         ] {
             assert_eq!(render(wrong).map(|_| ()).map_err(|error| error.exit_code()), Err(2), "{wrong}");

@@ -19,6 +19,7 @@ mod extract;
 pub mod forest;
 pub mod frame;
 mod gpu;
+pub mod readback;
 pub mod report;
 pub mod shaders;
 pub mod sky;

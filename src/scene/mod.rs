@@ -43,7 +43,7 @@ pub use camera::{Camera, PathKey, Pose, Viewpoint};
 pub use error::{Problem, SceneError};
 pub use ground::{Coordinates, Crop, Ground, GroundFile, GroundFlat, GroundImage, GroundNoise, Surroundings};
 pub use locate::Position;
-pub use parse::{ArgumentError, parse_pose, parse_positive, parse_seconds, parse_size};
+pub use parse::{ArgumentError, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size};
 pub use path::Path;
 pub use place::{Moon, Place};
 pub use plan::{Frame, PlanError, RenderPlan};

@@ -8,6 +8,9 @@ pub enum ArgumentError {
     /// Not `WIDTHxHEIGHT`.
     #[error("`{0}` is no size; write width and height in pixels, each at least 1, as in 1280x720")]
     Size(String),
+    /// Not a number of samples.
+    #[error("`{0}` samples per pixel: write 1 (off) or 4")]
+    Samples(String),
     /// Not `x,y,z,yaw,pitch`.
     #[error(
         "`{0}` is no camera; write x,y,z,yaw,pitch (metres east, above the ground, south; degrees), as in 0,20,0,90,-5"
@@ -32,6 +35,18 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), ArgumentError> {
     let parts = text.trim().split_once(['x', 'X', '×']);
     let size = parts.and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
     size.filter(|(width, height)| *width > 0 && *height > 0).ok_or_else(|| ArgumentError::Size(text.to_owned()))
+}
+
+/// Reads the number of samples per pixel: 1 or 4, what every device can do.
+///
+/// # Errors
+/// [`ArgumentError::Samples`].
+pub fn parse_samples(text: &str) -> Result<u32, ArgumentError> {
+    match text.trim() {
+        "1" => Ok(1),
+        "4" => Ok(4),
+        _ => Err(ArgumentError::Samples(text.to_owned())),
+    }
 }
 
 /// Reads `x,y,z,yaw,pitch` as [`Pose`] states them: metres east, above the ground and south; degrees.

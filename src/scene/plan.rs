@@ -215,6 +215,7 @@ mod tests {
             size: (64, 36),
             seed: None,
             adapter: None,
+            msaa: None,
             quiet: true,
             explain: false,
         }

@@ -24,6 +24,8 @@ pub struct FlyOptions {
     pub seed: Option<u64>,
     /// Part of the name of the graphics adapter to use; `None` lets the driver choose.
     pub adapter: Option<String>,
+    /// Samples per pixel, 1 or 4, instead of the scene's.
+    pub msaa: Option<u32>,
     /// No progress and no notes, only warnings and errors.
     pub quiet: bool,
     /// Print which passes ran, which were skipped, and why.
@@ -45,6 +47,8 @@ pub struct RenderOptions {
     pub seed: Option<u64>,
     /// Part of the name of the graphics adapter to use; `None` lets the driver choose.
     pub adapter: Option<String>,
+    /// Samples per pixel, 1 or 4, instead of the scene's.
+    pub msaa: Option<u32>,
     /// No progress and no notes, only warnings and errors.
     pub quiet: bool,
     /// Report which passes ran, which were skipped, and why.

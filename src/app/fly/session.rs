@@ -228,6 +228,7 @@ mod tests {
             underground: false,
             seed: None,
             adapter: None,
+            msaa: None,
             quiet: true,
             explain: false,
         };

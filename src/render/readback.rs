@@ -1,0 +1,69 @@
+//! The pixels of a finished picture, brought back from the device.
+
+use std::sync::{Arc, Mutex};
+
+use bevy::render::{
+    render_resource::{
+        BufferAsyncError, BufferDescriptor, BufferUsages, CommandEncoderDescriptor, Extent3d, MapMode, PollType,
+        TexelCopyBufferInfo, TexelCopyBufferLayout, Texture,
+    },
+    renderer::{RenderDevice, RenderQueue},
+};
+
+/// Why a picture could not be read back.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadbackError {
+    /// The device could not be waited for.
+    #[error("the picture could not be read back: {0}")]
+    Wait(#[from] wgpu::PollError),
+    /// The device refused to map the buffer.
+    #[error("the picture could not be read back: {0}")]
+    Map(#[from] BufferAsyncError),
+    /// The device finished without an answer.
+    #[error("the picture could not be read back: the device did not answer")]
+    NoAnswer,
+}
+
+/// The first layer of `texture`, whose format has four bytes a pixel, without its fourth channel: three bytes a pixel,
+/// row by row from the top. Waits until the device has finished everything that was submitted.
+///
+/// # Errors
+/// [`ReadbackError`], where the device is lost or out of memory.
+pub fn read_rgb(device: &RenderDevice, queue: &RenderQueue, texture: &Texture) -> Result<Vec<u8>, ReadbackError> {
+    let (width, height) = (texture.width(), texture.height());
+    let row = RenderDevice::align_copy_bytes_per_row(4 * width as usize);
+    let buffer = device.create_buffer(&BufferDescriptor {
+        label: Some("canopy_readback"),
+        size: row as u64 * u64::from(height),
+        usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor::default());
+    encoder.copy_texture_to_buffer(
+        texture.as_image_copy(),
+        TexelCopyBufferInfo {
+            buffer: &buffer,
+            layout: TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row as u32), rows_per_image: None },
+        },
+        Extent3d { width, height, depth_or_array_layers: 1 },
+    );
+    queue.submit([encoder.finish()]);
+    let outcome = Arc::new(Mutex::new(None));
+    let told = outcome.clone();
+    let slice = buffer.slice(..);
+    slice.map_async(MapMode::Read, move |result| {
+        if let Ok(mut slot) = told.lock() {
+            *slot = Some(result);
+        }
+    });
+    device.wgpu_device().poll(PollType::Wait { submission_index: None, timeout: None })?;
+    let mapped = outcome.lock().ok().and_then(|mut slot| slot.take());
+    mapped.ok_or(ReadbackError::NoAnswer)??;
+    let mut pixels = Vec::with_capacity(3 * width as usize * height as usize);
+    for line in slice.get_mapped_range().chunks_exact(row) {
+        for pixel in line[..4 * width as usize].chunks_exact(4) {
+            pixels.extend_from_slice(&pixel[..3]);
+        }
+    }
+    Ok(pixels)
+}
