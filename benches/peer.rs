@@ -82,6 +82,9 @@ struct Arguments {
     /// slow without a GPU: choose fewer there.
     #[arg(long, default_value_t = 1_000)]
     error_trees: u32,
+    /// Hours of the day, UTC, at which pictures are compared: the sun from behind, high, low and from the front.
+    #[arg(long, value_delimiter = ',', default_values_t = [8.5, 11.25, 17.0, 19.0])]
+    error_hours: Vec<f64>,
     /// Cargo says so to every benchmark; nothing depends on it.
     #[arg(long, hide = true)]
     bench: bool,
@@ -161,7 +164,8 @@ fn main() -> anyhow::Result<()> {
         return Ok(());
     }
     let field = Field::new(&plant, arguments.error_trees, look)?;
-    let rows = error::compare(&field, arguments.out.as_deref()).context("comparing with full models")?;
+    let rows = error::compare(&field, &arguments.error_hours, arguments.out.as_deref())
+        .context("comparing with full models")?;
     println!("\n{}\n{rows}", error::HEADING);
     println!("\n{}", error::shadow_lag(&plant, &look)?);
     Ok(())

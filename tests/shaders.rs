@@ -204,7 +204,7 @@ fn gpu_structs_are_what_the_shaders_think() {
         ForestViewUniform { anchor_cell, anchor_offset, anchor_y, cell_size, fade_start, fade_end }
     );
     twin!(layouts, "Plane", PlaneUniform { center, u, v, normal });
-    twin!(layouts, "Variant", VariantUniform { planes, size, transmission });
+    twin!(layouts, "Variant", VariantUniform { planes, size, transmission, spread });
     twin!(layouts, "Part", PartUniform { base_color, transmission });
     twin!(layouts, "Tree", PackedTree { xz, y, cell, look });
     twin!(layouts, "Tile", GpuTile { origin, spacing, first, morph_start, morph_end, clearance, level });

@@ -5,6 +5,7 @@ use std::{fmt::Write, path::Path, sync::Arc};
 use canopy::{
     bake::BakedPlant,
     light::sun::SunPosition,
+    plant::texture::srgb_to_linear,
     render::{
         components::SunShadowSettings,
         daylight::SkySettings,
@@ -29,23 +30,55 @@ const FRAMES: [usize; 2] = [0, 7];
 
 /// The table's head.
 pub const HEADING: &str = "\
-| trees | frame of the way | ours against its full models, mean FLIP | stock against its full models | ours after a flight against drawn afresh |
-|--:|--:|--:|--:|--:|";
+| trees | hour, UTC | frame of the way | ours against its full models: mean FLIP, relative RMSE, light | stock against its full models | ours after a flight against drawn afresh, mean FLIP |
+|--:|--:|--:|---|---|--:|";
 
 fn mean_flip(reference: &RgbImage, test: &RgbImage) -> f32 {
     let image = |picture: &RgbImage| FlipImageRgb8::with_data(picture.width(), picture.height(), picture);
     FlipPool::from_image(&flip(image(reference), image(test), PIXELS_PER_DEGREE)).mean()
 }
 
-/// Rows of the table for `field`; pictures go into `out`.
-pub fn compare(field: &Field, out: Option<&Path>) -> anyhow::Result<String> {
+/// How far a picture is from its side's full models.
+struct Difference {
+    flip: f32,
+    /// Root mean square of the difference over that of the reference, in linear light, over the pixels that differ: unlike
+    /// FLIP it does not grow with a picture's brightness, and stock's pictures are darker.
+    relative: f64,
+    /// Light of those pixels, as a share of the reference's.
+    light: f64,
+}
+
+impl Difference {
+    fn new(reference: &RgbImage, test: &RgbImage) -> Self {
+        let (mut squared, mut square, mut sum, mut reference_sum) = (0.0, 0.0, 0.0, 0.0);
+        for (a, b) in reference.pixels().zip(test.pixels()).filter(|(a, b)| a != b) {
+            for (a, b) in a.0.into_iter().zip(b.0) {
+                let [a, b] = [a, b].map(|code| f64::from(srgb_to_linear(f32::from(code) / 255.0)));
+                squared += (a - b).powi(2);
+                square += a * a;
+                sum += b;
+                reference_sum += a;
+            }
+        }
+        Self { flip: mean_flip(reference, test), relative: (squared / square).sqrt(), light: sum / reference_sum }
+    }
+}
+
+impl std::fmt::Display for Difference {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{:.4}, {:.2}, {:.2}", self.flip, self.relative, self.light)
+    }
+}
+
+/// Rows of the table for `field` at each of `hours` (UTC); pictures go into `out`.
+pub fn compare(field: &Field, hours: &[f64], out: Option<&Path>) -> anyhow::Result<String> {
     let full = field.full()?;
-    let sky = field.sky(0, false);
-    let light = field.light(&sky)?;
     let (mut ours, mut ours_full) = (Ours::new(field)?, Ours::new(&full)?);
     let (mut stock, mut stock_full) = (Stock::new(field)?, Stock::new(&full)?);
     let mut rows = Vec::new();
-    for frame in 0..=FRAMES[1] {
+    for (hour, frame) in hours.iter().flat_map(|hour| (0..=FRAMES[1]).map(move |frame| (hour, frame))) {
+        let sky = field.sky_at(*hour);
+        let light = field.light(&sky)?;
         let view = field.view(frame);
         let draw = |side: &mut Ours| {
             side.light(&sky);
@@ -71,14 +104,14 @@ pub fn compare(field: &Field, out: Option<&Path>) -> anyhow::Result<String> {
             for (name, picture) in
                 [("ours", &flown), ("ours-full", &truth), ("stock", &peer), ("stock-full", &peer_truth)]
             {
-                picture.save(folder.join(format!("error-{frame}-{name}.png")))?;
+                picture.save(folder.join(format!("error-{hour}-{frame}-{name}.png")))?;
             }
         }
         rows.push(format!(
-            "| {} | {frame} | {:.4} | {:.4} | {:.4} |",
+            "| {} | {hour} | {frame} | {} | {} | {:.4} |",
             field.stand.trees.len(),
-            mean_flip(&truth, &flown),
-            mean_flip(&peer_truth, &peer),
+            Difference::new(&truth, &flown),
+            Difference::new(&peer_truth, &peer),
             mean_flip(&afresh, &flown),
         ));
     }

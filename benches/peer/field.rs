@@ -20,7 +20,7 @@ use canopy::{
     scene::Viewpoint,
     terrain::{HeightField, Surroundings, Terrain},
 };
-use chrono::{DateTime, TimeDelta, Utc};
+use chrono::{DateTime, NaiveTime, TimeDelta, Utc};
 use glam::{DVec2, DVec3};
 
 /// Trees a hectare: 28,200 on a square kilometre.
@@ -166,6 +166,13 @@ impl Field {
         let morning = DateTime::<Utc>::from_timestamp(MORNING, 0).unwrap_or_default();
         let minutes = if moving { MINUTES_A_FRAME * (frame as i64 + 1) } else { 0 };
         SkySettings { instant: morning + TimeDelta::minutes(minutes), ..SkySettings::default() }
+    }
+
+    /// Place, air and time `hours` after midnight UTC of the same day.
+    pub fn sky_at(&self, hours: f64) -> SkySettings {
+        let morning = DateTime::<Utc>::from_timestamp(MORNING, 0).unwrap_or_default();
+        let midnight = morning.date_naive().and_time(NaiveTime::MIN).and_utc();
+        SkySettings { instant: midnight + TimeDelta::seconds((3600.0 * hours) as i64), ..SkySettings::default() }
     }
 
     /// The light of a time, which ours computes itself and stock is given.

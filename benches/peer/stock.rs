@@ -42,7 +42,7 @@ use canopy::{
     light::{LightState, atmosphere::luminance},
     plant::{
         PartKind, PlantMaterial, PlantMesh,
-        texture::{MipChain, alpha_tested_mips, color_mips, fade_alpha},
+        texture::{MipChain, color_mips, leaf_mips},
     },
     render::readback::read_rgb,
     scene::Viewpoint,
@@ -268,7 +268,7 @@ fn add_material(app: &mut App, material: StandardMaterial) -> Handle<StandardMat
 fn part_material(app: &mut App, kind: PartKind, material: &PlantMaterial) -> Handle<StandardMaterial> {
     let texture = material.base_color_texture.as_ref().map(|image| {
         let chain = match kind {
-            PartKind::Foliage => alpha_tested_mips(&fade_alpha(image, material.alpha_cutoff)),
+            PartKind::Foliage => leaf_mips(image, material.alpha_cutoff),
             PartKind::Wood => color_mips(image),
         };
         add_texture(app, &chain, ImageAddressMode::Repeat)

@@ -15,12 +15,26 @@ struct Surface {
     transmission: vec3<f32>,
     // Share of the surroundings that the surface sees, 0..1.
     ambient: f32,
+    // Unit vector to the viewer, and how far the surface is many leaves that face everywhere: 0 one normal, 1 all alike.
+    viewer: vec3<f32>,
+    spread: f32,
+}
+
+// Mean cosine to the light over the leaves that face a viewer, where leaves face everywhere alike and each counts by the
+// area that it shows him: the phase function of a diffuse sphere [Lambert 1760; Schoenberg 1925]. `cosine` is that of the
+// angle between light and viewer.
+fn sphere_cosine(cosine: f32) -> f32 {
+    let c = clamp(cosine, -1.0, 1.0);
+    return (sqrt(1.0 - c * c) + acos(-c) * c) * 0.21220659;
 }
 
 // Exitant radiance towards the viewer; `visibility` of the key light in 0..1.
 fn shade(surface: Surface, visibility: f32) -> vec3<f32> {
     let cosine = dot(surface.normal, light.key_direction.xyz);
-    let direct = (max(cosine, 0.0) + max(-cosine, 0.0) * surface.transmission) * visibility
+    let between = dot(surface.viewer, light.key_direction.xyz);
+    let front = mix(max(cosine, 0.0), sphere_cosine(between), surface.spread);
+    let back = mix(max(-cosine, 0.0), sphere_cosine(-between), surface.spread);
+    let direct = (front + back * surface.transmission) * visibility
         * light.key_illuminance.rgb * INVERSE_PI;
     var ambient = sky_irradiance(surface.normal);
     ambient += surface.transmission * sky_irradiance(-surface.normal) * 0.5;

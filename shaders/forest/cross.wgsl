@@ -25,6 +25,9 @@ struct Varying {
 }
 
 const VERTICES_A_TREE: u32 = 18u;
+const PLANES: u32 = 3u;
+// Mips for which the spread is known: src/bake/billboard/mod.rs.
+const SPREAD_LEVELS: f32 = 8.0;
 
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> Varying {
@@ -98,6 +101,8 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.albedo = mix(texel.rgb, tint_foliage(texel.rgb, in.look.w), foliage);
     surface.normal = normal;
     surface.transmission = in.crown.rgb * foliage;
+    surface.viewer = -normalize(in.relative);
+    surface.spread = leaf_spread(in.layer / PLANES, level) * foliage;
     let map = ground_map(in.relative);
     surface.ambient = scattered(properties.b) * stand_ambient(in.look.z, map.y);
     var visibility = terrain_visibility(map, in.look.y);
@@ -117,6 +122,15 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         color = mix(color, vec3(0.2, 0.35, 1.0) * dot(color, vec3(0.5)), 0.6);
     }
     return vec4(night_vision(apply_fog(color, in.relative)), coverage);
+}
+
+// How far the leaves that a texel stands for face everywhere.
+fn leaf_spread(variant: u32, level: f32) -> f32 {
+    let at = clamp(level, 0.0, SPREAD_LEVELS - 1.0);
+    let finer = u32(at);
+    let coarser = min(finer + 1u, u32(SPREAD_LEVELS) - 1u);
+    let spread = &variants[variant].spread;
+    return mix((*spread)[finer / 4u][finer % 4u], (*spread)[coarser / 4u][coarser % 4u], fract(at));
 }
 
 // Level of the pictures: the mean of the two axes' levels. The larger one, as samplers have it, would blur a plane seen

@@ -34,6 +34,8 @@ struct Variant {
     size: vec4<f32>,
     // Transmission of its leaves.
     transmission: vec4<f32>,
+    // How far the leaves of a texel face everywhere, 0..1, mip by mip.
+    spread: array<vec4<f32>, 2>,
 }
 
 struct Instance {

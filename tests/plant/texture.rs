@@ -1,8 +1,8 @@
 //! Plant textures: coverage, fading, halos.
 
 use canopy::plant::texture::{
-    MipChain, alpha_tested_mips, color_mips, dilate_colors, fade_alpha, linear_to_srgb, normal_mips, resize_to,
-    srgb_to_linear,
+    MipChain, alpha_tested_mips, color_mips, dilate_colors, fade_alpha, leaf_mips, linear_to_srgb, normal_mips,
+    resize_to, srgb_to_linear,
 };
 use glam::{Vec2, Vec3};
 use image::{Rgba, RgbaImage};
@@ -24,6 +24,17 @@ pub(super) fn leaves(size: u32, seed: u32) -> RgbaImage {
         let alpha = ((depth + 0.5).clamp(0.0, 1.0) * 255.0).round() as u8;
         if alpha == 0 { Rgba([255, 0, 255, 0]) } else { Rgba([40, 120, 20, alpha]) }
     })
+}
+
+/// The background of a cut-out once tinted distant trees: filtering took it in at every leaf's edge.
+#[test]
+fn the_background_of_a_leaf_texture_never_shows() {
+    let chain = leaf_mips(&leaves(256, 1), 0.5);
+    assert!(has_all_levels(&chain));
+    for (level, bytes) in chain.levels.iter().enumerate() {
+        let magenta = bytes.chunks_exact(4).find(|texel| texel[0] > 45 || texel[2] > 25);
+        assert_eq!(magenta, None, "level {level}");
+    }
 }
 
 fn has_all_levels(chain: &MipChain) -> bool {

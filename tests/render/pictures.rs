@@ -2,6 +2,7 @@
 
 use canopy::{
     app::{Picture, Stage},
+    lod::FadeBand,
     render::components::{CanopyOrigin, Forest, SunShadowSettings},
     scene::Viewpoint,
 };
@@ -130,6 +131,40 @@ fn crowns_are_lit_and_the_ground_below_them_is_dark() {
     let meadow = around(DVec3::new(0.0, 0.0, 20.0), 3.0);
     assert!(crown > 1.3 * floor, "crown {crown}, floor {floor}");
     assert!(meadow > 1.3 * floor, "meadow {meadow}, floor {floor}");
+}
+
+/// The grove with its fade from models to crosses at `distance` metres.
+fn fading_at(stage: &Stage, distance: f32, at: &str) -> Picture {
+    let mut renderer = renderer(1);
+    renderer.set_instant(stage, instant(at));
+    renderer.set_view(&over_the_grove(stage));
+    let world = renderer.app().world_mut();
+    world.spawn(stage.ground());
+    world.spawn(Forest { fade: FadeBand::new(distance, 0.1), ..stage.forest().expect("a forest") });
+    world.insert_resource(stage.shadow());
+    super::again(&mut renderer)
+}
+
+/// Crosses once had two thirds of their models' light: the mean of many leaves' cosines is not the cosine of their mean.
+#[test]
+fn crosses_have_the_light_of_their_models() {
+    let _gpu = gpu();
+    let built = grove(1);
+    for at in [NOON, "2026-06-21T18:00+01:00"] {
+        let (models, crosses) = (fading_at(&built.stage, 1e6, at), fading_at(&built.stage, 25.0, at));
+        keep(&crosses, &format!("crosses-{}", &at[11..13]));
+        keep(&models, &format!("models-{}", &at[11..13]));
+        let pixel = |picture: &Picture, column: u32, row: u32| {
+            let first = 3 * (row * picture.width + column) as usize;
+            [picture.pixels[first], picture.pixels[first + 1], picture.pixels[first + 2]]
+        };
+        let differs = |column, row| pixel(&models, column, row) != pixel(&crosses, column, row);
+        let [model, cross] = [&models, &crosses].map(|picture| mean_color(picture, differs));
+        for channel in 0..3 {
+            let ratio = cross[channel] / model[channel];
+            assert!((0.88..1.12).contains(&ratio), "{at}, channel {channel}: {ratio} of the models' light");
+        }
+    }
 }
 
 #[test]

@@ -13,7 +13,7 @@ use crate::{
     app::{AppError, ground::build_terrain, plants, stage, trees},
     bake::{
         BakedPlant,
-        billboard::{Cross, CrossTextures},
+        billboard::{Cross, CrossTextures, SPREAD_LEVELS},
     },
     light::sun::{Observer, SunPosition},
     plant::{PartKind, Plant, grow::GrowParameters},
@@ -114,7 +114,7 @@ fn unbaked(plant: Plant) -> BakedPlant {
         plant: Arc::new(plant),
         ambient: Vec::new(),
         shadow_proxy: Vec::new(),
-        cross: Cross { planes: Vec::new(), textures, transmission: Vec3::ZERO },
+        cross: Cross { planes: Vec::new(), textures, transmission: Vec3::ZERO, spread: [0.0; SPREAD_LEVELS] },
     }
 }
 

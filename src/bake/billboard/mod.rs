@@ -19,6 +19,7 @@ mod properties;
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 
+use self::properties::SpreadSum;
 use super::geometry;
 use super::rasterize::{Hit, Raster, View};
 use crate::plant::texture::MipChain;
@@ -34,7 +35,13 @@ pub struct Cross {
     /// Linear transmission colour of the foliage (mean over its area), a factor on the base colour as in
     /// [`crate::plant::PlantMaterial::transmission`], 0..1 each; applies to texels in the measure of their foliage.
     pub transmission: Vec3,
+    /// Share of the leaves in a texel that face everywhere alike, 0..1, for each of the pictures' first mips (the last one
+    /// stands for all that follow): what their mean normal no longer tells. 0: one leaf with the texel's normal.
+    pub spread: [f32; SPREAD_LEVELS],
 }
+
+/// Mips for which [`Cross::spread`] is known.
+pub const SPREAD_LEVELS: usize = 8;
 
 /// A rectangle `center + s u + t v` with s and t in -1..=1; its picture's upper left is at `center - u + v`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,14 +95,14 @@ pub struct CrossSettings {
     pub resolution: u32,
     /// Samples a texel along each axis, 1..=8. More: smoother colours and normals, time grows with the square.
     pub supersampling: u32,
-    /// Standard deviation of the normals' smoothing as a share of the picture's width, 0..=0.1. 0: every leaf glitters
-    /// for itself; larger: the crown is lit as a rounded body.
+    /// Standard deviation of the normals' smoothing as a share of the picture's width, 0..=0.1. 0: every leaf is lit for
+    /// itself; larger: the crown is lit as a rounded body. Either way [`Cross::spread`] keeps what a mean loses.
     pub normal_smoothing: f32,
 }
 
 impl Default for CrossSettings {
     fn default() -> Self {
-        Self { resolution: 256, supersampling: 4, normal_smoothing: 0.008 }
+        Self { resolution: 256, supersampling: 4, normal_smoothing: 0.0 }
     }
 }
 
@@ -119,15 +126,30 @@ pub fn bake_cross(plant: &Plant, ambient: &[Vec<f32>], settings: &CrossSettings)
     let settings = settings.in_range();
     let planes = planes(plant);
     let resolution = settings.resolution as usize;
-    let (color, properties) = planes
+    let pictures: Vec<_> = planes
         .par_iter()
         .map(|plane| {
             let texels = picture(plant, ambient, plane, &settings);
             let properties = properties::mips(&texels, resolution, settings.normal_smoothing);
             (color::mips(&texels, resolution), properties)
         })
-        .unzip();
-    Cross { planes, textures: CrossTextures { color, properties }, transmission: mean_transmission(plant) }
+        .collect();
+    let (color, properties): (Vec<_>, Vec<_>) = pictures.into_iter().unzip();
+    let (properties, spreads): (Vec<_>, Vec<_>) = properties.into_iter().unzip();
+    let textures = CrossTextures { color, properties };
+    Cross { planes, textures, transmission: mean_transmission(plant), spread: mean_spread(&spreads) }
+}
+
+/// Mean over the pictures, level by level; levels beyond the smallest picture repeat it.
+fn mean_spread(pictures: &[Vec<SpreadSum>]) -> [f32; SPREAD_LEVELS] {
+    std::array::from_fn(|level| {
+        let (mut spread, mut weight) = (0.0, 0.0);
+        for sum in pictures.iter().filter_map(|levels| levels.get(level).or(levels.last())) {
+            spread += sum.spread;
+            weight += sum.weight;
+        }
+        if weight > 0.0 { (spread / weight) as f32 } else { 0.0 }
+    })
 }
 
 fn planes(plant: &Plant) -> Vec<CrossPlane> {

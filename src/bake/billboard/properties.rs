@@ -1,6 +1,6 @@
 //! The property texture of a cross: normal, ambient visibility, share of foliage.
 
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::Texel;
@@ -10,6 +10,7 @@ use crate::plant::texture::MipChain;
 /// What a texel of any level holds, weighted with its coverage.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sum {
+    /// As long as the normals that it stands for agree.
     normal: Vec3,
     ambient: f32,
     foliage: f32,
@@ -27,9 +28,31 @@ impl Sum {
     }
 }
 
+/// How far leaves face everywhere, summed over the texels of one level: the sum of weights, and of spreads by weight.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct SpreadSum {
+    pub weight: f64,
+    pub spread: f64,
+}
+
+/// The share of leaves that face everywhere alike, in a mixture with leaves that all face one way, whose normals (turned
+/// towards the viewer, each counted by the area that it shows) have a mean of the length `resultant`, 0..1: that of the
+/// former is 2/3, that of the latter 1.
+fn spread(resultant: f32) -> f32 {
+    (3.0 - 3.0 * resultant).clamp(0.0, 1.0)
+}
+
+fn spread_of(level: &[Sum]) -> SpreadSum {
+    level.iter().filter(|sum| sum.coverage > 0.0).fold(SpreadSum::default(), |total, sum| SpreadSum {
+        weight: total.weight + f64::from(sum.foliage),
+        spread: total.spread + f64::from(sum.foliage * spread(sum.normal.length() / sum.coverage)),
+    })
+}
+
 /// Property mips of a picture of `resolution`² texels (a power of two). Means are weighted with the coverage, from
-/// level to level in floating point, so that air has no say; a texel of air continues what the coarser level holds.
-pub(super) fn mips(texels: &[Texel], resolution: usize, smoothing: f32) -> MipChain {
+/// level to level in floating point, so that air has no say; a texel of air continues what the coarser level holds. With
+/// them, how far the leaves of a texel face everywhere, level by level.
+pub(super) fn mips(texels: &[Texel], resolution: usize, smoothing: f32) -> (MipChain, Vec<SpreadSum>) {
     let normals = smoothed(texels, resolution, smoothing * resolution as f32);
     let finest = texels.iter().zip(normals).map(|(texel, normal)| Sum {
         normal: texel.coverage * normal,
@@ -44,6 +67,7 @@ pub(super) fn mips(texels: &[Texel], resolution: usize, smoothing: f32) -> MipCh
         levels.push(halved);
         size /= 2;
     }
+    let spreads = levels.iter().map(|level| spread_of(level)).collect();
     // From the coarsest level down: holes are filled from above.
     let mut coded: Vec<Vec<u8>> = Vec::with_capacity(levels.len());
     let mut above: Vec<Sum> = vec![Sum::OPEN];
@@ -56,7 +80,7 @@ pub(super) fn mips(texels: &[Texel], resolution: usize, smoothing: f32) -> MipCh
         above = level;
     }
     coded.reverse();
-    MipChain { width: resolution as u32, height: resolution as u32, levels: coded }
+    (MipChain { width: resolution as u32, height: resolution as u32, levels: coded }, spreads)
 }
 
 /// What a level of `size`² texels holds at texel (`x`, `y`) of the next finer one, bilinearly, borders continued.
@@ -93,14 +117,15 @@ fn halve(finer: &[Sum], size: usize) -> Vec<Sum> {
         .collect()
 }
 
-/// Unit normals, smoothed by a Gaussian of `deviation` texels over what is covered; straight ahead where nothing is.
+/// Mean normals under a Gaussian of `deviation` texels over what is covered, as long as the normals agree; straight ahead
+/// where nothing is.
 fn smoothed(texels: &[Texel], resolution: usize, deviation: f32) -> Vec<Vec3> {
     let radius = (3.0 * deviation).ceil() as isize;
     let kernel: Vec<f32> = (-radius..=radius)
         .map(|offset| if radius == 0 { 1.0 } else { (-0.5 * (offset as f32 / deviation).powi(2)).exp() })
         .collect();
     // A pass along rows that writes columns: two of them are the two-dimensional filter.
-    let pass = |source: &[Vec3]| -> Vec<Vec3> {
+    let pass = |source: &[Vec4]| -> Vec<Vec4> {
         (0..resolution * resolution)
             .into_par_iter()
             .map(|at| {
@@ -113,8 +138,9 @@ fn smoothed(texels: &[Texel], resolution: usize, deviation: f32) -> Vec<Vec3> {
             })
             .collect()
     };
-    let normals: Vec<Vec3> = texels.iter().map(|texel| texel.normal).collect();
-    pass(&pass(&normals)).into_iter().map(|sum| sum.try_normalize().unwrap_or(Vec3::Z)).collect()
+    let normals: Vec<Vec4> = texels.iter().map(|texel| texel.normal.extend(texel.coverage)).collect();
+    let mean = |sum: Vec4| if sum.w > 1e-6 { (sum.truncate() / sum.w).clamp_length_max(1.0) } else { Vec3::Z };
+    pass(&pass(&normals)).into_iter().map(mean).collect()
 }
 
 /// Octahedral encoding of a unit vector into 0..1 x 0..1, +Z in the middle [Cigolle et al. 2014, "A Survey of
@@ -159,7 +185,7 @@ mod tests {
             texels[y * 64 + 1] =
                 Texel { coverage: 0.5, normal: 0.5 * right, ambient: 0.4, foliage: 0.0, ..Default::default() };
         }
-        let chain = mips(&texels, 64, 0.0);
+        let (chain, spreads) = mips(&texels, 64, 0.0);
         assert_eq!(chain.levels.len(), 7);
         let texel = |level: usize, at: usize| -> [u8; 4] { std::array::from_fn(|c| chain.levels[level][4 * at + c]) };
         let mean = Vec3::new(-0.6 + 0.3, 0.0, 0.8 + 0.4).normalize();
@@ -167,6 +193,12 @@ mod tests {
             assert!(decode(texel(level, 0)).angle_between(mean) < 0.015, "level {level}");
             assert_eq!(texel(level, 0)[2], unit_code(0.6 / 1.5));
             assert_eq!(texel(level, 0)[3], unit_code(1.0 / 1.5));
+        }
+        // Level 0 has one direction a texel, the others two that disagree; wood has no say.
+        assert!(spreads[0].spread.abs() < 1e-5 && spreads[0].weight == 64.0);
+        let expected = spread(Vec3::new(-0.3, 0.0, 1.2).length() / 1.5);
+        for level in &spreads[1..] {
+            assert!((level.spread / level.weight - f64::from(expected)).abs() < 1e-5, "{level:?}");
         }
         // Air continues the coarser means.
         assert!(decode(texel(0, 63)).angle_between(mean) < 0.03);

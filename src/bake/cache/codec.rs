@@ -7,7 +7,7 @@
 //!       12    32  key: hash of what it was made from
 //!       44     8  length of the payload
 //!       52    32  BLAKE3 of bytes 0..52 and the payload
-//!       84        payload: ambient, shadow proxy, planes, textures, transmission; lists go with their length (u32)
+//!       84        payload: ambient, shadow proxy, planes, textures, transmission, spread; lists go with their length (u32)
 //! ```
 
 use std::sync::Arc;
@@ -15,12 +15,12 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 
 use crate::bake::BakedPlant;
-use crate::bake::billboard::{Cross, CrossPlane, CrossTextures};
+use crate::bake::billboard::{Cross, CrossPlane, CrossTextures, SPREAD_LEVELS};
 use crate::plant::texture::MipChain;
 use crate::plant::{Plant, PlantMesh};
 
 /// Version of the format *and* of the bakes: to be raised whenever either gives other bytes for the same input.
-pub(super) const VERSION: u32 = 1;
+pub(super) const VERSION: u32 = 2;
 
 const MAGIC: [u8; 8] = *b"CANOPYBK";
 const HEAD: usize = 52;
@@ -50,6 +50,7 @@ pub(super) fn encode(baked: &BakedPlant, key: &[u8; 32]) -> Vec<u8> {
         });
     }
     out.vector(baked.cross.transmission);
+    baked.cross.spread.iter().for_each(|share| out.float(*share));
 
     let payload = out.0;
     let mut file = Vec::with_capacity(PAYLOAD + payload.len());
@@ -82,12 +83,16 @@ pub(super) fn decode(file: &[u8], key: &[u8; 32], plant: &Arc<Plant>) -> Option<
         .list(|r| Some(CrossPlane { center: r.vector()?, u: r.vector()?, v: r.vector()?, normal: r.vector()? }))?;
     let textures = CrossTextures { color: reader.list(Reader::chain)?, properties: reader.list(Reader::chain)? };
     let transmission = reader.vector()?;
+    let mut spread = [0.0; SPREAD_LEVELS];
+    for share in &mut spread {
+        *share = reader.float().filter(|share| (0.0..=1.0).contains(share))?;
+    }
     let fits = reader.0.is_empty()
         && ambient.iter().map(Vec::len).eq(plant.parts.iter().map(|part| part.mesh.positions.len()))
         && shadow_proxy.len() == plant.parts.len()
         && textures.color.len() == planes.len()
         && textures.properties.len() == planes.len();
-    let cross = Cross { planes, textures, transmission };
+    let cross = Cross { planes, textures, transmission, spread };
     fits.then(|| BakedPlant { plant: Arc::clone(plant), ambient, shadow_proxy, cross })
 }
 
@@ -200,6 +205,7 @@ mod tests {
                 planes: vec![plane],
                 textures: CrossTextures { color: vec![chain.clone()], properties: vec![chain] },
                 transmission: Vec3::new(0.1, 0.2, 0.3),
+                spread: [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 1.0],
             },
         }
     }

@@ -165,7 +165,7 @@ mod tests {
         changed[4].ambient.least = 0.7;
         changed[5].cross.resolution = 512;
         changed[6].cross.supersampling = 2;
-        changed[7].cross.normal_smoothing = 0.0;
+        changed[7].cross.normal_smoothing = 0.01;
         changed[8].shadow_share = 0.5;
         let mut keys: Vec<String> =
             changed.iter().chain([&base]).map(|settings| CacheKey::new(&plant, settings).to_hex()).collect();

@@ -5,6 +5,8 @@ use rayon::prelude::*;
 
 use super::MipChain;
 use super::coverage::{Distribution, match_coverage};
+use super::dilate::dilate_colors;
+use super::fade::fade_alpha;
 use super::resample::{Layer, to_byte};
 
 /// A mean normal this short is the rounding of 8 bits.
@@ -43,6 +45,14 @@ pub fn alpha_tested_mips(image: &RgbaImage) -> MipChain {
         }
         bytes
     })
+}
+
+/// Mips of a leaf texture that was made to be drawn with an alpha test at `cutoff` (0..1), to be drawn with one at 0.5 or
+/// above: colours without halos, alpha that fades, coverage that is kept.
+pub fn leaf_mips(image: &RgbaImage, cutoff: f32) -> MipChain {
+    let mut dilated = image.clone();
+    dilate_colors(&mut dilated);
+    alpha_tested_mips(&fade_alpha(&dilated, cutoff))
 }
 
 /// Mips of a tangent-space normal map (RGB8, 127.5 is zero): averaged as vectors, renormalised, alpha averaged.

@@ -13,7 +13,7 @@
 //!   restructures alpha so that leaves shrink steadily, centre last [Franzke 2005, section 4.3.3, "blending
 //!   texture"].
 //!
-//! The order for a leaf: `dilate_colors`, then `fade_alpha`, then `alpha_tested_mips`.
+//! The order for a leaf: `dilate_colors`, then `fade_alpha`, then `alpha_tested_mips`; [`leaf_mips`] does all three.
 //!
 //! All functions are deterministic whatever the number of threads, accept images of any size (an image without
 //! texels gives a chain of one empty level) and treat the image border as an edge (no wrap-around).
@@ -28,7 +28,7 @@ mod resample;
 pub use dilate::dilate_colors;
 pub use distance::{NearestSites, nearest_sites};
 pub use fade::fade_alpha;
-pub use mips::{alpha_tested_mips, color_mips, normal_mips};
+pub use mips::{alpha_tested_mips, color_mips, leaf_mips, normal_mips};
 pub use resample::{linear_to_srgb, resize_to, srgb_to_linear};
 
 /// A texture with its mip levels, RGBA8, ready to be uploaded.

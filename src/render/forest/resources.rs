@@ -27,10 +27,10 @@ use glam::Vec3;
 
 use super::vertex::PlantVertex;
 use crate::{
-    bake::BakedPlant,
+    bake::{BakedPlant, billboard::SPREAD_LEVELS},
     plant::{
         PartKind, PlantMaterial, PlantMesh,
-        texture::{MipChain, alpha_tested_mips, color_mips, fade_alpha, normal_mips},
+        texture::{MipChain, color_mips, leaf_mips, normal_mips},
     },
     render::{components::Forest, cull::VariantSize, extract::ExtractedScene, gpu},
     scatter::{PackedStand, PackedTree},
@@ -81,6 +81,8 @@ pub struct VariantUniform {
     pub size: [f32; 4],
     /// Transmission of its leaves.
     pub transmission: [f32; 4],
+    /// How far the leaves of a texel face everywhere, mip by mip.
+    pub spread: [[f32; 4]; SPREAD_LEVELS / 4],
 }
 
 /// `Part` of `shaders/forest/model.wgsl`.
@@ -130,7 +132,7 @@ impl FromWorld for ForestLayouts {
                         uniform_buffer_sized(true, std::num::NonZeroU64::new(size_of::<ForestViewUniform>() as u64)),
                         storage_buffer_read_only_sized(false, None),
                         storage_buffer_read_only_sized(false, None),
-                        storage_buffer_read_only_sized(false, None),
+                        storage_buffer_read_only_sized(false, None).visibility(ShaderStages::VERTEX_FRAGMENT),
                     ),
                 ),
             ),
@@ -305,6 +307,7 @@ fn variant(index: usize, plant: &BakedPlant, size: &VariantSize) -> VariantUnifo
         planes,
         size: [size.height, size.radius, (index * PLANES) as f32, 1.0],
         transmission: plant.cross.transmission.extend(0.0).to_array(),
+        spread: bytemuck::cast(plant.cross.spread),
     }
 }
 
@@ -340,11 +343,7 @@ impl TextureShelf {
         self.views
             .entry((Arc::as_ptr(image) as usize, usage))
             .or_insert_with(|| {
-                let chain = if foliage {
-                    alpha_tested_mips(&fade_alpha(image, material.alpha_cutoff))
-                } else {
-                    color_mips(image)
-                };
+                let chain = if foliage { leaf_mips(image, material.alpha_cutoff) } else { color_mips(image) };
                 let smallest = if foliage { gpu::SMALLEST_TESTED_MIP } else { 1 };
                 gpu::texture(device, queue, "canopy_base_color", format, &chain, smallest)
             })
