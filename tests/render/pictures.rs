@@ -133,11 +133,11 @@ fn crowns_are_lit_and_the_ground_below_them_is_dark() {
     assert!(meadow > 1.3 * floor, "meadow {meadow}, floor {floor}");
 }
 
-/// The grove with its fade from models to crosses at `distance` metres.
-fn fading_at(stage: &Stage, distance: f32, at: &str) -> Picture {
+/// The grove from afar, with its change from models to crosses at `distance` metres.
+fn changing_at(stage: &Stage, distance: f32, at: &str) -> Picture {
     let mut renderer = renderer(1);
     renderer.set_instant(stage, instant(at));
-    renderer.set_view(&over_the_grove(stage));
+    renderer.set_view(&view(stage, (0.0, 12.0, 170.0), 0.0, -3.0));
     let world = renderer.app().world_mut();
     world.spawn(stage.ground());
     world.spawn(Forest { fade: FadeBand::new(distance, 0.1), ..stage.forest().expect("a forest") });
@@ -150,20 +150,23 @@ fn fading_at(stage: &Stage, distance: f32, at: &str) -> Picture {
 fn crosses_have_the_light_of_their_models() {
     let _gpu = gpu();
     let built = grove(1);
-    for at in [NOON, "2026-06-21T18:00+01:00"] {
-        let (models, crosses) = (fading_at(&built.stage, 1e6, at), fading_at(&built.stage, 25.0, at));
-        keep(&crosses, &format!("crosses-{}", &at[11..13]));
-        keep(&models, &format!("models-{}", &at[11..13]));
-        let pixel = |picture: &Picture, column: u32, row: u32| {
-            let first = 3 * (row * picture.width + column) as usize;
-            [picture.pixels[first], picture.pixels[first + 1], picture.pixels[first + 2]]
-        };
-        let differs = |column, row| pixel(&models, column, row) != pixel(&crosses, column, row);
-        let [model, cross] = [&models, &crosses].map(|picture| mean_color(picture, differs));
-        for channel in 0..3 {
-            let ratio = cross[channel] / model[channel];
-            assert!((0.88..1.12).contains(&ratio), "{at}, channel {channel}: {ratio} of the models' light");
-        }
+    let hours = [NOON, "2026-06-21T18:00+01:00", NIGHT];
+    let models = hours.map(|at| changing_at(&built.stage, 1e6, at));
+    let crosses = hours.map(|at| changing_at(&built.stage, 0.0, at));
+    let pixel = |picture: &Picture, column: u32, row: u32| {
+        let first = 3 * (row * picture.width + column) as usize;
+        [picture.pixels[first], picture.pixels[first + 1], picture.pixels[first + 2]]
+    };
+    for (hour, model) in models.iter().enumerate() {
+        keep(model, &format!("models-{hour}"));
+        keep(&crosses[hour], &format!("crosses-{hour}"));
+        let is_tree = |column, row| pixel(model, column, row) != pixel(&crosses[hour], column, row);
+        let light = |picture: &Picture| luminance(mean_color(picture, is_tree));
+        let control = if hour == 2 { 0 } else { 2 };
+        let [same, other] = [hour, control].map(|hour| light(&crosses[hour]) / light(model));
+        assert!((0.85..1.15).contains(&same), "{}: {same} of the models' light", hours[hour]);
+        // A control: day and night differ.
+        assert!(!(0.85..1.15).contains(&other), "{}: {other} of the models' light", hours[hour]);
     }
 }
 
