@@ -4,6 +4,7 @@ mod app;
 mod bake;
 mod cli;
 mod grow;
+mod implicit;
 mod light;
 mod plant;
 mod render;

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | [`ambient`] | ambient visibility k_a a vertex | [Monsi & Saeki 1953] |
 //! | [`billboard`] | crossed billboards with colour, normal, k_a | [Franzke 2005, 4.3] |
+//! | [`implicit`] | normals and k_a from the crown's implicit surface, and that surface | [Luft 2007] |
 //! | [`shadow_proxy`] | a lighter model with the same projected area | [Cook et al. 2007] |
 //! | [`rasterize`] | which triangle each sample of a picture sees | |
 //! | [`cache`] | files on disk, found by the content they were made from | |
@@ -15,6 +16,7 @@ pub mod ambient;
 pub mod billboard;
 pub mod cache;
 mod geometry;
+pub mod implicit;
 pub mod rasterize;
 pub mod shadow_proxy;
 mod surface;

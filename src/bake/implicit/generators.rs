@@ -1,0 +1,145 @@
+//! Generator points of the foliage [Luft 2007, 3.1]: one a primitive at its centre of mass, or an even choice of them.
+
+use glam::Vec3;
+
+use super::partition;
+use crate::bake::geometry;
+use crate::plant::PlantMesh;
+
+/// A generator point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Generator {
+    /// Centre of mass of its primitive, metres.
+    pub position: Vec3,
+    /// One-sided leaf area that it stands for, square metres.
+    pub area: f32,
+    /// Number of primitives that it stands for.
+    pub primitives: f32,
+}
+
+/// What a generator counts in the density field.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Weighting {
+    /// Each primitive counts 1, as published. A finer tessellation of the same leaves makes the crown darker.
+    Primitives,
+    /// Each counts its leaf area over ρ² (and a constant), so that the sum is the leaf area index over one radius:
+    /// in foliage of the leaf-area density u (1/m) it is u ρ. Neither the tessellation nor the plant's size matters,
+    /// so the same τ and d_min suit any model.
+    #[default]
+    LeafArea,
+}
+
+/// Integral of the bump (1 - x²)² over the unit ball: 32 π / 105.
+const BUMP_VOLUME: f32 = 32.0 * std::f32::consts::PI / 105.0;
+
+impl Weighting {
+    /// Weight of `generator` in a field of radius ρ `radius` in metres; finite, 0 or more.
+    pub fn weight(self, generator: &Generator, radius: f32) -> f32 {
+        let weight = match self {
+            Self::Primitives => generator.primitives,
+            Self::LeafArea => generator.area / radius / radius / BUMP_VOLUME,
+        };
+        if weight.is_finite() { weight.max(0.0) } else { 0.0 }
+    }
+}
+
+/// A generator for each valid triangle of `mesh`: indices in range, corners finite. A triangle without area (two
+/// corners in one place) has a generator as well; by leaf area it weighs nothing.
+pub fn generators(mesh: &PlantMesh) -> Vec<Generator> {
+    geometry::triangles(mesh)
+        .map(|(_, corners)| Generator {
+            position: corners.iter().map(|&c| mesh.positions[c] / 3.0).sum(),
+            area: geometry::area(mesh, corners),
+            primitives: 1.0,
+        })
+        .filter(|generator| generator.position.is_finite())
+        .collect()
+}
+
+/// A share (0..=1) of the generators, at least one, drawn evenly over the crown. The crown is cut by medians into as
+/// many compact groups of equal number as generators are wanted; of each the one nearest to the group's centre of area
+/// stands for all of it, with their area and number. So the sums keep their level, and neither τ nor d_min needs a
+/// factor. In the order of the groups; a share that is not below 1 or not a number gives all, in their order.
+pub fn even_share(generators: &[Generator], share: f32) -> Vec<Generator> {
+    let wanted = (f64::from(share.max(0.0)) * generators.len() as f64).ceil() as usize;
+    if share.is_nan() || wanted >= generators.len() {
+        return generators.to_vec();
+    }
+    let mut points: Vec<(Vec3, u32)> =
+        generators.iter().enumerate().map(|(index, generator)| (generator.position, index as u32)).collect();
+    choose(&mut points, generators, wanted.max(1))
+}
+
+fn choose(points: &mut [(Vec3, u32)], generators: &[Generator], wanted: usize) -> Vec<Generator> {
+    /// Fewer points are not worth a second thread.
+    const ALONE: usize = 4096;
+    if wanted <= 1 {
+        return stand_in(points, generators).into_iter().collect();
+    }
+    let first = wanted / 2;
+    let middle = (points.len() as u64 * first as u64 / wanted as u64) as usize;
+    partition::split_at(points, middle);
+    let (left, right) = points.split_at_mut(middle);
+    let (mut chosen, more) = if left.len() > ALONE {
+        rayon::join(|| choose(left, generators, first), || choose(right, generators, wanted - first))
+    } else {
+        (choose(left, generators, first), choose(right, generators, wanted - first))
+    };
+    chosen.extend(more);
+    chosen
+}
+
+fn stand_in(points: &mut [(Vec3, u32)], generators: &[Generator]) -> Option<Generator> {
+    // The sums are taken in the order of the indices: they must not depend on how the selection left the group.
+    points.sort_unstable_by_key(|(_, index)| *index);
+    let all = || points.iter().map(|(_, index)| &generators[*index as usize]);
+    let area: f32 = all().map(|generator| generator.area).sum();
+    let primitives: f32 = all().map(|generator| generator.primitives).sum();
+    let weight =
+        |generator: &Generator| if area > 0.0 { generator.area / area } else { generator.primitives / primitives };
+    let anchor = points.first()?.0;
+    let center: Vec3 = anchor + all().map(|g| weight(g) * (g.position - anchor)).sum::<Vec3>();
+    let nearest =
+        all().min_by(|a, b| a.position.distance_squared(center).total_cmp(&b.position.distance_squared(center)))?;
+    Some(Generator { position: nearest.position, area, primitives })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_even_share_keeps_area_and_number_and_is_spread() {
+        let all: Vec<Generator> = (0..4096u32)
+            .map(|i| Generator {
+                position: Vec3::new((i % 16) as f32, (i / 16 % 16) as f32, (i / 256) as f32),
+                area: 0.5 + (i % 3) as f32,
+                primitives: 1.0,
+            })
+            .collect();
+        let few = even_share(&all, 0.1);
+        assert_eq!(few.len(), 410);
+        let sum = |list: &[Generator]| list.iter().map(|g| f64::from(g.area)).sum::<f64>();
+        assert!((sum(&few) / sum(&all) - 1.0).abs() < 1e-6);
+        assert_eq!(few.iter().map(|g| g.primitives).sum::<f32>(), 4096.0);
+        for octant in 0..8u32 {
+            let low = Vec3::new((octant & 1) as f32, (octant >> 1 & 1) as f32, (octant >> 2) as f32) * 8.0;
+            let inside = |g: &&Generator| g.position.cmpge(low).all() && g.position.cmplt(low + 8.0).all();
+            assert!(few.iter().filter(inside).count().abs_diff(51) <= 8);
+        }
+        assert_eq!(even_share(&all, 0.0).len(), 1);
+        assert_eq!(even_share(&all, f32::NAN), all);
+        assert_eq!(even_share(&all, 1.0), all);
+        assert!(even_share(&[], 0.5).is_empty());
+    }
+
+    #[test]
+    fn the_weight_by_area_knows_neither_size_nor_tessellation() {
+        let leaf = |area: f32| Generator { position: Vec3::ZERO, area, primitives: 1.0 };
+        let whole = Weighting::LeafArea.weight(&leaf(0.02), 0.5);
+        assert!((Weighting::LeafArea.weight(&leaf(0.005), 0.5) * 4.0 - whole).abs() < 1e-7);
+        assert!((Weighting::LeafArea.weight(&leaf(2.0e4), 500.0) - whole).abs() < 1e-7);
+        assert_eq!(Weighting::Primitives.weight(&leaf(0.02), 0.5), 1.0);
+        assert_eq!(Weighting::LeafArea.weight(&leaf(1.0), 0.0), 0.0);
+    }
+}

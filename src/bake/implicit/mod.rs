@@ -1,0 +1,276 @@
+//! Light in the foliage by implicit surfaces [Luft 2007, "Expressive Illumination of Foliage Based on Implicit
+//! Surfaces"]: normals that follow the shape of the crown, and an ambient term that follows its density.
+//!
+//! ```text
+//! plant ─ generators ─ parameters ─ density field ─┬─ ambient term, all parts
+//!                                                  ├─ isosurface ─┬─ normals of the foliage (as published)
+//!                                                  │              └─ simplified, for other styles
+//!                                                  └─ gradient ──── normals of the foliage (smooth)
+//! ```
+//!
+//! | module | section |
+//! |---|---|
+//! | [`generators`] | generator points, an even share of them (3.1) |
+//! | [`density`] | density field and gradient (2.3, eq. 2 and 3) |
+//! | [`isosurface`], [`simplify_surface`] | the surface as a closed mesh (2.3, 3.1) |
+//! | [`ambient_term`] | k_a from the density (3.2, eq. 4) |
+//! | [`foliage_normals`] | realigned normals (3.3) |
+//! | [`packing`] | k_a as the length of the normal (3.2) |
+//! | [`parameters`] | settings, and values that follow from the model (3.1) |
+//! | [`stand`] | several plants that darken each other (5) |
+//!
+//! Realigned normals point out of the crown: they must not be flipped by the side of a leaf that faces the camera.
+//!
+//! Departures from the paper: generators count their leaf area (the paper's count is [`Weighting::Primitives`]);
+//! automatic parameters; the smooth variant. Limits: a card counts its whole area, also where its alpha is 0.
+//!
+//! Pure functions: the same plant and settings give the same bytes, with any number of threads. Cost: `benches/README.md`.
+
+pub mod ambient_term;
+mod cube_table;
+pub mod density;
+pub mod foliage_normals;
+pub mod generators;
+pub mod isosurface;
+mod moments;
+pub mod packing;
+pub mod parameters;
+mod partition;
+mod simplify;
+pub mod stand;
+
+use std::borrow::Cow;
+
+use glam::Vec3;
+
+use crate::plant::{PartKind, Plant, PlantMesh};
+use ambient_term::ambient_term;
+use density::{DensityField, FieldSample};
+use generators::Generator;
+use partition::Aabb;
+
+pub use generators::Weighting;
+pub use isosurface::SurfaceMesh;
+pub use parameters::{ImplicitParameters, ImplicitSettings, NormalSource};
+pub use simplify::{COARSE_SHARE, FINE_SHARE};
+pub use stand::{StandBake, StandPlant, bake_implicit_stand};
+
+/// Why the foliage keeps its own normals. Its ambient term is 1 throughout in the first two cases.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum NoSurface {
+    /// There is no leaf that counts, or ρ is 0.
+    #[error("there is no density field: the plant has no foliage with an area, or the radius is 0; normals are kept")]
+    NoField,
+    /// τ is above the field.
+    #[error(
+        "there is no implicit surface: the threshold {threshold} is not below the greatest density, {greatest}; \
+         normals are kept; lower the threshold or raise the radius"
+    )]
+    Threshold {
+        /// τ.
+        threshold: f32,
+        /// The greatest density at a vertex or generator.
+        greatest: f32,
+    },
+    /// All that there is of a surface is smaller than a cell.
+    #[error("the implicit surface is finer than its cells of {cell} m; normals are kept; raise the radius")]
+    BelowResolution {
+        /// Edge of a cell, metres.
+        cell: f32,
+    },
+}
+
+/// How a bake went.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImplicitReport {
+    /// The values that were used.
+    pub parameters: ImplicitParameters,
+    /// Number of generators.
+    pub generators: usize,
+    /// Edge of the surface's cells in metres; 0 where no surface was asked for.
+    pub cell: f32,
+    /// Why normals were kept; `None` where they were realigned.
+    pub no_surface: Option<NoSurface>,
+}
+
+/// A plant lit by implicit surfaces.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImplicitBake {
+    /// Unit normals, one list a part in the plant's order, one a vertex. Wood has its own; foliage that could not be
+    /// realigned (no surface, a position that is not finite) too.
+    pub normals: Vec<Vec<Vec3>>,
+    /// k_a, one list a part in the plant's order, one a vertex, k_a_min..=1.
+    pub ambient: Vec<Vec<f32>>,
+    /// The implicit surface in the plant's frame; `None` where there is none or none was asked for.
+    pub surface: Option<SurfaceMesh>,
+    /// How it went.
+    pub report: ImplicitReport,
+}
+
+/// Bakes the implicit surface of `plant`, and its foliage's normals and everything's ambient term from it. A plant
+/// that has no surface keeps its own normals, and the report says why.
+pub fn bake_implicit(plant: &Plant, settings: &ImplicitSettings) -> ImplicitBake {
+    let settings = settings.in_range();
+    let parts: Vec<Part> = plant.parts.iter().map(|p| Part { kind: p.kind, mesh: Cow::Borrowed(&p.mesh) }).collect();
+    let (parts, origin) = centered(parts);
+    let all = foliage_generators(&parts);
+    let radius = parameters::radius(&all, extent(&parts), &settings);
+    let generators = generators::even_share(&all, settings.generator_share);
+    let field = DensityField::new(&generators, radius, settings.weighting);
+    let parameters = parameters::parameters(&all, &field, &settings);
+    let mut baked = bake_parts(&parts, &generators, &field, parameters, &settings);
+    let places = baked.surface.iter_mut().flat_map(|surface| surface.positions.iter_mut());
+    places.for_each(|place| *place += origin);
+    baked
+}
+
+/// The surface with at most `target` triangles, or as near to it as its separate lobes allow, and with normals of
+/// `field` again. It stays closed.
+pub fn simplify_surface(surface: &SurfaceMesh, field: &DensityField, target: usize) -> SurfaceMesh {
+    let (positions, triangles) = simplify::simplify(&surface.positions, &surface.triangles, target);
+    with_normals(positions, triangles, field)
+}
+
+/// A part of a plant, in the frame of the bake.
+struct Part<'a> {
+    kind: PartKind,
+    mesh: Cow<'a, PlantMesh>,
+}
+
+fn finite_bounds(parts: &[Part]) -> Aabb {
+    Aabb::around(parts.iter().flat_map(|part| &part.mesh.positions).copied().filter(|p| p.is_finite()))
+}
+
+/// Longest extent of all parts, metres; not above 0 where there is nothing.
+fn extent(parts: &[Part]) -> f32 {
+    finite_bounds(parts).size().max_element()
+}
+
+/// Parts that lie far from the origin are moved there (differences of neighbouring f32 are exact), so that the places
+/// between them that the surface needs can be told apart. With the vector that leads back.
+fn centered(mut parts: Vec<Part>) -> (Vec<Part>, Vec3) {
+    let bounds = finite_bounds(&parts);
+    let center = Vec3::from(bounds.center());
+    if !center.is_finite() || center.abs().max_element() <= 4.0 * bounds.size().max_element() {
+        return (parts, Vec3::ZERO);
+    }
+    for part in &mut parts {
+        part.mesh.to_mut().positions.iter_mut().for_each(|position| *position -= center);
+    }
+    (parts, center)
+}
+
+/// A generator for each primitive of the foliage.
+fn foliage_generators(parts: &[Part]) -> Vec<Generator> {
+    let foliage = parts.iter().filter(|part| part.kind == PartKind::Foliage);
+    foliage.flat_map(|part| generators::generators(&part.mesh)).collect()
+}
+
+/// The bake itself, in the frame of the parts.
+fn bake_parts(
+    parts: &[Part],
+    generators: &[Generator],
+    field: &DensityField,
+    parameters: ImplicitParameters,
+    settings: &ImplicitSettings,
+) -> ImplicitBake {
+    // All parts at once: one list keeps all threads busy to its end.
+    let points: Vec<Vec3> = parts.iter().flat_map(|part| &part.mesh.positions).copied().collect();
+    let smooth = settings.normals == NormalSource::Gradient;
+    let samples = if smooth {
+        field.samples(&points)
+    } else {
+        field.values(&points).into_iter().map(|value| FieldSample { value, gradient: Vec3::ZERO }).collect()
+    };
+    let ambient = samples.iter().map(|sample| ambient_term(sample.value - parameters.threshold, &parameters));
+    let ambient = split(parts, ambient);
+
+    let (surface, cell) = if settings.surface || !smooth {
+        let region = Aabb::around(generators.iter().map(|generator| generator.position));
+        let cell = parameters.radius / settings.resolution;
+        let found = isosurface::extract(field, &region, parameters.threshold, cell);
+        (with_normals(found.positions, found.triangles, field), found.cell)
+    } else {
+        (SurfaceMesh::default(), 0.0)
+    };
+    let no_surface = no_surface(field, &samples, &surface, smooth, parameters.threshold, cell);
+
+    let realigned = match (no_surface, settings.normals) {
+        (Some(_), _) => vec![None; points.len()],
+        (None, NormalSource::NearestVertex) => {
+            of_foliage(parts, |points| foliage_normals::nearest_vertex_normals(points, &surface))
+        }
+        (None, NormalSource::Gradient) => foliage_normals::gradient_normals(&points, &samples, field),
+    };
+    let mut realigned = realigned.into_iter();
+    let normals = parts.iter().map(|part| own_or_realigned(part, &mut realigned, settings.own_normal)).collect();
+
+    let leaves: usize =
+        parts.iter().filter(|part| part.kind == PartKind::Foliage).map(|part| part.mesh.triangles.len()).sum();
+    let surface = (!surface.triangles.is_empty()).then_some(surface).map(|surface| match settings.surface_share {
+        Some(share) => simplify_surface(&surface, field, (f64::from(share) * leaves as f64).round() as usize),
+        None => surface,
+    });
+    let report = ImplicitReport { parameters, generators: generators.len(), cell, no_surface };
+    ImplicitBake { normals, ambient, surface, report }
+}
+
+fn no_surface(
+    field: &DensityField,
+    samples: &[FieldSample],
+    surface: &SurfaceMesh,
+    smooth: bool,
+    threshold: f32,
+    cell: f32,
+) -> Option<NoSurface> {
+    let greatest = samples.iter().map(|sample| sample.value).fold(0.0f32, f32::max);
+    if !surface.triangles.is_empty() || smooth && greatest > threshold {
+        None
+    } else if field.memory() == 0 {
+        Some(NoSurface::NoField)
+    } else if greatest <= threshold {
+        Some(NoSurface::Threshold { threshold, greatest })
+    } else {
+        Some(NoSurface::BelowResolution { cell })
+    }
+}
+
+/// Normals by `find` for the foliage's vertices, none for the wood's, in one list.
+fn of_foliage(parts: &[Part], find: impl Fn(&[Vec3]) -> Vec<Option<Vec3>>) -> Vec<Option<Vec3>> {
+    let mut found = Vec::new();
+    for part in parts {
+        match part.kind {
+            PartKind::Foliage => found.extend(find(&part.mesh.positions)),
+            PartKind::Wood => found.resize(found.len() + part.mesh.positions.len(), None),
+        }
+    }
+    found
+}
+
+/// The normals of a part, which takes its share of the list `realigned`.
+fn own_or_realigned(part: &Part, realigned: &mut impl Iterator<Item = Option<Vec3>>, own_share: f32) -> Vec<Vec3> {
+    let count = part.mesh.positions.len();
+    let own = part.mesh.normals.iter().copied().chain(std::iter::repeat(Vec3::Y)).take(count);
+    own.zip(realigned.take(count))
+        .map(|(own, realigned)| {
+            let own = own.try_normalize().unwrap_or(Vec3::Y);
+            match part.kind {
+                PartKind::Foliage => foliage_normals::blend(own, realigned, own_share),
+                PartKind::Wood => own,
+            }
+        })
+        .collect()
+}
+
+/// Cuts a list with a value for each vertex of all parts into one list a part.
+fn split<T>(parts: &[Part], values: impl IntoIterator<Item = T>) -> Vec<Vec<T>> {
+    let mut values = values.into_iter();
+    parts.iter().map(|part| values.by_ref().take(part.mesh.positions.len()).collect()).collect()
+}
+
+/// A mesh with the field's outward normals; up where the field is level.
+fn with_normals(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>, field: &DensityField) -> SurfaceMesh {
+    let outward = |sample: &FieldSample| (-sample.gradient * field.radius()).try_normalize().unwrap_or(Vec3::Y);
+    let normals = field.samples(&positions).iter().map(outward).collect();
+    SurfaceMesh { positions, normals, triangles }
+}

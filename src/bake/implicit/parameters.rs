@@ -1,0 +1,221 @@
+//! What a bake is told, and the values of ρ, τ, k_a_min, d_min and n that follow from the model where it is not told.
+//!
+//! [Luft 2007, 3.1] sets ρ and τ by hand and finds that adequate values follow from the model's size. Here:
+//!
+//! - ρ: a twentieth of the plant's longest extent, but at least twice the mean distance of its leaves, so that a
+//!   sparse plant does not fall into single leaves;
+//! - τ: a share of the median of F at the leaves, so that the surface keeps close to the crown whatever its density;
+//! - d_min: where the densest tenth of the leaves begins;
+//! - k_a_min and n: constants, fitted to the ambient visibility of [`crate::bake::ambient`] on our own broadleaf and
+//!   conifer and on an oak, a pine and an aspen (`benches/implicit.rs` prints how well they do).
+
+use glam::Vec3;
+
+use super::density::DensityField;
+use super::generators::{Generator, Weighting, even_share};
+use super::partition::Aabb;
+
+/// ρ as a share of the plant's longest extent.
+const RADIUS_SHARE: f32 = 0.05;
+/// ρ in mean distances between leaves, at least.
+const RADIUS_SPACINGS: f32 = 2.0;
+/// τ as a share of the median of F at the leaves.
+const THRESHOLD_SHARE: f32 = 0.25;
+/// The share of the leaves at which F - τ is below d_min.
+const CORE_QUANTILE: f64 = 0.9;
+/// k_a_min.
+const LEAST: f32 = 0.1;
+/// n.
+const EXPONENT: f32 = 1.0;
+/// Leaves that are asked for the density.
+const SAMPLES: usize = 4096;
+
+/// Where the normals of the foliage come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum NormalSource {
+    /// The nearest vertex of the surface, as published. Jumps between lobes of the crown.
+    #[default]
+    NearestVertex,
+    /// The gradient of the density field: smooth.
+    Gradient,
+}
+
+/// How a plant is lit by implicit surfaces. Values out of range are moved into it; `None` follows from the model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImplicitSettings {
+    /// ρ, metres, 0..=1e6. Larger: a smoother, more general shape of the crown.
+    pub radius: Option<f32>,
+    /// τ in units of the field (see [`Weighting`]), 0..=1e6. Larger: a surface closer to the densest foliage.
+    pub threshold: Option<f32>,
+    /// k_a_min, 0..=1: what is left of the ambient light in the core.
+    pub least: Option<f32>,
+    /// d_min in units of the field, 0..=1e6: density from which on k_a is k_a_min. Larger: brighter.
+    pub core: Option<f32>,
+    /// n, 0.01..=100: below 1 the crown darkens late on the way inside, above 1 early.
+    pub exponent: Option<f32>,
+    /// Share of the foliage's primitives that are generators, 0..=1 (at least one is). Smaller: faster, a little off.
+    pub generator_share: f32,
+    /// What a generator counts.
+    pub weighting: Weighting,
+    /// Where the normals come from.
+    pub normals: NormalSource,
+    /// Share of a leaf's own normal in the result, 0..=1; the publication shows 0.
+    pub own_normal: f32,
+    /// Whether the surface is extracted where the normals do not need it.
+    pub surface: bool,
+    /// Cells of the surface a radius ρ, 1..=16. More: a finer surface, with the square in triangles.
+    pub resolution: f32,
+    /// Triangles of the surface that is returned as a share of the foliage's, 0..=1 (the presets
+    /// [`COARSE_SHARE`](super::COARSE_SHARE) and [`FINE_SHARE`](super::FINE_SHARE)); `None` leaves it as extracted.
+    /// Normals always come from the surface as extracted.
+    pub surface_share: Option<f32>,
+}
+
+impl Default for ImplicitSettings {
+    fn default() -> Self {
+        Self {
+            radius: None,
+            threshold: None,
+            least: None,
+            core: None,
+            exponent: None,
+            generator_share: 1.0,
+            weighting: Weighting::LeafArea,
+            normals: NormalSource::NearestVertex,
+            own_normal: 0.0,
+            surface: true,
+            resolution: 4.0,
+            surface_share: None,
+        }
+    }
+}
+
+impl ImplicitSettings {
+    /// The settings with every value moved into its range; what is not finite becomes the default.
+    pub fn in_range(self) -> Self {
+        let default = Self::default();
+        let or = |value: f32, default: f32| if value.is_finite() { value } else { default };
+        let within = |value: Option<f32>, low: f32, high: f32| {
+            value.filter(|value| value.is_finite()).map(|value| value.clamp(low, high))
+        };
+        Self {
+            radius: within(self.radius, 0.0, 1.0e6),
+            threshold: within(self.threshold, 0.0, 1.0e6),
+            least: within(self.least, 0.0, 1.0),
+            core: within(self.core, 0.0, 1.0e6),
+            exponent: within(self.exponent, 0.01, 100.0),
+            generator_share: or(self.generator_share, default.generator_share).clamp(0.0, 1.0),
+            own_normal: or(self.own_normal, default.own_normal).clamp(0.0, 1.0),
+            resolution: or(self.resolution, default.resolution).clamp(1.0, 16.0),
+            surface_share: within(self.surface_share, 0.0, 1.0),
+            ..self
+        }
+    }
+}
+
+/// The values that a bake went by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImplicitParameters {
+    /// ρ, metres.
+    pub radius: f32,
+    /// τ, units of the field.
+    pub threshold: f32,
+    /// k_a_min, 0..=1.
+    pub least: f32,
+    /// d_min, units of the field.
+    pub core: f32,
+    /// n.
+    pub exponent: f32,
+}
+
+/// ρ in metres for a plant with `generators`, one a primitive, whose longest extent is `extent` metres: as the settings say or as follows from the model.
+/// 0 where there are no generators or they have no extent.
+pub fn radius(generators: &[Generator], extent: f32, settings: &ImplicitSettings) -> f32 {
+    if let Some(radius) = settings.radius {
+        return radius;
+    }
+    let bounds = Aabb::around(generators.iter().map(|generator| generator.position));
+    let size = Vec3::from(bounds.size());
+    let longest = size.max_element().max(extent);
+    if generators.is_empty() || !longest.is_finite() || longest <= 0.0 {
+        return 0.0;
+    }
+    // Leaves in a plane or a line have no volume: each side counts a hundredth of the longest at least.
+    let relative = (size / longest).max(Vec3::splat(0.01));
+    // The number of equal leaves that would vary as much as these: many tiny ones beside large ones do not count.
+    let heaviest = generators.iter().map(|g| g.area).fold(0.0f32, f32::max);
+    let shares = || generators.iter().map(|g| f64::from(if heaviest > 0.0 { g.area / heaviest } else { 1.0 }));
+    let number = shares().sum::<f64>().powi(2) / shares().map(|share| share * share).sum::<f64>();
+    let spacing = (f64::from(relative.element_product()) / number.max(1.0)).cbrt() as f32;
+    (RADIUS_SHARE.max(RADIUS_SPACINGS * spacing).min(1.0)) * longest
+}
+
+/// All values for a model with `generators`, one a primitive, and the `field` of them or of a share of them, whose radius
+/// is kept: as the settings say or as follows from the density at the leaves.
+pub fn parameters(generators: &[Generator], field: &DensityField, settings: &ImplicitSettings) -> ImplicitParameters {
+    let share = SAMPLES as f32 / generators.len().max(1) as f32;
+    let places: Vec<Vec3> = even_share(generators, share).iter().map(|generator| generator.position).collect();
+    let mut densities = field.values(&places);
+    densities.sort_by(f32::total_cmp);
+    let quantile = |share: f64| {
+        let at = (share * densities.len() as f64) as usize;
+        densities.get(at.min(densities.len().saturating_sub(1))).copied().unwrap_or(0.0)
+    };
+    let threshold = settings.threshold.unwrap_or(THRESHOLD_SHARE * quantile(0.5));
+    ImplicitParameters {
+        radius: field.radius(),
+        threshold,
+        least: settings.least.unwrap_or(LEAST),
+        core: settings.core.unwrap_or((quantile(CORE_QUANTILE) - threshold).max(0.0)),
+        exponent: settings.exponent.unwrap_or(EXPONENT),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_are_moved_into_range() {
+        let wild = ImplicitSettings {
+            radius: Some(-1.0),
+            threshold: Some(f32::NAN),
+            least: Some(2.0),
+            core: Some(f32::INFINITY),
+            exponent: Some(0.0),
+            generator_share: f32::NAN,
+            own_normal: -3.0,
+            resolution: 1.0e9,
+            surface_share: Some(7.0),
+            ..ImplicitSettings::default()
+        }
+        .in_range();
+        assert_eq!((wild.radius, wild.threshold, wild.least, wild.core), (Some(0.0), None, Some(1.0), None));
+        assert_eq!((wild.exponent, wild.generator_share, wild.own_normal), (Some(0.01), 1.0, 0.0));
+        assert_eq!((wild.resolution, wild.surface_share), (16.0, Some(1.0)));
+        assert_eq!(ImplicitSettings::default().in_range(), ImplicitSettings::default());
+    }
+
+    #[test]
+    fn automatic_values_scale_with_the_plant() {
+        let of = |scale: f32| {
+            let leaves: Vec<Generator> = (0..4000u32)
+                .map(|i| Generator {
+                    position: Vec3::new((i % 16) as f32, (i / 16 % 16) as f32, (i / 256) as f32) * scale,
+                    area: scale * scale * 0.2,
+                    primitives: 1.0,
+                })
+                .collect();
+            let settings = ImplicitSettings::default();
+            let field = DensityField::new(&leaves, radius(&leaves, 20.0 * scale, &settings), settings.weighting);
+            parameters(&leaves, &field, &settings)
+        };
+        let (small, large) = (of(1.0e-4), of(1.0e3));
+        assert!((small.radius / 1.0e-4 / (large.radius / 1.0e3) - 1.0).abs() < 1e-4);
+        assert!((small.threshold / large.threshold - 1.0).abs() < 1e-3);
+        assert!((small.core / large.core - 1.0).abs() < 1e-2);
+        // Twice the distance of the leaves, as a twentieth of 20 would be too little.
+        assert!((1.5..2.5).contains(&(large.radius / 1.0e3)), "{}", large.radius);
+        assert_eq!(radius(&[], 10.0, &ImplicitSettings::default()), 0.0);
+    }
+}
