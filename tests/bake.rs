@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use canopy::bake::ambient::{AmbientSettings, ambient_visibility};
 use canopy::bake::billboard::{Cross, CrossSettings, bake_cross};
+use canopy::bake::implicit::{ImplicitSettings, NoSurface};
+use canopy::bake::lighting::{BakedLighting, ExpressiveLighting, LightingSettings};
 use canopy::bake::cache::{Cache, CacheKey};
 use canopy::bake::rasterize::{View, projected_area};
 use canopy::bake::shadow_proxy::{shadow_proxy, simplify_foliage};
@@ -117,7 +118,7 @@ fn small_settings() -> BakeSettings {
 }
 
 fn same(a: &BakedPlant, b: &BakedPlant) -> bool {
-    a.ambient == b.ambient && a.shadow_proxy == b.shadow_proxy && a.cross == b.cross
+    a.lighting == b.lighting && a.shadow_proxy == b.shadow_proxy && a.cross == b.cross
 }
 
 fn decode_octahedral(code: [u8; 2]) -> Vec3 {
@@ -150,51 +151,9 @@ fn picture_area(cross: &Cross, index: usize, level: usize) -> f32 {
 }
 
 #[test]
-fn ambient_is_brighter_outside_than_inside_and_on_top_than_below() {
-    let plant = tree(6000, 1);
-    let ambient = ambient_visibility(&plant, &AmbientSettings::default());
-    assert_eq!(
-        ambient.iter().map(Vec::len).collect::<Vec<_>>(),
-        plant.parts.iter().map(|p| p.mesh.positions.len()).collect::<Vec<_>>()
-    );
-    let mean = |select: &dyn Fn(Vec3) -> bool| {
-        let chosen: Vec<f32> = plant.parts[1]
-            .mesh
-            .positions
-            .iter()
-            .zip(&ambient[1])
-            .filter(|(p, _)| select(**p))
-            .map(|(_, k)| *k)
-            .collect();
-        assert!(chosen.len() > 20, "the test looks at {} vertices only", chosen.len());
-        chosen.iter().sum::<f32>() / chosen.len() as f32
-    };
-    let middle = Vec3::new(0.3, 5.0, -0.2);
-    let inside = mean(&|p| p.distance(middle) < 1.0);
-    let outside = mean(&|p| p.distance(middle) > 2.2);
-    assert!(outside > 1.3 * inside, "outside {outside}, inside {inside}");
-    let (top, bottom) = (mean(&|p| p.y > 6.5), mean(&|p| p.y < 3.5));
-    assert!(top > 1.1 * bottom, "top {top}, bottom {bottom}");
-}
-
-#[test]
-fn ambient_of_bare_wood_is_open_and_of_denser_foliage_darker() {
-    let mut bare = tree(1, 2);
-    bare.parts.truncate(1);
-    assert!(ambient_visibility(&bare, &AmbientSettings::default())[0].iter().all(|&k| k == 1.0));
-    let mean = |cards: usize| {
-        let ambient = ambient_visibility(&tree(cards, 3), &AmbientSettings::default());
-        ambient[0].iter().sum::<f32>() / ambient[0].len() as f32
-    };
-    let (thin, dense) = (mean(400), mean(8000));
-    assert!(dense < 0.8 * thin && thin < 1.0, "thin {thin}, dense {dense}");
-}
-
-#[test]
 fn a_cross_covers_what_the_plant_covers_in_every_mip() {
     let plant = tree(1500, 4);
-    let ambient = ambient_visibility(&plant, &AmbientSettings::default());
-    let cross = bake_cross(&plant, &ambient, &CrossSettings::default());
+    let cross = bake_cross(&plant, &BakedLighting::Local, &CrossSettings::default());
     let bounds = plant.bounds().unwrap();
     for (index, plane) in cross.planes.iter().enumerate() {
         assert!((plane.u.cross(plane.v).normalize() - plane.normal).length() < 1e-5);
@@ -217,7 +176,7 @@ fn a_cross_covers_what_the_plant_covers_in_every_mip() {
 #[test]
 fn a_cross_has_no_foreign_colour_anywhere() {
     let plant = tree(1500, 5);
-    let cross = bake_cross(&plant, &[], &CrossSettings { resolution: 128, ..Default::default() });
+    let cross = bake_cross(&plant, &BakedLighting::Local, &CrossSettings { resolution: 128, ..Default::default() });
     for chain in &cross.textures.color {
         // Leaves are green (60, 120, 30), bark is brown: red never exceeds what lies between, blue stays low.
         for texel in chain.levels.iter().flat_map(|level| level.chunks_exact(4)) {
@@ -236,7 +195,12 @@ fn a_cross_keeps_normal_ambient_and_kind() {
     add_card(&mut mesh, Vec3::new(0.0, 2.0, 0.0), Quat::from_rotation_arc(Vec3::Z, -normal), 1.0);
     let part = PlantPart { kind: PartKind::Foliage, mesh, material: PlantMaterial::default() };
     let plant = Plant { name: String::new(), parts: vec![part] };
-    let cross = bake_cross(&plant, &[vec![0.4; 4]], &CrossSettings { resolution: 64, ..Default::default() });
+    let lighting = BakedLighting::Expressive(ExpressiveLighting {
+        normals: vec![plant.parts[0].mesh.normals.clone()],
+        ambient: vec![vec![0.4; 4]],
+        no_surface: Some(NoSurface::NoField),
+    });
+    let cross = bake_cross(&plant, &lighting, &CrossSettings { resolution: 64, ..Default::default() });
     for (plane, chain) in cross.planes.iter().zip(&cross.textures.properties) {
         for level in &chain.levels {
             for texel in level.chunks_exact(4) {
@@ -252,7 +216,7 @@ fn a_cross_keeps_normal_ambient_and_kind() {
 
 #[test]
 fn nothing_and_flat_plants_give_crosses_too() {
-    let empty = bake_cross(&Plant::default(), &[], &CrossSettings::default());
+    let empty = bake_cross(&Plant::default(), &BakedLighting::Local, &CrossSettings::default());
     assert_eq!(empty.planes.len(), 3);
     assert!(empty.textures.color.iter().flat_map(|chain| &chain.levels).flatten().all(|&byte| byte == 0));
 
@@ -260,8 +224,7 @@ fn nothing_and_flat_plants_give_crosses_too() {
     add_card(&mut mesh, Vec3::Y, Quat::IDENTITY, 1.0);
     let part = PlantPart { kind: PartKind::Foliage, mesh, material: PlantMaterial::default() };
     let flat = Plant { name: String::new(), parts: vec![part] };
-    let ambient = ambient_visibility(&flat, &AmbientSettings::default());
-    let cross = bake_cross(&flat, &ambient, &CrossSettings { resolution: 64, ..Default::default() });
+    let cross = bake_cross(&flat, &BakedLighting::Local, &CrossSettings { resolution: 64, ..Default::default() });
     assert_eq!(cross.planes[1].u, Vec3::ZERO);
     assert!(cross.planes.iter().all(|plane| plane.frame().is_finite()));
     assert_eq!(cross.textures.color[0].coverage(0, 0.5), 1.0);
@@ -357,7 +320,7 @@ fn a_folder_that_cannot_be_written_is_a_warning() {
         panic!("{source:?}")
     };
     assert!(warning.to_string().contains("CANOPY_CACHE"), "{warning}");
-    assert_eq!(baked.ambient.len(), 2);
+    assert!(baked.lighting.fits(&baked.plant));
 
     // A folder in the place of the file: it can be neither read nor replaced.
     let cache = Cache::new(folder.path());
@@ -394,9 +357,9 @@ fn sixty_thousand_triangles_are_baked_in_seconds() {
         println!("{what}: {time:?}");
         assert!(time < Duration::from_secs(limit), "{what} took {time:?}");
     };
-    let mut ambient = Vec::new();
-    timed("ambient visibility", 5, &mut || ambient = ambient_visibility(&plant, &AmbientSettings::default()));
-    timed("crossed billboards", 15, &mut || drop(bake_cross(&plant, &ambient, &CrossSettings::default())));
+    let mut lighting = BakedLighting::Local;
+    timed("lighting", 10, &mut || lighting = BakedLighting::bake(&plant, &LightingSettings::default()));
+    timed("crossed billboards", 15, &mut || drop(bake_cross(&plant, &lighting, &CrossSettings::default())));
     timed("shadow proxy", 10, &mut || drop(shadow_proxy(&plant, 12_000)));
     let folder = tempfile::tempdir().unwrap();
     let cache = Cache::new(folder.path());
@@ -478,18 +441,21 @@ proptest! {
     fn any_plant_bakes_to_finite_values(
         parts in proptest::collection::vec(any_part(), 0..3),
         target in 0usize..40,
-        cell in any_number(),
-        extinction in any_number(),
+        radius in any_number(),
+        threshold in any_number(),
         smoothing in any_number(),
     ) {
         let plant = Plant { name: String::new(), parts };
-        let ambient = ambient_visibility(&plant, &AmbientSettings { cell, extinction, ..Default::default() });
-        for (part, values) in plant.parts.iter().zip(&ambient) {
-            prop_assert_eq!(part.mesh.positions.len(), values.len());
-            prop_assert!(values.iter().all(|k| (0.0..=1.0).contains(k)));
+        let implicit =
+            ImplicitSettings { radius: Some(radius), threshold: Some(threshold), ..ImplicitSettings::default() };
+        let lighting = BakedLighting::bake(&plant, &LightingSettings::Expressive(implicit).in_range());
+        prop_assert!(lighting.fits(&plant));
+        for part in 0..plant.parts.len() {
+            prop_assert!(lighting.ambient(part).iter().all(|k| (0.0..=1.0).contains(k)));
+            prop_assert!(lighting.normals(part).unwrap_or_default().iter().all(|normal| normal.is_normalized()));
         }
         let settings = CrossSettings { resolution: 3, supersampling: 0, normal_smoothing: smoothing };
-        let cross = bake_cross(&plant, &ambient, &settings);
+        let cross = bake_cross(&plant, &lighting, &settings);
         prop_assert_eq!(cross.textures.color[0].width, 64);
         prop_assert!(cross.transmission.is_finite());
         for plane in &cross.planes {

@@ -2,7 +2,7 @@
 //!
 //! | module | makes | after |
 //! |---|---|---|
-//! | [`ambient`] | ambient visibility k_a a vertex | [Monsi & Saeki 1953] |
+//! | [`lighting`] | which light a plant gets, and what is baked for it | |
 //! | [`billboard`] | crossed billboards with colour, normal, k_a | [Franzke 2005, 4.3] |
 //! | [`implicit`] | normals and k_a from the crown's implicit surface, and that surface | [Luft 2007] |
 //! | [`shadow_proxy`] | a lighter model with the same projected area | [Cook et al. 2007] |
@@ -12,11 +12,11 @@
 //! [`bake_plant`] does all of it. Its result depends on the plant and the settings alone, bit for bit, not on the
 //! number of threads.
 
-pub mod ambient;
 pub mod billboard;
 pub mod cache;
 mod geometry;
 pub mod implicit;
+pub mod lighting;
 pub mod rasterize;
 pub mod shadow_proxy;
 mod surface;
@@ -25,17 +25,17 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::plant::{Plant, PlantMesh};
-use ambient::{AmbientSettings, ambient_visibility};
 use billboard::{Cross, CrossSettings, bake_cross};
 use cache::{Cache, CacheKey};
+use lighting::{BakedLighting, LightingSettings};
 
 /// A plant with everything that is derived from it once and kept in the cache.
 #[derive(Clone, Debug)]
 pub struct BakedPlant {
     /// The full model.
     pub plant: Arc<Plant>,
-    /// Ambient visibility k_a of every vertex, one list a part in the plant's order, 0..1.
-    pub ambient: Vec<Vec<f32>>,
+    /// What lights the foliage.
+    pub lighting: BakedLighting,
     /// A lighter model (parts in the plant's order) with the same projected area, which casts the near shadow.
     pub shadow_proxy: Vec<PlantMesh>,
     /// Crossed billboards.
@@ -45,8 +45,8 @@ pub struct BakedPlant {
 /// How a plant is baked. Values out of range are moved into it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BakeSettings {
-    /// Ambient visibility.
-    pub ambient: AmbientSettings,
+    /// Which light the foliage gets.
+    pub lighting: LightingSettings,
     /// Crossed billboards.
     pub cross: CrossSettings,
     /// Triangles of the shadow proxy as a share of the plant's, 0..=1. Smaller: faster and coarser shadows.
@@ -55,7 +55,7 @@ pub struct BakeSettings {
 
 impl Default for BakeSettings {
     fn default() -> Self {
-        Self { ambient: AmbientSettings::default(), cross: CrossSettings::default(), shadow_share: 0.2 }
+        Self { lighting: LightingSettings::default(), cross: CrossSettings::default(), shadow_share: 0.2 }
     }
 }
 
@@ -63,7 +63,7 @@ impl BakeSettings {
     /// The settings with every value moved into its range; what is not finite becomes the default.
     pub fn in_range(self) -> Self {
         let share = if self.shadow_share.is_finite() { self.shadow_share } else { Self::default().shadow_share };
-        Self { ambient: self.ambient.in_range(), cross: self.cross.in_range(), shadow_share: share.clamp(0.0, 1.0) }
+        Self { lighting: self.lighting.in_range(), cross: self.cross.in_range(), shadow_share: share.clamp(0.0, 1.0) }
     }
 }
 
@@ -124,8 +124,8 @@ pub fn bake_plant(plant: Arc<Plant>, settings: &BakeSettings, cache: Option<&Cac
 fn bake_fresh(plant: Arc<Plant>, settings: &BakeSettings) -> BakedPlant {
     let triangles: usize = plant.parts.iter().map(|part| part.mesh.triangles.len()).sum();
     let target = (triangles as f64 * f64::from(settings.shadow_share)).round() as usize;
-    let ambient = ambient_visibility(&plant, &settings.ambient);
-    let cross = bake_cross(&plant, &ambient, &settings.cross);
+    let lighting = BakedLighting::bake(&plant, &settings.lighting);
+    let cross = bake_cross(&plant, &lighting, &settings.cross);
     let shadow_proxy = shadow_proxy::shadow_proxy(&plant, target);
-    BakedPlant { plant, ambient, shadow_proxy, cross }
+    BakedPlant { plant, lighting, shadow_proxy, cross }
 }

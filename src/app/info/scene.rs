@@ -14,6 +14,7 @@ use crate::{
     bake::{
         BakedPlant,
         billboard::{Cross, CrossTextures, SPREAD_LEVELS},
+        lighting::BakedLighting,
     },
     light::sun::{Observer, SunPosition},
     plant::{PartKind, Plant, grow::GrowParameters},
@@ -112,7 +113,7 @@ fn unbaked(plant: Plant) -> BakedPlant {
     let textures = CrossTextures { color: Vec::new(), properties: Vec::new() };
     BakedPlant {
         plant: Arc::new(plant),
-        ambient: Vec::new(),
+        lighting: BakedLighting::Local,
         shadow_proxy: Vec::new(),
         cross: Cross { planes: Vec::new(), textures, transmission: Vec3::ZERO, spread: [0.0; SPREAD_LEVELS] },
     }

@@ -21,6 +21,7 @@ use rayon::prelude::*;
 
 use self::properties::SpreadSum;
 use super::geometry;
+use super::lighting::BakedLighting;
 use super::rasterize::{Hit, Raster, View};
 use crate::plant::texture::MipChain;
 use crate::plant::{Bounds, PartKind, Plant};
@@ -119,17 +120,17 @@ impl CrossSettings {
     }
 }
 
-/// Makes the crossed billboards of `plant`. `ambient` is k_a of every vertex ([`super::ambient`]); what is missing
-/// there counts as 1. The planes cover the plant's bounds exactly; an empty plant gets three planes without extent
+/// Makes the crossed billboards of `plant` with the normals and the k_a of its `lighting`; what is missing there is the
+/// plant's own, or 1. The planes cover the plant's bounds exactly; an empty plant gets three planes without extent
 /// and wholly transparent pictures.
-pub fn bake_cross(plant: &Plant, ambient: &[Vec<f32>], settings: &CrossSettings) -> Cross {
+pub fn bake_cross(plant: &Plant, lighting: &BakedLighting, settings: &CrossSettings) -> Cross {
     let settings = settings.in_range();
     let planes = planes(plant);
     let resolution = settings.resolution as usize;
     let pictures: Vec<_> = planes
         .par_iter()
         .map(|plane| {
-            let texels = picture(plant, ambient, plane, &settings);
+            let texels = picture(plant, lighting, plane, &settings);
             let properties = properties::mips(&texels, resolution, settings.normal_smoothing);
             (color::mips(&texels, resolution), properties)
         })
@@ -205,7 +206,7 @@ struct Texel {
     coverage: f32,
     /// Linear base colour.
     color: Vec3,
-    /// Normal in the plane's frame, turned towards the viewer.
+    /// Normal in the plane's frame; a leaf's own is turned towards the viewer.
     normal: Vec3,
     /// Ambient visibility.
     ambient: f32,
@@ -214,13 +215,13 @@ struct Texel {
 }
 
 /// The picture of the plant on one plane, row by row from the top.
-fn picture(plant: &Plant, ambient: &[Vec<f32>], plane: &CrossPlane, settings: &CrossSettings) -> Vec<Texel> {
+fn picture(plant: &Plant, lighting: &BakedLighting, plane: &CrossPlane, settings: &CrossSettings) -> Vec<Texel> {
     const ROWS: u32 = 8;
     let (resolution, samples) = (settings.resolution, settings.supersampling);
     let view = View { center: plane.center, right: plane.u, up: plane.v, toward: plane.normal };
     let side = resolution * samples;
     let raster = Raster::new(plant, &view, side, side, ROWS * samples);
-    let shader = Shader { plant, ambient, raster: &raster, to_plane: plane.frame().transpose(), toward: plane.normal };
+    let shader = Shader { plant, lighting, raster: &raster, to_plane: plane.frame().transpose(), toward: plane.normal };
     let (side, samples, resolution) = (side as usize, samples as usize, resolution as usize);
     let bands: Vec<Vec<Texel>> = (0..raster.band_count())
         .into_par_iter()
@@ -248,7 +249,7 @@ fn picture(plant: &Plant, ambient: &[Vec<f32>], plane: &CrossPlane, settings: &C
 /// Looks up what a sample sees.
 struct Shader<'a> {
     plant: &'a Plant,
-    ambient: &'a [Vec<f32>],
+    lighting: &'a BakedLighting,
     raster: &'a Raster<'a>,
     to_plane: Mat3,
     toward: Vec3,
@@ -262,19 +263,20 @@ impl Shader<'_> {
         let weights = Vec3::new(1.0 - hit.weights.x - hit.weights.y, hit.weights.x, hit.weights.y).to_array();
         let weighted = || corners.into_iter().zip(weights);
 
-        let normal: Vec3 = weighted().map(|(c, w)| w * mesh.normals[c]).sum();
+        let normals = self.lighting.normals(hit.part as usize).unwrap_or(&mesh.normals);
+        let normal: Vec3 = weighted().map(|(c, w)| w * normals.get(c).copied().unwrap_or(Vec3::Y)).sum();
         let [a, b, c] = corners.map(|c| mesh.positions[c]);
-        // A leaf has two sides, the viewer sees the one that is turned to him. Bark has one, but an open branch may
+        // A leaf has two sides, the viewer sees the one that is turned to him; a crown has only its outside. Bark has one, but an open branch may
         // be seen into; only then is its normal turned, a smooth one may well look over the edge.
         let from_behind = match part.kind {
-            PartKind::Foliage => normal.dot(self.toward) < 0.0,
+            PartKind::Foliage => !self.lighting.is_realigned() && normal.dot(self.toward) < 0.0,
             PartKind::Wood => (b - a).cross(c - a).dot(self.toward) < 0.0,
         };
         let normal = if from_behind { -normal } else { normal };
         let normal = normal.try_normalize().unwrap_or(self.toward);
 
-        let values = self.ambient.get(hit.part as usize);
-        let ambient: f32 = weighted().map(|(c, w)| w * values.and_then(|v| v.get(c)).copied().unwrap_or(1.0)).sum();
+        let values = self.lighting.ambient(hit.part as usize);
+        let ambient: f32 = weighted().map(|(c, w)| w * values.get(c).copied().unwrap_or(1.0)).sum();
         let uv = weighted().map(|(c, w)| w * mesh.uvs[c]).sum();
         let color = self.raster.surface(hit.part).color(uv);
 

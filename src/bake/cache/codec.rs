@@ -7,7 +7,7 @@
 //!       12    32  key: hash of what it was made from
 //!       44     8  length of the payload
 //!       52    32  BLAKE3 of bytes 0..52 and the payload
-//!       84        payload: ambient, shadow proxy, planes, textures, transmission, spread; lists go with their length (u32)
+//!       84        payload: lighting, shadow proxy, planes, textures, transmission, spread; lists go with their length (u32)
 //! ```
 
 use std::sync::Arc;
@@ -15,21 +15,27 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 
 use crate::bake::BakedPlant;
+use crate::bake::implicit::NoSurface;
+use crate::bake::lighting::{BakedLighting, ExpressiveLighting};
 use crate::bake::billboard::{Cross, CrossPlane, CrossTextures, SPREAD_LEVELS};
 use crate::plant::texture::MipChain;
 use crate::plant::{Plant, PlantMesh};
 
 /// Version of the format *and* of the bakes: to be raised whenever either gives other bytes for the same input.
-pub(super) const VERSION: u32 = 2;
+pub(super) const VERSION: u32 = 3;
 
 const MAGIC: [u8; 8] = *b"CANOPYBK";
 const HEAD: usize = 52;
 const PAYLOAD: usize = HEAD + 32;
 
+/// What a file says of the lighting that it holds.
+const LOCAL: u32 = 0;
+const EXPRESSIVE: u32 = 1;
+
 /// The file of a baked plant; the plant itself is not in it.
 pub(super) fn encode(baked: &BakedPlant, key: &[u8; 32]) -> Vec<u8> {
     let mut out = Writer(Vec::new());
-    out.list(&baked.ambient, |out, values| out.list(values, |out, value| out.float(*value)));
+    out.lighting(&baked.lighting);
     out.list(&baked.shadow_proxy, |out, mesh| {
         out.list(&mesh.positions, |out, p| out.vector(*p));
         out.list(&mesh.normals, |out, n| out.vector(*n));
@@ -77,7 +83,7 @@ pub(super) fn decode(file: &[u8], key: &[u8; 32], plant: &Arc<Plant>) -> Option<
         return None;
     }
     let mut reader = Reader(payload);
-    let ambient = reader.list(|r| r.list(|r| r.float().filter(|k| (0.0..=1.0).contains(k))))?;
+    let lighting = reader.lighting()?;
     let shadow_proxy = reader.list(Reader::mesh)?;
     let planes = reader
         .list(|r| Some(CrossPlane { center: r.vector()?, u: r.vector()?, v: r.vector()?, normal: r.vector()? }))?;
@@ -88,12 +94,12 @@ pub(super) fn decode(file: &[u8], key: &[u8; 32], plant: &Arc<Plant>) -> Option<
         *share = reader.float().filter(|share| (0.0..=1.0).contains(share))?;
     }
     let fits = reader.0.is_empty()
-        && ambient.iter().map(Vec::len).eq(plant.parts.iter().map(|part| part.mesh.positions.len()))
+        && lighting.fits(plant)
         && shadow_proxy.len() == plant.parts.len()
         && textures.color.len() == planes.len()
         && textures.properties.len() == planes.len();
     let cross = Cross { planes, textures, transmission, spread };
-    fits.then(|| BakedPlant { plant: Arc::clone(plant), ambient, shadow_proxy, cross })
+    fits.then(|| BakedPlant { plant: Arc::clone(plant), lighting, shadow_proxy, cross })
 }
 
 fn checksum(head: &[u8], payload: &[u8]) -> [u8; 32] {
@@ -109,6 +115,26 @@ impl Writer {
 
     fn float(&mut self, value: f32) {
         self.0.extend_from_slice(&value.to_le_bytes());
+    }
+
+    fn lighting(&mut self, lighting: &BakedLighting) {
+        match lighting {
+            BakedLighting::Local => self.count(LOCAL),
+            BakedLighting::Expressive(expressive) => {
+                self.count(EXPRESSIVE);
+                self.list(&expressive.normals, |out, normals| out.list(normals, |out, normal| out.vector(*normal)));
+                self.list(&expressive.ambient, |out, values| out.list(values, |out, value| out.float(*value)));
+                let (tag, first, second) = match expressive.no_surface {
+                    None => (0, 0.0, 0.0),
+                    Some(NoSurface::NoField) => (1, 0.0, 0.0),
+                    Some(NoSurface::Threshold { threshold, greatest }) => (2, threshold, greatest),
+                    Some(NoSurface::BelowResolution { cell }) => (3, cell, 0.0),
+                };
+                self.count(tag);
+                self.float(first);
+                self.float(second);
+            }
+        }
     }
 
     fn vector(&mut self, vector: Vec3) {
@@ -151,6 +177,26 @@ impl Reader<'_> {
             items.push(read(self)?);
         }
         Some(items)
+    }
+
+    fn lighting(&mut self) -> Option<BakedLighting> {
+        match self.count()? {
+            LOCAL => Some(BakedLighting::Local),
+            EXPRESSIVE => {
+                let normals = self.list(|r| r.list(Self::vector))?;
+                let ambient = self.list(|r| r.list(|r| r.float().filter(|k| (0.0..=1.0).contains(k))))?;
+                let (tag, first, second) = (self.count()?, self.float()?, self.float()?);
+                let no_surface = match tag {
+                    0 => None,
+                    1 => Some(NoSurface::NoField),
+                    2 => Some(NoSurface::Threshold { threshold: first, greatest: second }),
+                    3 => Some(NoSurface::BelowResolution { cell: first }),
+                    _ => return None,
+                };
+                Some(BakedLighting::Expressive(ExpressiveLighting { normals, ambient, no_surface }))
+            }
+            _ => None,
+        }
     }
 
     fn mesh(&mut self) -> Option<PlantMesh> {
@@ -199,7 +245,11 @@ mod tests {
         let plane = CrossPlane { center: Vec3::ONE, u: Vec3::X, v: Vec3::Y, normal: Vec3::Z };
         BakedPlant {
             plant: Arc::new(Plant { name: "small".into(), parts: vec![part] }),
-            ambient: vec![vec![0.0, 0.5, 1.0]],
+            lighting: BakedLighting::Expressive(ExpressiveLighting {
+                normals: vec![vec![Vec3::X, Vec3::Y, Vec3::Z]],
+                ambient: vec![vec![0.0, 0.5, 1.0]],
+                no_surface: Some(NoSurface::Threshold { threshold: 2.0, greatest: 1.5 }),
+            }),
             shadow_proxy: vec![mesh],
             cross: Cross {
                 planes: vec![plane],
@@ -216,7 +266,7 @@ mod tests {
     fn what_is_written_is_read() {
         let baked = small();
         let read = decode(&encode(&baked, &KEY), &KEY, &baked.plant).unwrap();
-        assert_eq!(read.ambient, baked.ambient);
+        assert_eq!(read.lighting, baked.lighting);
         assert_eq!(read.shadow_proxy, baked.shadow_proxy);
         assert_eq!(read.cross, baked.cross);
     }
@@ -257,7 +307,7 @@ mod tests {
             let mut changed = payload.to_vec();
             changed[at] = 0xff;
             if let Some(read) = decode(&sealed(&changed), &KEY, &baked.plant) {
-                assert!(read.ambient.iter().flatten().all(|k| k.is_finite()));
+                assert!(read.lighting.ambient(0).iter().all(|k| k.is_finite()));
             }
         }
     }

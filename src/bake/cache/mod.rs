@@ -30,15 +30,10 @@ impl CacheKey {
         let mut number = |value: u64| {
             hasher.update(&value.to_le_bytes());
         };
-        let BakeSettings { ambient, cross, shadow_share } = settings;
         number(u64::from(codec::VERSION));
-        for value in [ambient.cell, ambient.extinction, ambient.least, cross.normal_smoothing, *shadow_share] {
-            number(u64::from(value.to_bits()));
-        }
-        for value in [ambient.upper_directions, ambient.lower_directions, cross.resolution, cross.supersampling] {
-            number(u64::from(value));
-        }
         number(plant.parts.len() as u64);
+        // Every field by name, every number to its last bit: no setting can be forgotten here.
+        hasher.update(format!("{settings:?}").as_bytes());
         for part in &plant.parts {
             // Every list goes with its length, so that no two plants give the same stream of bytes.
             let mut list = |bytes: &[u8]| {
@@ -139,6 +134,10 @@ fn default_folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bake::{
+        implicit::{ImplicitSettings, NormalSource},
+        lighting::LightingSettings,
+    };
 
     #[test]
     fn the_folder_follows_the_environment() {
@@ -157,12 +156,17 @@ mod tests {
     fn every_setting_counts() {
         let plant = Plant::default();
         let base = BakeSettings::default();
+        let expressive = |change: &dyn Fn(&mut ImplicitSettings)| {
+            let mut settings = ImplicitSettings::default();
+            change(&mut settings);
+            BakeSettings { lighting: LightingSettings::Expressive(settings), ..base }
+        };
         let mut changed = [base; 9];
-        changed[0].ambient.cell = 0.1;
-        changed[1].ambient.upper_directions = 7;
-        changed[2].ambient.lower_directions = 7;
-        changed[3].ambient.extinction = 0.7;
-        changed[4].ambient.least = 0.7;
+        changed[0].lighting = LightingSettings::Local;
+        changed[1] = expressive(&|settings| settings.radius = Some(0.1));
+        changed[2] = expressive(&|settings| settings.radius = Some(0.1f32.next_up()));
+        changed[3] = expressive(&|settings| settings.threshold = Some(0.1));
+        changed[4] = expressive(&|settings| settings.normals = NormalSource::Gradient);
         changed[5].cross.resolution = 512;
         changed[6].cross.supersampling = 2;
         changed[7].cross.normal_smoothing = 0.01;

@@ -1,0 +1,113 @@
+//! How a plant is lit: what is baked for it, vertex by vertex, and what its billboards take over.
+//!
+//! | model | baked | vertex bytes beyond position, normal, texture coordinates |
+//! |---|---|--:|
+//! | [`LightingSettings::Local`] | nothing | 0 |
+//! | [`LightingSettings::Expressive`] | realigned normals, k_a ([`super::implicit`]) | 0: k_a is the normal's length |
+//!
+//! The models are alternatives: what a plant does not use is neither baked, nor kept, nor uploaded.
+
+use glam::Vec3;
+
+use super::implicit::{ImplicitSettings, NoSurface, bake_implicit};
+use crate::plant::Plant;
+
+/// Which light a plant gets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LightingSettings {
+    /// The leaves' own normals, all light from everywhere: [Luft 2007, fig. 1a], to compare with.
+    Local,
+    /// Normals and ambient term of the crown's implicit surface [Luft 2007].
+    Expressive(ImplicitSettings),
+}
+
+impl Default for LightingSettings {
+    fn default() -> Self {
+        Self::Expressive(ImplicitSettings::default())
+    }
+}
+
+impl LightingSettings {
+    /// The settings with every value moved into its range.
+    pub fn in_range(self) -> Self {
+        match self {
+            Self::Local => Self::Local,
+            Self::Expressive(settings) => Self::Expressive(settings.in_range()),
+        }
+    }
+}
+
+/// What was baked. Lists have one entry a part in the plant's order, each with one value a vertex.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum BakedLighting {
+    /// Nothing.
+    #[default]
+    Local,
+    /// Of the implicit surface.
+    Expressive(ExpressiveLighting),
+}
+
+/// What is kept of an implicit surface's bake.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExpressiveLighting {
+    /// Unit normals. Those of foliage point out of the crown, whichever side of a leaf is seen, unless `no_surface`.
+    pub normals: Vec<Vec<Vec3>>,
+    /// k_a, 0..=1.
+    pub ambient: Vec<Vec<f32>>,
+    /// Why the foliage has its own normals after all.
+    pub no_surface: Option<NoSurface>,
+}
+
+impl BakedLighting {
+    /// Bakes what `settings` ask for.
+    pub fn bake(plant: &Plant, settings: &LightingSettings) -> Self {
+        match settings {
+            LightingSettings::Local => Self::Local,
+            LightingSettings::Expressive(settings) => {
+                let baked = bake_implicit(plant, settings);
+                let no_surface = baked.report.no_surface;
+                Self::Expressive(ExpressiveLighting { normals: baked.normals, ambient: baked.ambient, no_surface })
+            }
+        }
+    }
+
+    /// Unit normals that replace the own ones of part `part`; `None` where the own ones stay.
+    pub fn normals(&self, part: usize) -> Option<&[Vec3]> {
+        match self {
+            Self::Expressive(lighting) if lighting.no_surface.is_none() => lighting.normals.get(part).map(Vec::as_slice),
+            _ => None,
+        }
+    }
+
+    /// k_a of the vertices of part `part`, 0..=1; empty where all of them are 1.
+    pub fn ambient(&self, part: usize) -> &[f32] {
+        match self {
+            Self::Local => &[],
+            Self::Expressive(lighting) => lighting.ambient.get(part).map_or(&[], Vec::as_slice),
+        }
+    }
+
+    /// Whether the lists have as many entries as `plant` has parts and vertices.
+    pub fn fits(&self, plant: &Plant) -> bool {
+        let counts = || plant.parts.iter().map(|part| part.mesh.positions.len());
+        match self {
+            Self::Local => true,
+            Self::Expressive(lighting) => {
+                lighting.normals.iter().map(Vec::len).eq(counts()) && lighting.ambient.iter().map(Vec::len).eq(counts())
+            }
+        }
+    }
+
+    /// Whether the foliage's normals point out of the crown rather than out of each leaf.
+    pub fn is_realigned(&self) -> bool {
+        matches!(self, Self::Expressive(lighting) if lighting.no_surface.is_none())
+    }
+
+    /// What the user ought to know of the bake.
+    pub fn warning(&self) -> Option<String> {
+        match self {
+            Self::Expressive(lighting) => lighting.no_surface.map(|reason| reason.to_string()),
+            Self::Local => None,
+        }
+    }
+}
