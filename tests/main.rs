@@ -12,4 +12,5 @@ mod scene;
 mod shaders;
 mod support;
 mod terrain;
+mod trace;
 mod withstand;

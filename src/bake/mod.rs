@@ -14,10 +14,10 @@
 pub mod ambient;
 pub mod billboard;
 pub mod cache;
-mod geometry;
+pub(crate) mod geometry;
 pub mod rasterize;
 pub mod shadow_proxy;
-mod surface;
+pub(crate) mod surface;
 
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -227,7 +227,7 @@ fn picture(plant: &Plant, ambient: &[Vec<f32>], plane: &CrossPlane, settings: &C
 struct Shader<'a> {
     plant: &'a Plant,
     ambient: &'a [Vec<f32>],
-    raster: &'a Raster<'a>,
+    raster: &'a Raster,
     to_plane: Mat3,
     toward: Vec3,
 }
