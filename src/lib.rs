@@ -36,6 +36,7 @@ pub mod render;
 pub mod scatter;
 pub mod scene;
 pub mod terrain;
+pub mod trace;
 
 use bevy::app::{PluginGroup, PluginGroupBuilder};
 

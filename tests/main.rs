@@ -13,4 +13,5 @@ mod scene;
 mod shaders;
 mod support;
 mod terrain;
+mod trace;
 mod withstand;

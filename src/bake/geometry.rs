@@ -1,4 +1,4 @@
-//! Triangles of a plant as the bakes read them: checked corners, areas, sampling points and connected elements.
+//! Triangles of a plant as the bakes read them: checked corners, areas and connected elements.
 //!
 //! Every bake walks a mesh through [`triangles`], so a mesh that breaks its own rules (an index out of range, a
 //! position that is not finite) loses those triangles and nothing else.
@@ -25,26 +25,6 @@ pub(crate) fn area(mesh: &PlantMesh, corners: [usize; 3]) -> f32 {
     let [a, b, c] = corners.map(|i| mesh.positions[i]);
     let area = 0.5 * (b - a).cross(c - a).length();
     if area.is_finite() { area } else { 0.0 }
-}
-
-/// The centres of the `order`² congruent triangles that a triangle falls into when each edge is cut into `order`
-/// pieces, as barycentric weights. Each stands for the same share of the area.
-pub(crate) fn barycentric_lattice(order: u32) -> Vec<Vec3> {
-    let step = 1.0 / order as f32;
-    let mut points = Vec::with_capacity((order * order) as usize);
-    for row in 0..order {
-        for column in 0..order - row {
-            let corner = |third: f32| {
-                let (b, c) = ((row as f32 + third) * step, (column as f32 + third) * step);
-                Vec3::new(1.0 - b - c, b, c)
-            };
-            points.push(corner(1.0 / 3.0));
-            if column + 1 < order - row {
-                points.push(corner(2.0 / 3.0));
-            }
-        }
-    }
-    points
 }
 
 /// Triangles of a mesh that hang together: a leaf card, a twig, a trunk.
@@ -146,17 +126,6 @@ mod tests {
     fn mesh(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> PlantMesh {
         let count = positions.len();
         PlantMesh { positions, normals: vec![Vec3::Z; count], uvs: vec![Vec2::ZERO; count], triangles }
-    }
-
-    #[test]
-    fn lattice_points_are_inside_and_balanced() {
-        for order in 1..9 {
-            let points = barycentric_lattice(order);
-            assert_eq!(points.len(), (order * order) as usize);
-            assert!(points.iter().all(|p| p.min_element() > 0.0 && (p.element_sum() - 1.0).abs() < 1e-6));
-            let mean = points.iter().copied().sum::<Vec3>() / points.len() as f32;
-            assert!((mean - Vec3::splat(1.0 / 3.0)).length() < 1e-5, "order {order}: {mean}");
-        }
     }
 
     #[test]

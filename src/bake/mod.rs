@@ -14,12 +14,12 @@
 
 pub mod billboard;
 pub mod cache;
-mod geometry;
+pub(crate) mod geometry;
 pub mod implicit;
 pub mod lighting;
 pub mod rasterize;
 pub mod shadow_proxy;
-mod surface;
+pub(crate) mod surface;
 
 use std::path::PathBuf;
 use std::sync::Arc;

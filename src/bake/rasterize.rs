@@ -66,8 +66,8 @@ struct Projected {
 }
 
 /// A plant projected and sorted into bands, ready to be drawn band by band.
-pub(crate) struct Raster<'a> {
-    surfaces: Vec<Surface<'a>>,
+pub(crate) struct Raster {
+    surfaces: Vec<Surface>,
     projected: Vec<Projected>,
     /// For each band the triangles that touch it, nearest first.
     bands: Vec<Vec<u32>>,
@@ -76,9 +76,9 @@ pub(crate) struct Raster<'a> {
     band_rows: u32,
 }
 
-impl<'a> Raster<'a> {
+impl Raster {
     /// Projects `plant` for a picture of `width` x `height` samples, in bands of `band_rows` rows.
-    pub fn new(plant: &'a Plant, view: &View, width: u32, height: u32, band_rows: u32) -> Self {
+    pub fn new(plant: &Plant, view: &View, width: u32, height: u32, band_rows: u32) -> Self {
         let inverse = |axis: Vec3| if axis.length_squared() > 0.0 { axis / axis.length_squared() } else { Vec3::ZERO };
         let (right, up) = (inverse(view.right), inverse(view.up));
         let half = 0.5 * Vec2::new(width as f32, height as f32);
@@ -123,7 +123,7 @@ impl<'a> Raster<'a> {
     }
 
     /// The material of a part.
-    pub fn surface(&self, part: u32) -> &Surface<'a> {
+    pub fn surface(&self, part: u32) -> &Surface {
         &self.surfaces[part as usize]
     }
 

@@ -1,6 +1,6 @@
 //! A plant's material at a point of its surface, as the GPU would sample it: textures repeat, filtering is bilinear.
 
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 use glam::{Vec2, Vec3};
 use image::RgbaImage;
@@ -29,9 +29,9 @@ struct Footprint {
 }
 
 /// One part's material, ready to be sampled.
-pub(crate) struct Surface<'a> {
+pub(crate) struct Surface {
     /// Base colour texture; `None` also where the image holds no texel.
-    texture: Option<&'a RgbaImage>,
+    texture: Option<Arc<RgbaImage>>,
     factor: Vec3,
     /// The alpha test; `None` for opaque parts.
     test: Option<AlphaTest>,
@@ -45,21 +45,25 @@ struct AlphaTest {
     alphas: Vec<u8>,
 }
 
-impl<'a> Surface<'a> {
+impl Surface {
     /// The material of `part`.
-    pub fn new(part: &'a PlantPart) -> Self {
-        let texture =
-            part.material.base_color_texture.as_deref().filter(|image| image.width() > 0 && image.height() > 0);
-        let test = texture.filter(|_| part.kind == PartKind::Foliage).map(|image| AlphaTest {
+    pub fn new(part: &PlantPart) -> Self {
+        let texture = part.material.base_color_texture.clone().filter(|image| image.width() > 0 && image.height() > 0);
+        let test = texture.as_ref().filter(|_| part.kind == PartKind::Foliage).map(|image| AlphaTest {
             threshold: 255.0 * part.material.alpha_cutoff,
             alphas: image.as_raw().chunks_exact(4).map(|texel| texel[3]).collect(),
         });
         Self { texture, factor: part.material.base_color, test }
     }
 
+    /// Whether there is an alpha test that may fail.
+    pub fn is_tested(&self) -> bool {
+        self.test.is_some()
+    }
+
     /// Whether the surface is there at `uv`: the alpha test.
     pub fn passes(&self, uv: Vec2) -> bool {
-        let (Some(image), Some(test)) = (self.texture, &self.test) else { return true };
+        let (Some(image), Some(test)) = (&self.texture, &self.test) else { return true };
         let Footprint { texels: [a, b, c, d], right, down } = footprint(image, uv);
         let alpha = |texel: usize| f32::from(test.alphas[texel]);
         let upper = alpha(a) + right * (alpha(b) - alpha(a));
@@ -70,7 +74,7 @@ impl<'a> Surface<'a> {
     /// Linear base colour at `uv`: texture times factor. In alpha-tested parts the four texels are also weighted by
     /// their alpha, so that a colour behind the outline never bleeds in.
     pub fn color(&self, uv: Vec2) -> Vec3 {
-        let Some(image) = self.texture else { return self.factor };
+        let Some(image) = &self.texture else { return self.factor };
         let Footprint { texels, right, down } = footprint(image, uv);
         let weights = [(1.0 - right) * (1.0 - down), right * (1.0 - down), (1.0 - right) * down, right * down];
         let (mut sum, mut total) = (Vec3::ZERO, 0.0);

@@ -250,7 +250,7 @@ fn picture(plant: &Plant, lighting: &BakedLighting, plane: &CrossPlane, settings
 struct Shader<'a> {
     plant: &'a Plant,
     lighting: &'a BakedLighting,
-    raster: &'a Raster<'a>,
+    raster: &'a Raster,
     to_plane: Mat3,
     toward: Vec3,
 }

@@ -377,7 +377,6 @@ fn upload_parts(
     let layout = pipelines.get_bind_group_layout(&layouts.part);
     let mut parts = Vec::new();
     for (index, part) in plant.plant.parts.iter().enumerate() {
-        let ambient = plant.ambient.get(index).map_or(&[][..], Vec::as_slice);
         let empty = PlantMesh::default();
         let proxy = plant.shadow_proxy.get(index).unwrap_or(&empty);
         let material = &part.material;
@@ -395,21 +394,23 @@ fn upload_parts(
         );
         parts.push(GpuPart {
             kind: part.kind,
-            model: upload_mesh(&part.mesh, ambient, device),
-            proxy: upload_mesh(proxy, &[], device),
+            model: upload_mesh(&part.mesh, plant.lighting.normals(index), plant.lighting.ambient(index), device),
+            proxy: upload_mesh(proxy, None, &[], device),
             bind_group,
         });
     }
     parts
 }
 
-fn upload_mesh(mesh: &PlantMesh, ambient: &[f32], device: &RenderDevice) -> GpuMesh {
+/// `normals` replace the mesh's own; where `ambient` ends, k_a is 1.
+fn upload_mesh(mesh: &PlantMesh, normals: Option<&[Vec3]>, ambient: &[f32], device: &RenderDevice) -> GpuMesh {
+    let normals = normals.unwrap_or(&mesh.normals);
     let vertices: Vec<PlantVertex> = mesh
         .positions
         .iter()
         .enumerate()
         .map(|(i, &position)| {
-            let normal = mesh.normals.get(i).copied().unwrap_or(Vec3::Y);
+            let normal = normals.get(i).copied().unwrap_or(Vec3::Y);
             let uv = mesh.uvs.get(i).copied().unwrap_or_default();
             PlantVertex::new(position, normal, ambient.get(i).copied().unwrap_or(1.0), uv)
         })

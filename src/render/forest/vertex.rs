@@ -8,30 +8,29 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 use half::f16;
 
+use crate::bake::implicit::packing;
+
 /// A vertex of the full model or of its shadow proxy.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct PlantVertex {
     /// Metres in the plant's frame.
     pub position: [f32; 3],
-    /// Unit normal as snorm8 (within 0.6°), and the ambient visibility 0..1 in w (within 0.004).
-    pub normal_ambient: [i8; 4],
+    /// The normal, as long as the ambient visibility says ([`packing`]).
+    pub normal: u32,
     /// Texture coordinates, half precision.
     pub uv: [u16; 2],
 }
 
 impl PlantVertex {
-    /// Packs one vertex. Values that are not finite become harmless ones: the origin, up, 0.
+    /// Packs one vertex. Values that are not finite become harmless ones: the origin, up, 1, 0.
     pub fn new(position: Vec3, normal: Vec3, ambient: f32, uv: Vec2) -> Self {
         let position = if position.is_finite() { position } else { Vec3::ZERO };
-        let normal = normal.try_normalize().unwrap_or(Vec3::Y);
-        let snorm = |value: f32| (value.clamp(-1.0, 1.0) * 127.0).round() as i8;
-        let ambient = if ambient.is_finite() { ambient.clamp(0.0, 1.0) } else { 1.0 };
         let half =
             |value: f32| f16::from_f32(if value.is_finite() { value.clamp(-6.0e4, 6.0e4) } else { 0.0 }).to_bits();
         Self {
             position: position.to_array(),
-            normal_ambient: [snorm(normal.x), snorm(normal.y), snorm(normal.z), snorm(ambient)],
+            normal: packing::encode(normal, ambient),
             uv: [half(uv.x), half(uv.y)],
         }
     }
@@ -40,7 +39,7 @@ impl PlantVertex {
     pub fn layout() -> VertexBufferLayout {
         VertexBufferLayout::from_vertex_formats(
             VertexStepMode::Vertex,
-            [VertexFormat::Float32x3, VertexFormat::Snorm8x4, VertexFormat::Float16x2],
+            [VertexFormat::Float32x3, VertexFormat::Unorm10_10_10_2, VertexFormat::Float16x2],
         )
     }
 }
@@ -50,13 +49,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn packing_is_twenty_bytes_and_keeps_the_direction() {
+    fn a_vertex_is_twenty_bytes_and_keeps_what_it_holds() {
         assert_eq!(size_of::<PlantVertex>() as u64, PlantVertex::layout().array_stride);
+        assert_eq!(size_of::<PlantVertex>(), 20);
         let normal = Vec3::new(0.3, -0.8, 0.5).normalize();
         let vertex = PlantVertex::new(Vec3::ONE, normal, 0.25, Vec2::new(1.5, -2.0));
-        let unpacked = Vec3::from_slice(&vertex.normal_ambient.map(|v| f32::from(v) / 127.0)[..3]);
-        assert!(unpacked.normalize().angle_between(normal).to_degrees() < 0.6);
-        assert!((f32::from(vertex.normal_ambient[3]) / 127.0 - 0.25).abs() < 0.004);
+        let (unpacked, ambient) = packing::decode(vertex.normal);
+        assert!(unpacked.angle_between(normal).to_degrees() < 0.4 && (ambient - 0.25).abs() < 0.0023);
         assert_eq!(f16::from_bits(vertex.uv[1]).to_f32(), -2.0);
     }
 
@@ -64,7 +63,7 @@ mod tests {
     fn nonsense_becomes_harmless() {
         let vertex = PlantVertex::new(Vec3::NAN, Vec3::ZERO, f32::NAN, Vec2::splat(f32::INFINITY));
         assert_eq!(vertex.position, [0.0; 3]);
-        assert_eq!(vertex.normal_ambient, [0, 127, 0, 127]);
+        assert_eq!(packing::decode(vertex.normal), (Vec3::Y, 1.0));
         assert_eq!(vertex.uv, [0, 0]);
     }
 }
