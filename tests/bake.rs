@@ -5,9 +5,9 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use canopy::bake::billboard::{Cross, CrossSettings, bake_cross};
+use canopy::bake::cache::{Cache, CacheKey};
 use canopy::bake::implicit::{ImplicitSettings, NoSurface};
 use canopy::bake::lighting::{BakedLighting, ExpressiveLighting, LightingSettings};
-use canopy::bake::cache::{Cache, CacheKey};
 use canopy::bake::rasterize::{View, projected_area};
 use canopy::bake::shadow_proxy::{shadow_proxy, simplify_foliage};
 use canopy::bake::{BakeError, BakeSettings, BakeSource, BakedPlant, bake_plant};

@@ -7,8 +7,12 @@
 
 struct Part {
     base_color: vec4<f32>,
+    // w: 1 where normals point out of the crown, whichever side of a leaf is seen.
     transmission: vec4<f32>,
 }
+
+// Length of a stored normal whose ambient visibility is zero.
+const LEAST_LENGTH: f32 = 0.25;
 
 @group(2) @binding(0) var color_texture: texture_2d<f32>;
 @group(2) @binding(1) var normal_texture: texture_2d<f32>;
@@ -17,8 +21,8 @@ struct Part {
 
 struct Vertex {
     @location(0) position: vec3<f32>,
-    // Unit normal, and the ambient visibility in w.
-    @location(1) normal_ambient: vec4<f32>,
+    // The normal, as long as the ambient visibility says: src/bake/implicit/packing.rs.
+    @location(1) normal: vec4<f32>,
     @location(2) uv: vec2<f32>,
 }
 
@@ -40,10 +44,13 @@ fn vertex(in: Vertex, @builtin(instance_index) index: u32) -> Varying {
     var out: Varying;
     out.relative = relative;
     out.clip = frame.clip_from_relative * vec4(relative, 1.0);
-    out.normal = turn(in.normal_ambient.xyz, tree.yaw);
+    let stored = in.normal.xyz * (1023.0 / 511.0) - 1.0;
+    let size = max(length(stored), 1e-6);
+    out.normal = turn(stored / size, tree.yaw);
+    let ambient = saturate((size - LEAST_LENGTH) / (1.0 - LEAST_LENGTH));
     out.uv = in.uv;
     let height = max(variants[tree.variant].size.x * tree.scale, 0.01);
-    out.look = vec4(in.normal_ambient.w, local.y, local.y / height, tree.tint);
+    out.look = vec4(ambient, local.y, local.y / height, tree.tint);
     out.threshold = model_threshold(length(tree.position.xz));
     return out;
 }
@@ -90,9 +97,9 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
         discard;
     }
 #endif
-    // Leaves are lit from the side that is seen; their smoothed normals may point across the leaf.
-    if dot(normal, in.relative) > 0.0 {
-        normal = reflect(normal, normalize(in.relative));
+    // A leaf has two sides, and its own normal is that of the side that is seen.
+    if part.transmission.w < 0.5 && dot(normal, in.relative) > 0.0 {
+        normal = -normal;
     }
 #else
     normal = detail_normal(normal, in.relative, in.uv);

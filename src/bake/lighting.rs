@@ -74,7 +74,9 @@ impl BakedLighting {
     /// Unit normals that replace the own ones of part `part`; `None` where the own ones stay.
     pub fn normals(&self, part: usize) -> Option<&[Vec3]> {
         match self {
-            Self::Expressive(lighting) if lighting.no_surface.is_none() => lighting.normals.get(part).map(Vec::as_slice),
+            Self::Expressive(lighting) if lighting.no_surface.is_none() => {
+                lighting.normals.get(part).map(Vec::as_slice)
+            }
             _ => None,
         }
     }

@@ -15,9 +15,9 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 
 use crate::bake::BakedPlant;
+use crate::bake::billboard::{Cross, CrossPlane, CrossTextures, SPREAD_LEVELS};
 use crate::bake::implicit::NoSurface;
 use crate::bake::lighting::{BakedLighting, ExpressiveLighting};
-use crate::bake::billboard::{Cross, CrossPlane, CrossTextures, SPREAD_LEVELS};
 use crate::plant::texture::MipChain;
 use crate::plant::{Plant, PlantMesh};
 

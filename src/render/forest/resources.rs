@@ -91,7 +91,7 @@ pub struct VariantUniform {
 pub struct PartUniform {
     /// Linear factor on the texture.
     pub base_color: [f32; 4],
-    /// Transmission factor.
+    /// Transmission factor; w: 1 where the normals point out of the crown, whichever side of a leaf is seen.
     pub transmission: [f32; 4],
 }
 
@@ -382,7 +382,7 @@ fn upload_parts(
         let material = &part.material;
         let uniform = PartUniform {
             base_color: material.base_color.extend(1.0).to_array(),
-            transmission: material.transmission.extend(0.0).to_array(),
+            transmission: material.transmission.extend(f32::from(u8::from(plant.lighting.is_realigned()))).to_array(),
         };
         let uniform = gpu::buffer_with(device, "canopy_plant_part", BufferUsages::UNIFORM, &[uniform]);
         let color = textures.color(material, part.kind, device, queue);

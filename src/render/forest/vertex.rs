@@ -28,11 +28,7 @@ impl PlantVertex {
         let position = if position.is_finite() { position } else { Vec3::ZERO };
         let half =
             |value: f32| f16::from_f32(if value.is_finite() { value.clamp(-6.0e4, 6.0e4) } else { 0.0 }).to_bits();
-        Self {
-            position: position.to_array(),
-            normal: packing::encode(normal, ambient),
-            uv: [half(uv.x), half(uv.y)],
-        }
+        Self { position: position.to_array(), normal: packing::encode(normal, ambient), uv: [half(uv.x), half(uv.y)] }
     }
 
     /// The vertex buffer's layout, as `shaders/forest/model.wgsl` reads it.
