@@ -23,7 +23,7 @@
 //! }
 //! ```
 //!
-//! The rooms: [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`bake`], [`light`] and [`lod`]
+//! The rooms: [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`bake`], [`light`], [`lod`] and [`reference`]
 //! know no App and no GPU; [`render`] draws what they make; [`app`] is the interactive program. ARCHITECTURE.md in
 //! the repository shows how a tree gets from a file to a pixel.
 
@@ -32,6 +32,7 @@ pub mod bake;
 pub mod light;
 pub mod lod;
 pub mod plant;
+pub mod reference;
 pub mod render;
 pub mod scatter;
 pub mod scene;

@@ -6,6 +6,7 @@ mod cli;
 mod grow;
 mod light;
 mod plant;
+mod reference;
 mod render;
 mod scatter;
 mod scene;
