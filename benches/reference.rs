@@ -4,6 +4,7 @@
 //!    rays from a camera, the first surface of rays between the leaves, and whether such rays meet anything.
 //! 2. Relative error of a picture of the stand over the samples a pixel, against one of many samples and another seed,
 //!    with the seconds it takes. Independent samples would keep the last column level: error times root of samples.
+//! 3. Share of the picture's light that is missing when light is scattered between surfaces a few times only.
 //!
 //! Run `cargo bench --bench reference -- --help` for the arguments.
 
@@ -174,15 +175,31 @@ fn relative_error(film: &Film, truth: &[Vec3]) -> f64 {
     (difference / truth.len() as f64).sqrt() / mean
 }
 
+fn trace(scene: &ReferenceScene, light: &Light, settings: TraceSettings, shot: &Shot, film: &mut Film, samples: u32) {
+    let tracer = PathTracer::new(scene, light, settings).expect("the light is possible");
+    let mut on = |_: &Film| ControlFlow::Continue(());
+    tracer.render(shot, film, samples, &mut on).expect("the camera is possible");
+}
+
+/// What is missing without the later bounces, over the picture's mean.
+fn bounces(scene: &ReferenceScene, shot: &Shot, samples: u32) {
+    let light = Light::of(&daylight(), None);
+    let mean = |bounces: u32| {
+        let mut film = Film::new(shot).expect("the camera is possible");
+        trace(scene, &light, TraceSettings { bounces, ..TraceSettings::default() }, shot, &mut film, samples);
+        film.radiance().iter().map(|pixel| f64::from(pixel.element_sum())).sum::<f64>()
+    };
+    let whole = mean(u32::MAX);
+    println!("\n| bounces | share of the light that is missing |\n|---|---|");
+    for count in [0, 1, 2, 3, 4, 5, 8] {
+        println!("| {count} | {:.4} |", 1.0 - mean(count) / whole);
+    }
+}
+
 fn convergence(scene: &ReferenceScene, shot: &Shot, arguments: &Arguments) {
     let light = Light::of(&daylight(), None);
-    let tracer = |seed| {
-        PathTracer::new(scene, &light, TraceSettings { seed, ..TraceSettings::default() })
-            .expect("the light is possible")
-    };
     let render = |film: &mut Film, seed: u64, samples: u32| {
-        let mut on = |_: &Film| ControlFlow::Continue(());
-        tracer(seed).render(shot, film, samples, &mut on).expect("the camera is possible");
+        trace(scene, &light, TraceSettings { seed, ..TraceSettings::default() }, shot, film, samples);
     };
     let mut truth = Film::new(shot).expect("the camera is possible");
     render(&mut truth, 2, arguments.truth);
@@ -232,4 +249,5 @@ fn main() {
     rays_a_second(&scenes, arguments.rays);
     let (_, grove, view) = &scenes[1];
     convergence(grove, view, &arguments);
+    bounces(grove, view, arguments.most.min(32));
 }

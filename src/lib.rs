@@ -23,9 +23,9 @@
 //! }
 //! ```
 //!
-//! The rooms: [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`bake`], [`light`], [`lod`] and [`reference`]
-//! know no App and no GPU; [`render`] draws what they make; [`app`] is the interactive program. ARCHITECTURE.md in
-//! the repository shows how a tree gets from a file to a pixel.
+//! The rooms: [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`bake`], [`light`], [`lod`],
+//! [`trace`] and [`reference`] know no App and no GPU; [`render`] draws what they make; [`app`] is the interactive
+//! program. ARCHITECTURE.md in the repository shows how a tree gets from a file to a pixel.
 
 pub mod app;
 pub mod bake;
