@@ -267,7 +267,7 @@ fn rays_find_a_leaf_in_the_side_of_its_own_box() {
     // A level leaf is a box without height: the ray enters, meets and leaves it at one place.
     let scene = scene(&leaves(&[0.0], 40.0, 0.5, 0.0));
     for x in 0..100 {
-        let place = DVec3::new(f64::from(x) * 0.37 - 18.0, 0.0, f64::from(x) * -0.31 + 9.0);
+        let place = DVec3::new(f64::from(x) * 0.37 - 18.0, 0.0, f64::from(x) * -0.25 + 9.0);
         let direction = DVec3::new(0.3, -1.0, f64::from(x) * 0.02).normalize();
         for far in [1.0, 1e3, 1e6] {
             let ray = WorldRay::new(place - far * direction, direction);
