@@ -81,11 +81,6 @@ impl Camera {
         let direction = (self.view.rotation() * forward).normalize();
         WorldRay::new(self.view.position + direction * (self.near * forward.length()), direction)
     }
-
-    /// Radians between neighbouring pixels in the picture's middle.
-    pub fn pixel_angle(&self) -> f64 {
-        2.0 * (0.5 * self.view.field_of_view).tan() / f64::from(self.size.1.max(1))
-    }
 }
 
 #[cfg(test)]
