@@ -23,15 +23,16 @@
 //! }
 //! ```
 //!
-//! The rooms: [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`bake`], [`light`] and [`lod`]
-//! know no App and no GPU; [`render`] draws what they make; [`app`] is the interactive program. ARCHITECTURE.md in
-//! the repository shows how a tree gets from a file to a pixel.
+//! The rooms: [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`bake`], [`light`], [`lod`],
+//! [`trace`] and [`reference`] know no App and no GPU; [`render`] draws what they make; [`app`] is the interactive
+//! program. ARCHITECTURE.md in the repository shows how a tree gets from a file to a pixel.
 
 pub mod app;
 pub mod bake;
 pub mod light;
 pub mod lod;
 pub mod plant;
+pub mod reference;
 pub mod render;
 pub mod scatter;
 pub mod scene;

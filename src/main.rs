@@ -27,6 +27,10 @@ fn run(arguments: Arguments) -> Outcome {
             Ok(options) => render_pictures(&options).into(),
             Err(error) => Outcome::Usage(error),
         },
+        Some(Command::Reference(reference)) => match cli::reference_options(reference, &common) {
+            Ok(options) => trace_reference(&options).into(),
+            Err(error) => Outcome::Usage(error),
+        },
         Some(Command::Info(info)) => describe(&info.file).into(),
         None => Outcome::Usage(cli::no_command()),
     }
@@ -50,6 +54,16 @@ fn render_pictures(options: &canopy::scene::RenderOptions) -> anyhow::Result<()>
         return Ok(());
     }
     cli::print_lines(report.files.iter().map(|file| file.display()))
+}
+
+fn trace_reference(options: &canopy::scene::ReferenceOptions) -> anyhow::Result<()> {
+    let mut bars = Bars::new(options.quiet);
+    let file = canopy::app::reference(options, &mut bars)?;
+    drop(bars);
+    if options.quiet {
+        return Ok(());
+    }
+    cli::print_lines([file.display()])
 }
 
 fn describe(file: &std::path::Path) -> anyhow::Result<()> {

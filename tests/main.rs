@@ -7,6 +7,7 @@ mod grow;
 mod implicit;
 mod light;
 mod plant;
+mod reference;
 mod render;
 mod scatter;
 mod scene;

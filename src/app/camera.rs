@@ -11,7 +11,7 @@ use crate::{render::components::CanopyOrigin, scene::Viewpoint};
 /// Metres to which the Bevy world's origin is rounded near the camera.
 const ORIGIN_STEP: f64 = 1024.0;
 /// Metres to the near plane.
-const NEAR: f32 = 0.1;
+pub const NEAR: f32 = 0.1;
 /// From the camera's exposed radiance to what a screen shows.
 pub const TONEMAPPING: Tonemapping = Tonemapping::BlenderFilmic;
 

@@ -31,6 +31,9 @@ pub enum AppError {
     /// Sun and sky.
     #[error(transparent)]
     Light(#[from] crate::light::LightError),
+    /// The ground truth.
+    #[error(transparent)]
+    Reference(#[from] crate::reference::ReferenceError),
     /// A file that cannot be read.
     #[error("{}: {source}; check the path and its permissions", path.display())]
     Read {

@@ -1,4 +1,4 @@
-//! The program: scenes built into stages, headless pictures, the interactive flight, and what a file holds.
+//! The program: scenes built into stages, headless pictures, the ground truth of a scene, the interactive flight, and what a file holds.
 
 mod adapter;
 mod camera;
@@ -10,7 +10,9 @@ mod info;
 mod notes;
 mod picture;
 mod plants;
+mod reference;
 mod stage;
+mod tone;
 mod trees;
 
 pub use adapter::list_adapters;
@@ -19,4 +21,5 @@ pub use fly::fly;
 pub use headless::{Renderer, render};
 pub use info::info;
 pub use picture::Picture;
+pub use reference::reference;
 pub use stage::Stage;

@@ -18,6 +18,7 @@ const DEFAULT_SIZE: &str = "1280x720";
   canopy fly                                          the demo forest in a window
   canopy fly my-valley.ron --at 2026-10-03T18:05+02:00
   canopy render my-valley.ron --out noon.png
+  canopy reference my-valley.ron --out truth.exr --spp 256
   canopy info stand.csv
 
 `canopy help render` shows how to render pictures, sequences and time-lapses."
@@ -61,6 +62,8 @@ pub enum Command {
     Fly(Fly),
     /// Render a scene to PNG files, without a window.
     Render(Render),
+    /// Trace the ground truth of a scene on the processor: slow, and right.
+    Reference(Reference),
     /// Say what a plant, terrain, inventory or scene file holds.
     Info(Info),
 }
@@ -145,6 +148,41 @@ pub struct Render {
     /// Last instant of a time-lapse.
     #[arg(long, value_name = "TIME", requires = "from")]
     pub to: Option<LocalTime>,
+}
+
+/// Arguments of `canopy reference`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  canopy reference demo.ron --out truth.exr --spp 256 --size 640x360
+  canopy reference demo.ron --out truth.png --at 2026-06-21T19:30-04:00 --camera 0,2,0,270,5 --spp 64 --resume
+Pictures can be interrupted: what was traced is kept every 30 s beside them, and --resume goes on from there.")]
+pub struct Reference {
+    /// Scene file.
+    pub scene: PathBuf,
+    /// Picture to write: .exr for radiance in nits, .png as the renderer shows it.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Samples a pixel.
+    #[arg(long, value_name = "NUMBER", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
+    pub spp: u32,
+    /// Size of the picture in pixels.
+    #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = DEFAULT_SIZE)]
+    pub size: (u32, u32),
+    /// Date and time with the offset from UTC, as in 2026-06-21T15:30+02:00 [default: the scene's].
+    #[arg(long, value_name = "TIME")]
+    pub at: Option<LocalTime>,
+    /// Where the camera is [default: the scene's start].
+    #[command(flatten)]
+    pub view: CameraArguments,
+    /// How often light is scattered between surfaces, 0 for light straight from sun and sky [default: as it will].
+    #[arg(long, value_name = "NUMBER")]
+    pub bounces: Option<u32>,
+    /// Leave the renderer's fog out.
+    #[arg(long)]
+    pub clear_air: bool,
+    /// Go on with an earlier picture of the same scene, light and camera.
+    #[arg(long)]
+    pub resume: bool,
 }
 
 /// Arguments of `canopy info`.

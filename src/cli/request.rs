@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use canopy::scene::{Clock, FlyOptions, Pictures, RenderOptions, Still, View};
+use canopy::scene::{Clock, FlyOptions, Pictures, ReferenceOptions, RenderOptions, Still, View};
 use clap::CommandFactory;
 use clap::error::ErrorKind;
 
-use super::arguments::{Arguments, CameraArguments, Common, Fly, Render};
+use super::arguments::{Arguments, CameraArguments, Common, Fly, Reference, Render};
 
 /// The scene of `canopy fly` without a name.
 const DEMO: &str = "scenes/demo.ron";
@@ -46,6 +46,32 @@ pub fn render_options(render: Render, common: &Common) -> Result<RenderOptions, 
     })
 }
 
+/// The options of a picture of the ground truth.
+///
+/// # Errors
+/// A usage error for a file that ends neither in `.exr` nor in `.png`.
+pub fn reference_options(reference: Reference, common: &Common) -> Result<ReferenceOptions, clap::Error> {
+    if !ends_in(&reference.out, "exr") && !ends_in(&reference.out, "png") {
+        let file = reference.out.display();
+        return Err(usage(format!(
+            "--out {file}: a reference is an OpenEXR or a PNG file, end the name in .exr or .png"
+        )));
+    }
+    Ok(ReferenceOptions {
+        view: view(&reference.view),
+        scene: reference.scene,
+        out: reference.out,
+        at: reference.at,
+        size: reference.size,
+        samples: reference.spp,
+        bounces: reference.bounces,
+        fog: !reference.clear_air,
+        resume: reference.resume,
+        seed: common.seed,
+        quiet: common.quiet,
+    })
+}
+
 fn pictures(
     mut out: Vec<PathBuf>,
     at: &[canopy::scene::LocalTime],
@@ -61,7 +87,7 @@ fn pictures(
                 at.len()
             )));
         }
-        if let Some(wrong) = out.iter().find(|file| !ends_in_png(file)) {
+        if let Some(wrong) = out.iter().find(|file| !ends_in(file, "png")) {
             return Err(usage(format!("--out {}: pictures are PNG files, end the name in .png", wrong.display())));
         }
         let times = at.iter().copied().map(Some).chain(std::iter::repeat(None));
@@ -84,8 +110,8 @@ fn pictures(
     }
 }
 
-fn ends_in_png(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"))
+fn ends_in(path: &Path, ending: &str) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(ending))
 }
 
 fn usage(message: String) -> clap::Error {
@@ -94,7 +120,7 @@ fn usage(message: String) -> clap::Error {
 
 /// The usage error of a command line that names no command.
 pub fn no_command() -> clap::Error {
-    Arguments::command().error(ErrorKind::MissingSubcommand, "name a command: fly, render or info")
+    Arguments::command().error(ErrorKind::MissingSubcommand, "name a command: fly, render, reference or info")
 }
 
 fn view(camera: &CameraArguments) -> View {
@@ -154,6 +180,25 @@ mod tests {
         assert!(matches!(lapse.pictures, Pictures::Sequence { clock: Clock::Lapse { .. }, fps: None, .. }));
         let west = render("--out a.png --camera -10,2,-30,270,-5")?;
         assert!(matches!(west.view, View::Pose(pose) if pose.position == (-10.0, 2.0, -30.0)));
+        Ok(())
+    }
+
+    #[test]
+    fn references_are_exr_or_png() -> Result<(), Box<dyn std::error::Error>> {
+        let read = |arguments: &str| {
+            let words = ["canopy", "reference", "s.ron"].into_iter().chain(arguments.split_whitespace());
+            let arguments = Arguments::try_parse_from(words)?;
+            match arguments.command {
+                Some(Command::Reference(reference)) => reference_options(reference, &arguments.common),
+                _ => Err(usage("no reference".to_owned())),
+            }
+        };
+        let options = read("--out a.EXR --spp 7 --bounces 2 --resume --clear-air --size 64x32")?;
+        assert!(options.samples == 7 && options.bounces == Some(2) && options.resume && !options.fog);
+        assert!(read("--out a.png")?.fog);
+        for wrong in ["", "--out a.jpg", "--out a.exr --spp 0", "--out a.exr --bounces -1"] {
+            assert_eq!(read(wrong).map(|_| ()).map_err(|error| error.exit_code()), Err(2), "{wrong}");
+        }
         Ok(())
     }
 

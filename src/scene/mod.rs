@@ -48,7 +48,9 @@ pub use path::Path;
 pub use place::{Moon, Place};
 pub use plan::{Frame, PlanError, RenderPlan};
 pub use quality::Quality;
-pub use request::{Clock, FlyOptions, Pictures, Progress, RenderOptions, RenderReport, Silent, Still, View};
+pub use request::{
+    Clock, FlyOptions, Pictures, Progress, ReferenceOptions, RenderOptions, RenderReport, Silent, Still, View,
+};
 pub use species::{GltfPlants, GrownForm, GrownPlants, PlantSource, Species};
 pub use time::{LocalTime, TimeError, YEARS};
 pub use trees::{Anchor, Area, Clearings, InventoryTrees, LengthUnit, ScatteredTrees, Sequence, Trees};

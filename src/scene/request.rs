@@ -55,6 +55,33 @@ pub struct RenderOptions {
     pub explain: bool,
 }
 
+/// Everything about a picture of the ground truth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReferenceOptions {
+    /// The scene file.
+    pub scene: PathBuf,
+    /// The `.exr` (radiance in nits) or `.png` (as the renderer shows it) to write.
+    pub out: PathBuf,
+    /// Date and time; `None` takes the scene's.
+    pub at: Option<LocalTime>,
+    /// Where the camera stands.
+    pub view: View,
+    /// Size of the picture in pixels, each at least 1.
+    pub size: (u32, u32),
+    /// Samples a pixel, at least 1.
+    pub samples: u32,
+    /// How often light may be scattered between surfaces; `None` is as often as it will.
+    pub bounces: Option<u32>,
+    /// Whether the renderer's fog lies before what the camera sees.
+    pub fog: bool,
+    /// Go on from where an earlier picture of the same scene, light and camera stopped, and keep the state for the next.
+    pub resume: bool,
+    /// Replaces the scene's seed.
+    pub seed: Option<u64>,
+    /// No progress and no notes, only warnings and errors.
+    pub quiet: bool,
+}
+
 /// Single pictures or a sequence.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Pictures {

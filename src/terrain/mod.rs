@@ -13,6 +13,7 @@
 mod error;
 mod extended_grid;
 mod geo_reference;
+pub mod ground_noise;
 mod height_bounds;
 mod height_field;
 mod holes;

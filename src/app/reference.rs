@@ -1,0 +1,131 @@
+//! The ground truth of a scene: what `canopy reference` does.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use glam::DVec3;
+
+use super::{camera::NEAR, error::AppError, notes::notes, picture::Picture, stage::Stage, tone::tone_table};
+use crate::{
+    light::{Atmosphere, AtmosphereParams, LightState},
+    reference::{
+        Camera, Development, Film, Fog, Ground, GroundColor, GroundShape, Instance, Light, PathTracer, ReferenceScene,
+        Shot, Soil, TraceSettings,
+    },
+    scene::{Frame, Pictures, Progress, ReferenceOptions, RenderOptions, RenderPlan, Scene, Still},
+};
+
+/// How often the film is kept on disk while it grows.
+const KEEP_EVERY: Duration = Duration::from_secs(30);
+
+/// Traces the picture that `options` ask for, as OpenEXR or PNG by the ending of its name; returns the file.
+///
+/// The film is kept every 30 s, in a file beside the picture that ends in `.checkpoint`. With `resume` a film of the
+/// same scene, light and camera goes on from there, and stays when the picture is done, so that more samples can be
+/// added; without, it begins anew and the file is deleted in the end.
+///
+/// # Errors
+/// [`AppError`]; a picture that was there before stays as it is.
+pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Result<PathBuf, AppError> {
+    Scene::read(&options.scene)?;
+    let stage = Stage::build(&options.scene, options.seed, progress)?;
+    let frame = frame(options, &stage)?;
+    let sky = stage.sky(frame.instant);
+    let atmosphere = Atmosphere::new(AtmosphereParams::with_visibility_km(sky.visibility_km))?;
+    let light = sky.light(&atmosphere)?;
+
+    progress.begin("Trees of rays", 0);
+    let scene = scene(&stage)?;
+    progress.end();
+    let settings = TraceSettings { bounces: options.bounces.unwrap_or(u32::MAX), ..TraceSettings::default() };
+    let tracer = PathTracer::new(&scene, &Light::of(&light, None), settings)?;
+    let shot = Shot {
+        camera: Camera { view: frame.view, size: options.size, near: NEAR.into() },
+        fog: options.fog.then(|| Fog::new(&light, frame.view.position.y)),
+    };
+    let kept = options.out.with_extension("checkpoint");
+    let fingerprint = tracer.fingerprint(&shot);
+    let mut film = match options.resume.then(|| Film::load_checkpoint(&kept, &fingerprint)).transpose()?.flatten() {
+        Some(film) => film,
+        None => Film::new(&shot)?,
+    };
+
+    progress.begin("Samples", options.samples.into());
+    progress.advance(film.samples().min(options.samples).into());
+    let (mut last, mut failure) = (Instant::now(), None);
+    tracer.render(&shot, &mut film, options.samples, &mut |film: &Film| {
+        progress.advance(1);
+        if last.elapsed() >= KEEP_EVERY {
+            last = Instant::now();
+            if let Err(error) = film.save_checkpoint(&kept, &fingerprint) {
+                failure = Some(error);
+                return ControlFlow::Break(());
+            }
+        }
+        ControlFlow::Continue(())
+    })?;
+    progress.end();
+    if let Some(error) = failure {
+        return Err(error.into());
+    }
+    if options.resume {
+        film.save_checkpoint(&kept, &fingerprint)?;
+    }
+    save(&film, options, &stage, &frame, &light)?;
+    if !options.resume && kept.exists() {
+        std::fs::remove_file(&kept).map_err(|source| AppError::Write { path: kept, source })?;
+    }
+    if let Some(error) = film.relative_error() {
+        progress.note(&format!("{} samples, standard error of the luminance {:.2} %", film.samples(), 100.0 * error));
+    }
+    Ok(options.out.clone())
+}
+
+/// Camera and instant, planned as `canopy render` plans a still.
+fn frame(options: &ReferenceOptions, stage: &Stage) -> Result<Frame, AppError> {
+    let still = RenderOptions {
+        scene: options.scene.clone(),
+        pictures: Pictures::Stills(vec![Still { out: options.out.with_extension("png"), at: options.at }]),
+        view: options.view,
+        size: options.size,
+        seed: options.seed,
+        adapter: None,
+        quiet: options.quiet,
+        explain: false,
+    };
+    let plan = RenderPlan::new(&still, &stage.scene, &|x, z| stage.terrain.height(x, z))?;
+    plan.frames.into_iter().next().ok_or(AppError::Plan(crate::scene::PlanError::Nothing))
+}
+
+fn scene(stage: &Stage) -> Result<ReferenceScene, AppError> {
+    let plants: Vec<_> = stage.plants.iter().map(|baked| baked.plant.clone()).collect();
+    let ground = Ground {
+        shape: GroundShape::Terrain(stage.terrain.clone()),
+        color: GroundColor::Soil(Soil::new(&stage.terrain, stage.cover.clone()).into()),
+        reach: stage.scene.quality.view_distance,
+    };
+    Ok(ReferenceScene::new(&plants, &Instance::of_stand(&stage.stand, DVec3::ZERO), Some(ground))?)
+}
+
+fn save(
+    film: &Film,
+    options: &ReferenceOptions,
+    stage: &Stage,
+    frame: &Frame,
+    light: &LightState,
+) -> Result<(), AppError> {
+    if is_exr(&options.out) {
+        return Ok(film.save_exr(&options.out)?);
+    }
+    let table = tone_table()?;
+    let (width, height) = film.size();
+    let pixels = film.develop(&Development::of(light, Some(&table)));
+    let mut notes = notes(stage, &options.scene, &frame.view, frame.instant);
+    notes.push(("Samples", film.samples().to_string()));
+    Picture { width, height, pixels }.save(&options.out, &notes)
+}
+
+fn is_exr(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"))
+}

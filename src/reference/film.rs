@@ -1,0 +1,179 @@
+//! A picture that grows sample by sample, and the loop that makes it grow.
+
+use std::ops::ControlFlow;
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::camera::Camera;
+use super::error::ReferenceError;
+use super::fog::Fog;
+use super::path::PathTracer;
+use super::sampler::PathSampler;
+use crate::light::atmosphere::luminance;
+
+/// Pixels along a tile's side: what one task renders.
+const TILE: u32 = 16;
+
+/// Sums of radiance over the samples done so far.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Film {
+    size: (u32, u32),
+    samples: u32,
+    /// Row by row from the top: nits per channel, summed over the samples.
+    pub(super) sums: Vec<DVec3>,
+    /// Squares of the luminance, summed.
+    pub(super) squares: Vec<f64>,
+}
+
+/// A camera, and the air before it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shot {
+    /// The camera.
+    pub camera: Camera,
+    /// The renderer's fog, or clear air.
+    pub fog: Option<Fog>,
+}
+
+impl Film {
+    /// A film for `shot`, without a sample.
+    ///
+    /// # Errors
+    /// As [`Camera::check`].
+    pub fn new(shot: &Shot) -> Result<Self, ReferenceError> {
+        shot.camera.check()?;
+        let size = shot.camera.size;
+        let pixels = size.0 as usize * size.1 as usize;
+        Ok(Self { size, samples: 0, sums: vec![DVec3::ZERO; pixels], squares: vec![0.0; pixels] })
+    }
+
+    pub(super) fn from_parts(size: (u32, u32), samples: u32, sums: Vec<DVec3>, squares: Vec<f64>) -> Self {
+        Self { size, samples, sums, squares }
+    }
+
+    /// Width and height in pixels.
+    pub fn size(&self) -> (u32, u32) {
+        self.size
+    }
+
+    /// Samples done for every pixel.
+    pub fn samples(&self) -> u32 {
+        self.samples
+    }
+
+    /// Mean radiance of each pixel in nits, row by row from the top; black without a sample.
+    pub fn radiance(&self) -> Vec<Vec3> {
+        let share = 1.0 / f64::from(self.samples.max(1));
+        self.sums.iter().map(|sum| (*sum * share).as_vec3()).collect()
+    }
+
+    /// Standard error of the picture's luminance: the root of the pixels' mean variance, over the picture's mean. An
+    /// estimate from the samples' own spread, as of independent samples: an upper bound for stratified ones. `None`
+    /// below two samples, and for a black picture.
+    pub fn relative_error(&self) -> Option<f64> {
+        let n = f64::from(self.samples);
+        let (mut variance, mut mean) = (0.0, 0.0);
+        for (sum, squares) in self.sums.iter().zip(&self.squares) {
+            let sum = luminance_of(*sum);
+            variance += (squares - sum * sum / n).max(0.0) / (n - 1.0) / n;
+            mean += sum / n;
+        }
+        let pixels = self.sums.len() as f64;
+        let error = (variance / pixels).sqrt() / (mean / pixels);
+        (self.samples > 1 && error.is_finite()).then_some(error)
+    }
+}
+
+fn luminance_of(sum: DVec3) -> f64 {
+    f64::from(luminance(Vec3::X)) * sum.x
+        + f64::from(luminance(Vec3::Y)) * sum.y
+        + f64::from(luminance(Vec3::Z)) * sum.z
+}
+
+impl PathTracer<'_> {
+    /// Adds samples to `film` until each pixel has `until`. After each pass of one sample a pixel, `hear` gets the
+    /// film, to show or to keep; it may break the work off, and a later call goes on with the same result as if it had
+    /// not.
+    ///
+    /// Every sample is a function of seed, pixel and number; a pixel's samples are added in their order. So the film's
+    /// bytes depend neither on threads nor on interruptions.
+    ///
+    /// # Errors
+    /// As [`Camera::check`]; [`ReferenceError::Size`] for a film of another size than the camera's.
+    pub fn render(
+        &self,
+        shot: &Shot,
+        film: &mut Film,
+        until: u32,
+        hear: &mut dyn FnMut(&Film) -> ControlFlow<()>,
+    ) -> Result<(), ReferenceError> {
+        shot.camera.check()?;
+        let (width, height) = shot.camera.size;
+        if film.size != shot.camera.size {
+            return Err(ReferenceError::Size {
+                width: film.size.0,
+                height: film.size.1,
+                limit: film.sums.len() as u64,
+            });
+        }
+        let across = width.div_ceil(TILE);
+        let tiles = across * height.div_ceil(TILE);
+        let corner = |tile: u32| (tile % across * TILE, tile / across * TILE);
+        let pixels = |tile: u32| {
+            let (left, top) = corner(tile);
+            let rows = top..(top + TILE).min(height);
+            rows.flat_map(move |row| (left..(left + TILE).min(width)).map(move |column| (column, row)))
+        };
+        while film.samples < until {
+            let sample = film.samples;
+            let passes: Vec<Vec<Vec3>> = (0..tiles)
+                .into_par_iter()
+                .map(|tile| pixels(tile).map(|(column, row)| self.sample(shot, column, row, sample)).collect())
+                .collect();
+            for (tile, values) in (0..tiles).zip(passes) {
+                for ((column, row), value) in pixels(tile).zip(values) {
+                    let at = row as usize * width as usize + column as usize;
+                    film.sums[at] += value.as_dvec3();
+                    film.squares[at] += luminance_of(value.as_dvec3()).powi(2);
+                }
+            }
+            film.samples += 1;
+            if hear(film).is_break() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Radiance in nits of one sample of one pixel.
+    fn sample(&self, shot: &Shot, column: u32, row: u32, sample: u32) -> Vec3 {
+        let pixel = u64::from(row) * u64::from(shot.camera.size.0) + u64::from(column);
+        let mut sampler = PathSampler::new(self.settings().seed, pixel, sample);
+        let ray = shot.camera.ray(column, row, sampler.pair());
+        let (radiance, distance) = self.along(&ray, &mut sampler);
+        let color = match (distance, &shot.fog) {
+            (Some(distance), Some(fog)) => {
+                let relative = ray.at(distance) - shot.camera.view.position;
+                fog.apply(radiance, relative.as_vec3())
+            }
+            _ => radiance,
+        };
+        if color.is_finite() { color.max(Vec3::ZERO) } else { Vec3::ZERO }
+    }
+
+    /// A hash of everything that a pixel of `shot` depends on: scene, light, settings, camera and fog.
+    pub fn fingerprint(&self, shot: &Shot) -> [u8; 32] {
+        let mut hasher = blake3::Hasher::new();
+        self.scene().feed(&mut hasher);
+        self.light().feed(&mut hasher);
+        let settings = self.settings();
+        hasher.update(format!("{settings:?} {:?}", shot.camera).as_bytes());
+        match &shot.fog {
+            Some(fog) => fog.feed(&mut hasher),
+            None => {
+                hasher.update(b"clear");
+            }
+        }
+        *hasher.finalize().as_bytes()
+    }
+}

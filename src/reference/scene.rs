@@ -1,0 +1,430 @@
+//! What a reference picture shows: instances of plants on a ground.
+
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::boxes::{BoxTree, MOST_ITEMS, WorldBox};
+use super::bsdf::{Bsdf, balanced};
+use super::camera::WorldRay;
+use super::error::ReferenceError;
+use super::ground::{Crossing, GroundShape};
+use super::soil::Soil;
+use crate::plant::{PartKind, Plant};
+use crate::scatter::PackedStand;
+use crate::trace::{Hit, PlantTracer, Ray, SurfacePoint, offset_origin};
+
+/// Share of a plant's size by which its rays start before its box.
+const MARGIN: f64 = 0.01;
+/// Largest coordinate of a foot, metres.
+const FARTHEST: f64 = 1e8;
+
+/// One plant of a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instance {
+    /// Which plant.
+    pub plant: usize,
+    /// Its foot, scene metres, each within ±1e8.
+    pub position: DVec3,
+    /// Turn about the vertical in radians, counter-clockwise seen from above.
+    pub yaw: f32,
+    /// Factor on the plant's size, 1e-6 to 1e6.
+    pub scale: f32,
+    /// Deviation of the foliage's colour, -1 to 1.
+    pub tint: f32,
+}
+
+impl Instance {
+    /// The trees of a stand as the renderer draws them, rounded to their 16 bytes. `origin` is the scene position of the
+    /// stand's own origin.
+    pub fn of_stand(stand: &PackedStand, origin: DVec3) -> Vec<Self> {
+        let tree = |tree: &crate::scatter::PackedTree| Self {
+            plant: tree.variant().into(),
+            position: origin + tree.position(stand.cell_size),
+            yaw: tree.yaw(),
+            scale: tree.scale(),
+            tint: tree.tint().max(-1.0),
+        };
+        stand.trees.iter().map(tree).collect()
+    }
+
+    fn check(&self, instance: usize, plants: usize) -> Result<(), ReferenceError> {
+        if self.plant >= plants {
+            return Err(ReferenceError::UnknownPlant { instance, plant: self.plant, count: plants });
+        }
+        let fail = |what, value: f64, remedy| Err(ReferenceError::Instance { instance, what, value, remedy });
+        if let Some(&wrong) = self.position.to_array().iter().find(|c| c.is_nan() || c.abs() > FARTHEST) {
+            return fail("a coordinate", wrong, "give metres within 1e8 of the scene's origin");
+        }
+        if !(-1e6..=1e6).contains(&self.yaw) {
+            return fail("the yaw", self.yaw.into(), "give radians");
+        }
+        if !(1e-6..=1e6).contains(&self.scale) {
+            return fail("the scale", self.scale.into(), "give 1e-6 to 1e6");
+        }
+        if !(-1.0..=1.0).contains(&self.tint) {
+            return fail("the tint", self.tint.into(), "give -1 to 1");
+        }
+        Ok(())
+    }
+}
+
+/// What the ground looks like.
+#[derive(Clone, Debug)]
+pub enum GroundColor {
+    /// One albedo, 0..1 a channel.
+    Even(Vec3),
+    /// As the renderer colours its terrain.
+    Soil(Arc<Soil>),
+}
+
+/// The ground of a scene.
+#[derive(Clone, Debug)]
+pub struct Ground {
+    /// Its shape.
+    pub shape: GroundShape,
+    /// Its colour.
+    pub color: GroundColor,
+    /// Metres to which rays look for it: more sees farther, and costs rays that run along the ground. The renderer
+    /// draws the ground to its view distance.
+    pub reach: f64,
+}
+
+/// Which normals cosines are counted from. Where they are interpolated, light from behind the flat triangle is left
+/// out: some energy is lost there, none is made, and reflection is no longer exactly reciprocal.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Normals {
+    /// The triangles' own: exact for what is modelled, facets included.
+    Flat,
+    /// Interpolated on wood, so that a trunk of few sides is round; leaves, which are flat, have their triangles' own.
+    #[default]
+    RoundWood,
+    /// Interpolated everywhere, as the renderer's `local` lighting has them.
+    Interpolated,
+}
+
+/// An instance, ready for rays.
+#[derive(Clone, Copy, Debug)]
+struct Placed {
+    position: DVec3,
+    /// Sine and cosine of the yaw.
+    turn: (f64, f64),
+    scale: f64,
+    plant: u32,
+    tint: f32,
+}
+
+impl Placed {
+    fn into_plant(self, v: DVec3) -> DVec3 {
+        let (s, c) = self.turn;
+        DVec3::new(c * v.x - s * v.z, v.y, s * v.x + c * v.z)
+    }
+
+    fn into_scene(self, v: DVec3) -> DVec3 {
+        let (s, c) = self.turn;
+        DVec3::new(c * v.x + s * v.z, v.y, c * v.z - s * v.x)
+    }
+
+    /// The ray in the plant's frame, from `start` metres along it to `end`.
+    fn ray(&self, ray: &WorldRay, start: f64, end: f64) -> Ray {
+        let origin = self.into_plant(ray.at(start) - self.position) / self.scale;
+        Ray {
+            origin: origin.as_vec3(),
+            direction: self.into_plant(ray.direction).as_vec3(),
+            t_max: ((end - start) / self.scale) as f32,
+        }
+    }
+}
+
+/// A scene that rays can be sent through.
+pub struct ReferenceScene {
+    tracers: Vec<PlantTracer>,
+    /// For each plant, metres before its box from which rays are traced in its own frame, at scale 1.
+    margins: Vec<f64>,
+    instances: Vec<Placed>,
+    tree: BoxTree,
+    ground: Option<Ground>,
+}
+
+/// What a ray meets first.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Found {
+    Plant {
+        instance: usize,
+        hit: Hit,
+    },
+    Ground {
+        position: DVec3,
+    },
+    /// The ray starts under the ground, where no light is.
+    Buried,
+}
+
+/// A surface at a point, and how rays leave it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Surface {
+    /// Scene metres.
+    pub position: DVec3,
+    pub bsdf: Bsdf,
+    anchor: Anchor,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Anchor {
+    /// Point and flat normal in the plant's frame, where the point is exact.
+    Plant {
+        instance: usize,
+        position: Vec3,
+        normal: Vec3,
+    },
+    Ground,
+}
+
+impl ReferenceScene {
+    /// Builds the trees over plants and instances.
+    ///
+    /// # Errors
+    /// [`ReferenceError::Instance`] and [`ReferenceError::UnknownPlant`] for the first instance that is impossible,
+    /// [`ReferenceError::TooManyInstances`], [`ReferenceError::Value`] for the ground.
+    pub fn new(plants: &[Arc<Plant>], instances: &[Instance], ground: Option<Ground>) -> Result<Self, ReferenceError> {
+        if instances.len() > MOST_ITEMS {
+            return Err(ReferenceError::TooManyInstances { count: instances.len(), limit: MOST_ITEMS });
+        }
+        for (index, instance) in instances.iter().enumerate() {
+            instance.check(index, plants.len())?;
+        }
+        if let Some(ground) = &ground {
+            if !(0.0..=1e7).contains(&ground.reach) {
+                return Err(ReferenceError::value("the reach of the ground", ground.reach, "metres from 0 to 1e7"));
+            }
+            if let GroundShape::Plane(height) = ground.shape
+                && !(-FARTHEST..=FARTHEST).contains(&height)
+            {
+                return Err(ReferenceError::value("the height of the ground", height, "metres within 1e8"));
+            }
+        }
+        let tracers: Vec<PlantTracer> = plants.par_iter().map(PlantTracer::new).collect();
+        let placed: Vec<Placed> = instances
+            .iter()
+            .map(|instance| Placed {
+                position: instance.position,
+                turn: f64::from(instance.yaw).sin_cos(),
+                scale: instance.scale.into(),
+                plant: instance.plant as u32,
+                tint: instance.tint,
+            })
+            .collect();
+        let boxes: Vec<WorldBox> = placed.iter().map(|placed| placed_box(placed, &tracers)).collect();
+        let margin = |tracer: &PlantTracer| {
+            tracer.bounds().map_or(0.0, |bounds| MARGIN * f64::from(bounds.size().max_element()))
+        };
+        let margins = tracers.iter().map(margin).collect();
+        Ok(Self { tracers, margins, tree: BoxTree::new(&boxes), instances: placed, ground })
+    }
+
+    /// Number of instances.
+    pub fn instances(&self) -> usize {
+        self.instances.len()
+    }
+
+    /// The plant of an instance.
+    pub fn plant(&self, instance: usize) -> Option<&Arc<Plant>> {
+        self.tracer(instance).map(PlantTracer::plant)
+    }
+
+    /// The ground.
+    pub fn ground(&self) -> Option<&Ground> {
+        self.ground.as_ref()
+    }
+
+    pub(crate) fn tracer(&self, instance: usize) -> Option<&PlantTracer> {
+        self.tracers.get(self.instances.get(instance)?.plant as usize)
+    }
+
+    /// The ray in the frame of an instance whose box it enters at `near`, with where it starts there.
+    ///
+    /// It is moved up to the plant, and in f64: in f32 the ray of a camera a kilometre away would be off by a tenth of a
+    /// millimetre. It starts a little before the box, on whose very side there may be a leaf.
+    fn at_instance(&self, ray: &WorldRay, index: usize, near: f64, reach: f64) -> (&Placed, Ray, f64) {
+        let placed = &self.instances[index];
+        let start = (near - self.margins[placed.plant as usize] * placed.scale).max(0.0);
+        (placed, placed.ray(ray, start, reach), start)
+    }
+
+    /// Metres to what the ray meets first; 0 under the ground, `None` where it meets nothing.
+    pub fn distance(&self, ray: &WorldRay) -> Option<f64> {
+        let found = self.closest(ray)?;
+        self.surface(found, ray.direction, Normals::Flat)
+            .map_or(Some(0.0), |s| Some((s.position - ray.origin).length()))
+    }
+
+    /// What the ray meets first.
+    pub(crate) fn closest(&self, ray: &WorldRay) -> Option<Found> {
+        let mut found = None;
+        let mut end = ray.t_max;
+        self.tree.walk(ray, |index, near, reach| {
+            let (placed, local, start) = self.at_instance(ray, index, near, reach);
+            let Some(hit) = self.tracers[placed.plant as usize].closest(&local) else { return reach };
+            found = Some(Found::Plant { instance: index, hit });
+            end = start + f64::from(hit.t) * placed.scale;
+            end
+        });
+        let Some(ground) = &self.ground else { return found };
+        match ground.shape.crossing(&WorldRay { t_max: end, ..*ray }, ground.reach) {
+            Some(Crossing::At(t)) => Some(Found::Ground { position: ray.at(t) }),
+            Some(Crossing::Buried) => Some(Found::Buried),
+            None => found,
+        }
+    }
+
+    /// Whether the ray meets anything.
+    pub fn occluded(&self, ray: &WorldRay) -> bool {
+        let mut met = false;
+        self.tree.walk(ray, |index, near, reach| {
+            let (placed, local, _) = self.at_instance(ray, index, near, reach);
+            met = self.tracers[placed.plant as usize].occluded(&local);
+            if met { -1.0 } else { reach }
+        });
+        met || self.ground.as_ref().is_some_and(|ground| ground.shape.crossing(ray, ground.reach).is_some())
+    }
+
+    /// The surface that was found, seen along the unit vector `direction`; `None` under the ground.
+    pub(crate) fn surface(&self, found: Found, direction: DVec3, normals: Normals) -> Option<Surface> {
+        match found {
+            Found::Buried => None,
+            Found::Ground { position } => {
+                let ground = self.ground.as_ref()?;
+                let normal = ground.shape.normal(position.x, position.z);
+                let albedo = match &ground.color {
+                    GroundColor::Even(albedo) => *albedo,
+                    GroundColor::Soil(soil) => soil.albedo(position, normal),
+                };
+                let bsdf = Bsdf::new(normal, normal, balanced(albedo, Vec3::ZERO).0, Vec3::ZERO, normal);
+                Some(Surface { position, bsdf, anchor: Anchor::Ground })
+            }
+            Found::Plant { instance, hit } => {
+                let point = self.tracer(instance)?.point(&hit);
+                let to_viewer = -direction.as_vec3();
+                Some(self.on_plant(instance, &point, normals, |placed, geometric, shading| {
+                    let (reflected, transmitted) = placed.shares(&point);
+                    Bsdf::new(geometric, shading, reflected, transmitted, to_viewer)
+                }))
+            }
+        }
+    }
+
+    /// A surface of an instance at a point in the plant's frame; `bsdf` gets the normals in the scene's.
+    fn on_plant(
+        &self,
+        instance: usize,
+        point: &SurfacePoint,
+        normals: Normals,
+        bsdf: impl FnOnce(&Placed, Vec3, Vec3) -> Bsdf,
+    ) -> Surface {
+        let placed = &self.instances[instance];
+        let turned = |normal: Vec3| placed.into_scene(normal.as_dvec3()).as_vec3();
+        let geometric = turned(point.geometric_normal);
+        let round = match normals {
+            Normals::Flat => false,
+            Normals::RoundWood => point.kind == PartKind::Wood,
+            Normals::Interpolated => true,
+        };
+        let shading = if round { turned(point.shading_normal) } else { geometric };
+        Surface {
+            position: placed.position + placed.into_scene(point.position.as_dvec3()) * placed.scale,
+            bsdf: bsdf(placed, geometric, shading),
+            anchor: Anchor::Plant { instance, position: point.position, normal: point.geometric_normal },
+        }
+    }
+
+    /// A point of an instance whose light is asked for, seen from the side of `normal` (plant frame).
+    pub(crate) fn receiver(
+        &self,
+        instance: usize,
+        position: Vec3,
+        normal: Vec3,
+        shares: (Vec3, Vec3),
+    ) -> Option<Surface> {
+        let placed = self.instances.get(instance)?;
+        let turned = placed.into_scene(normal.as_dvec3()).as_vec3();
+        Some(Surface {
+            position: placed.position + placed.into_scene(position.as_dvec3()) * placed.scale,
+            bsdf: Bsdf::new(turned, turned, shares.0, shares.1, turned),
+            anchor: Anchor::Plant { instance, position, normal },
+        })
+    }
+
+    /// A ray without end that leaves `surface` in a direction and does not meet it again where it starts.
+    pub(crate) fn leave(&self, surface: &Surface, direction: Vec3) -> WorldRay {
+        let direction = direction.as_dvec3().normalize_or(DVec3::Y);
+        let origin = match surface.anchor {
+            Anchor::Ground => self.ground.as_ref().map_or(surface.position, |g| g.shape.lifted(surface.position)),
+            Anchor::Plant { instance, position, normal } => {
+                let placed = &self.instances[instance];
+                let local = placed.into_plant(direction).as_vec3();
+                let origin = offset_origin(position, normal, local);
+                placed.position + placed.into_scene(origin.as_dvec3()) * placed.scale
+            }
+        };
+        WorldRay::new(origin, direction)
+    }
+
+    /// Everything that rays depend on, as bytes for a fingerprint.
+    pub(crate) fn feed(&self, hasher: &mut blake3::Hasher) {
+        for tracer in &self.tracers {
+            let key = crate::bake::cache::CacheKey::new(tracer.plant(), &crate::bake::BakeSettings::default());
+            hasher.update(key.to_hex().as_bytes());
+        }
+        for placed in &self.instances {
+            let numbers = [placed.position.x, placed.position.y, placed.position.z, placed.turn.0, placed.turn.1];
+            hasher.update(bytemuck::cast_slice(&numbers));
+            hasher.update(&placed.scale.to_le_bytes());
+            hasher.update(&placed.plant.to_le_bytes());
+            hasher.update(&placed.tint.to_le_bytes());
+        }
+        let Some(ground) = &self.ground else { return };
+        match &ground.shape {
+            GroundShape::Plane(height) => hasher.update(&height.to_le_bytes()),
+            GroundShape::Terrain(terrain) => {
+                let field = terrain.field();
+                hasher.update(bytemuck::cast_slice(field.heights()));
+                hasher.update(format!("{:?} {:?}", terrain.surroundings(), field).as_bytes())
+            }
+        };
+        hasher.update(&ground.reach.to_le_bytes());
+        match &ground.color {
+            GroundColor::Even(albedo) => {
+                hasher.update(bytemuck::bytes_of(albedo));
+            }
+            GroundColor::Soil(soil) => soil.feed(hasher),
+        }
+    }
+}
+
+impl Placed {
+    /// What the point reflects and transmits: the twin of `tint_foliage` in `shaders/forest/instance.wgsl`.
+    fn shares(&self, point: &SurfacePoint) -> (Vec3, Vec3) {
+        let tint = match point.kind {
+            PartKind::Wood => Vec3::ONE,
+            PartKind::Foliage => Vec3::ONE + self.tint * Vec3::new(0.18, 0.07, -0.05),
+        };
+        balanced(point.base_color * tint, point.transmission * tint)
+    }
+}
+
+/// The box of an instance: its plant's, turned. A plant without a surface has its foot.
+fn placed_box(placed: &Placed, tracers: &[PlantTracer]) -> WorldBox {
+    let Some(bounds) = tracers[placed.plant as usize].bounds() else {
+        return WorldBox { min: placed.position, max: placed.position };
+    };
+    let corners = (0..8).map(|corner| {
+        let pick = |bit: u32, axis: usize| if corner >> bit & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
+        let corner = DVec3::new(pick(0, 0).into(), pick(1, 1).into(), pick(2, 2).into());
+        placed.position + placed.into_scene(corner) * placed.scale
+    });
+    corners.fold(WorldBox { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY }, |b, corner| WorldBox {
+        min: b.min.min(corner),
+        max: b.max.max(corner),
+    })
+}
