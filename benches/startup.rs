@@ -20,7 +20,7 @@ use bevy::ecs::{
 use canopy::{
     app::{Renderer, Stage},
     render::components::{Forest, Ground},
-    scene::{Pictures, Progress, RenderOptions, RenderPlan, Scene, Still, View, Viewpoint},
+    scene::{Overrides, Pictures, Progress, RenderOptions, RenderPlan, Scene, Still, View, Viewpoint},
 };
 use chrono::TimeDelta;
 use clap::Parser;
@@ -126,7 +126,7 @@ impl Progress for Steps {
 fn turn(arguments: &Arguments) -> anyhow::Result<()> {
     let folder = tempfile::tempdir()?;
     let mut steps = Steps { last: Instant::now(), open: None };
-    let stage = Stage::build(&arguments.scene, None, &mut steps)?;
+    let stage = Stage::build(&arguments.scene, &Overrides::default(), &mut steps)?;
     steps.done("loading: scene file and the rest");
     let mut renderer = Renderer::new(arguments.size, None, stage.scene.quality.msaa)?;
     steps.done("Bevy and the device");
@@ -168,9 +168,8 @@ fn first_view(arguments: &Arguments, scene: &Scene, stage: &Stage) -> anyhow::Re
         pictures: Pictures::Stills(vec![Still { out: "picture.png".into(), at: None }]),
         view: View::Scene,
         size: arguments.size,
-        seed: None,
+        overrides: Overrides::default(),
         adapter: None,
-        msaa: None,
         quiet: true,
         explain: false,
     };

@@ -4,7 +4,7 @@ use bevy::prelude::*;
 use canopy::prelude::*;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let stage = Stage::build("assets/scenes/inventory.ron".as_ref(), None, &mut Silent)?;
+    let stage = Stage::build("assets/scenes/inventory.ron".as_ref(), &Overrides::default(), &mut Silent)?;
     App::new()
         .add_plugins((DefaultPlugins, CanopyPlugins))
         .insert_resource(stage.sky(stage.scene.place.time.utc()))

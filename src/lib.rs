@@ -7,7 +7,7 @@
 //! use canopy::prelude::*;
 //!
 //! fn main() -> Result<(), Box<dyn std::error::Error>> {
-//!     let stage = Stage::build("assets/scenes/demo.ron".as_ref(), None, &mut Silent)?;
+//!     let stage = Stage::build("assets/scenes/demo.ron".as_ref(), &Overrides::default(), &mut Silent)?;
 //!     App::new()
 //!         .add_plugins((DefaultPlugins, CanopyPlugins))
 //!         .insert_resource(stage.sky(stage.scene.place.time.utc()))
@@ -62,6 +62,6 @@ pub mod prelude {
             },
             daylight::{FollowsDaylight, SkySettings},
         },
-        scene::{Progress, Silent},
+        scene::{Overrides, Progress, Silent},
     };
 }

@@ -52,8 +52,7 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
     Scene::read(&options.scene)?;
     let settings = adapter::settings(options.adapter.as_deref())?;
     adapter::check_size(&settings, options.size)?;
-    let mut stage = Stage::build(&options.scene, options.seed, progress)?;
-    stage.set_samples(options.msaa);
+    let stage = Stage::build(&options.scene, &options.overrides, progress)?;
     let plan = RenderPlan::new(options, &stage.scene, &|x, z| stage.terrain.height(x, z))?;
     check_writable(&plan)?;
     let started = Instant::now();

@@ -4,14 +4,19 @@ use std::{ops::Range, path::PathBuf};
 
 use super::error::AppError;
 use crate::{
-    bake::{BakeSettings, billboard::CrossSettings},
+    bake::{
+        BakeSettings,
+        billboard::CrossSettings,
+        implicit::{ImplicitSettings, NormalSource},
+        lighting::LightingSettings,
+    },
     plant::{
         Plant,
         gltf::{GltfOptions, load_plant},
         grow::{GrowParameters, grow},
     },
     scatter::packed::MAX_VARIANTS,
-    scene::{GrownForm, PlantSource, Quality, Scene, Species},
+    scene::{CrownNormals, GrownForm, Lighting, PlantSource, Quality, Scene, Species},
 };
 
 /// How one individual is made.
@@ -58,11 +63,20 @@ impl IndividualSource {
     }
 }
 
+/// One individual of a species.
+#[derive(Clone, Debug)]
+pub struct Individual {
+    /// How it is made.
+    pub source: IndividualSource,
+    /// How its foliage is lit.
+    pub lighting: LightingSettings,
+}
+
 /// All individuals of a scene, and which belong to which species.
 #[derive(Clone, Debug, Default)]
 pub struct PlantPlan {
     /// One for each variant.
-    pub sources: Vec<IndividualSource>,
+    pub individuals: Vec<Individual>,
     /// Variants of each of the scene's species.
     pub variants: Vec<Range<u16>>,
 }
@@ -74,18 +88,20 @@ pub struct PlantPlan {
 pub fn plan(scene: &Scene) -> Result<PlantPlan, AppError> {
     let mut plan = PlantPlan::default();
     for species in &scene.species {
-        let first = plan.sources.len();
-        add_individuals(species, &mut plan.sources)?;
-        plan.variants.push(first as u16..plan.sources.len() as u16);
+        let first = plan.individuals.len();
+        let lighting = lighting_settings(species.lighting.as_ref());
+        let individuals = sources(species)?.into_iter().map(|source| Individual { source, lighting });
+        plan.individuals.extend(individuals);
+        plan.variants.push(first as u16..plan.individuals.len() as u16);
     }
-    if plan.sources.len() > MAX_VARIANTS {
-        return Err(AppError::TooManyPlants { count: plan.sources.len(), limit: MAX_VARIANTS });
+    if plan.individuals.len() > MAX_VARIANTS {
+        return Err(AppError::TooManyPlants { count: plan.individuals.len(), limit: MAX_VARIANTS });
     }
     Ok(plan)
 }
 
-fn add_individuals(species: &Species, sources: &mut Vec<IndividualSource>) -> Result<(), AppError> {
-    match &species.plant {
+fn sources(species: &Species) -> Result<Vec<IndividualSource>, AppError> {
+    Ok(match &species.plant {
         PlantSource::Grown(grown) => {
             let (parameters, from) = match &grown.form {
                 GrownForm::Broadleaf => (GrowParameters::broadleaf(), "broadleaf".into()),
@@ -98,12 +114,14 @@ fn add_individuals(species: &Species, sources: &mut Vec<IndividualSource>) -> Re
                     (parameters, path.clone())
                 }
             };
-            sources.extend((0..grown.individuals).map(|individual| IndividualSource::Grown {
-                parameters: Box::new(parameters.clone()),
-                from: from.clone(),
-                seed: grown.seed.wrapping_add(u64::from(individual)),
-                triangles: grown.triangles as usize,
-            }));
+            (0..grown.individuals)
+                .map(|individual| IndividualSource::Grown {
+                    parameters: Box::new(parameters.clone()),
+                    from: from.clone(),
+                    seed: grown.seed.wrapping_add(u64::from(individual)),
+                    triangles: grown.triangles as usize,
+                })
+                .collect()
         }
         PlantSource::Gltf(files) => {
             let options = GltfOptions {
@@ -112,17 +130,45 @@ fn add_individuals(species: &Species, sources: &mut Vec<IndividualSource>) -> Re
                 wood_materials: files.wood.clone(),
                 ..GltfOptions::default()
             };
-            sources.extend(
-                files.files.iter().map(|path| IndividualSource::Gltf { path: path.clone(), options: options.clone() }),
-            );
+            files
+                .files
+                .iter()
+                .map(|path| IndividualSource::Gltf { path: path.clone(), options: options.clone() })
+                .collect()
         }
-    }
-    Ok(())
+    })
 }
 
-/// Bake settings of a scene's quality.
-pub fn bake_settings(quality: &Quality) -> BakeSettings {
+/// What a species' light asks of the bake.
+fn lighting_settings(lighting: Option<&Lighting>) -> LightingSettings {
+    match lighting {
+        None => LightingSettings::default(),
+        Some(Lighting::Local) => LightingSettings::Local,
+        Some(Lighting::Expressive(expressive)) => {
+            let default = ImplicitSettings::default();
+            let number = |value: Option<f64>| value.map(|value| value as f32);
+            LightingSettings::Expressive(ImplicitSettings {
+                radius: number(expressive.radius),
+                threshold: number(expressive.threshold),
+                least: number(expressive.least),
+                core: number(expressive.core),
+                exponent: number(expressive.exponent),
+                generator_share: number(expressive.share).unwrap_or(default.generator_share),
+                normals: match expressive.normals {
+                    CrownNormals::Nearest => NormalSource::NearestVertex,
+                    CrownNormals::Smooth => NormalSource::Gradient,
+                },
+                own_normal: number(expressive.own_normal).unwrap_or(default.own_normal),
+                ..default
+            })
+        }
+    }
+}
+
+/// Bake settings of a scene's quality and a species' light.
+pub fn bake_settings(quality: &Quality, lighting: LightingSettings) -> BakeSettings {
     BakeSettings {
+        lighting,
         cross: CrossSettings { resolution: quality.cross_resolution, ..CrossSettings::default() },
         ..BakeSettings::default()
     }

@@ -29,7 +29,7 @@ const KEEP_EVERY: Duration = Duration::from_secs(30);
 /// [`AppError`]; a picture that was there before stays as it is.
 pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Result<PathBuf, AppError> {
     Scene::read(&options.scene)?;
-    let stage = Stage::build(&options.scene, options.seed, progress)?;
+    let stage = Stage::build(&options.scene, &options.overrides, progress)?;
     let frame = frame(options, &stage)?;
     let sky = stage.sky(frame.instant);
     let atmosphere = Atmosphere::new(AtmosphereParams::with_visibility_km(sky.visibility_km))?;
@@ -89,7 +89,7 @@ fn frame(options: &ReferenceOptions, stage: &Stage) -> Result<Frame, AppError> {
         pictures: Pictures::Stills(vec![Still { out: options.out.with_extension("png"), at: options.at }]),
         view: options.view,
         size: options.size,
-        seed: options.seed,
+        overrides: options.overrides.clone(),
         adapter: None,
         quiet: options.quiet,
         explain: false,

@@ -15,7 +15,7 @@ use crate::{
         daylight::SkySettings,
     },
     scatter::{CoverMap, PackedStand, VariantBounds, cover_map, packed::DEFAULT_CELL_SIZE},
-    scene::{self, Progress, Quality, Scene},
+    scene::{self, Overrides, Progress, Quality, Scene},
     terrain::Terrain,
 };
 
@@ -43,15 +43,13 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// Builds the scene in `path`; `seed` replaces the scene's.
+    /// Builds the scene in `path`, with what `overrides` replace in it.
     ///
     /// # Errors
     /// [`AppError`] for anything in the scene or its files that cannot be used.
-    pub fn build(path: &Path, seed: Option<u64>, progress: &mut dyn Progress) -> Result<Self, AppError> {
+    pub fn build(path: &Path, overrides: &Overrides, progress: &mut dyn Progress) -> Result<Self, AppError> {
         let mut scene = Scene::read(path)?;
-        if let Some(seed) = seed {
-            scene.seed = seed;
-        }
+        overrides.apply(&mut scene);
         let started = Instant::now();
         progress.begin("Terrain", 0);
         let terrain = Arc::new(ground::build_terrain(&scene.terrain, progress)?);
@@ -81,11 +79,6 @@ impl Stage {
             progress.warn("the scene's rules leave no place for any tree: only the ground is drawn");
         }
         Ok(Self { terrain, stand: Arc::new(packed), plants: Arc::new(plants), cover, observer, scene })
-    }
-
-    /// Replaces the scene's samples per pixel (1 or 4) where `samples` says so.
-    pub fn set_samples(&mut self, samples: Option<u32>) {
-        self.scene.quality.msaa = samples.unwrap_or(self.scene.quality.msaa);
     }
 
     /// The forest of the scene, or `None` without trees.
@@ -171,18 +164,20 @@ fn bake(
     progress: &mut dyn Progress,
 ) -> Result<Vec<BakedPlant>, AppError> {
     let started = Instant::now();
-    progress.begin("Plants", species.sources.len() as u64);
+    progress.begin("Plants", species.individuals.len() as u64);
     let cache = Cache::of_user();
-    let settings = plants::bake_settings(quality);
-    let mut baked = Vec::with_capacity(species.sources.len());
+    let mut baked = Vec::with_capacity(species.individuals.len());
     let mut fresh = 0;
     // A few at a time: in parallel, and still with progress.
-    for group in species.sources.chunks(rayon::current_num_threads().max(1)) {
+    for group in species.individuals.chunks(rayon::current_num_threads().max(1)) {
         let results: Vec<_> = group
             .par_iter()
-            .map(|source| {
-                let (plant, warnings) = source.build()?;
-                Ok((bake_plant(Arc::new(plant), &settings, cache.as_ref()), warnings))
+            .map(|individual| {
+                let (plant, mut warnings) = individual.source.build()?;
+                let settings = plants::bake_settings(quality, individual.lighting);
+                let baked = bake_plant(Arc::new(plant), &settings, cache.as_ref());
+                warnings.extend(baked.0.lighting.warning().map(|what| format!("{}: {what}", baked.0.plant.name)));
+                Ok((baked, warnings))
             })
             .collect::<Result<_, AppError>>()?;
         for ((plant, source), warnings) in results {

@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use canopy::scene::{LocalTime, Pose, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size};
+use canopy::scene::{
+    Lighting, LocalTime, Pose, parse_lighting, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size,
+};
 use clap::{Args, Parser, Subcommand};
 
 /// Width and height of pictures and windows unless stated.
@@ -50,6 +52,9 @@ pub struct Common {
     /// Samples per pixel, 1 (rough leaf edges, faster) or 4, instead of what the scene asks for.
     #[arg(long, global = true, value_name = "1|4", value_parser = parse_samples)]
     pub msaa: Option<u32>,
+    /// Light of all foliage: local, expressive [default: each species' own].
+    #[arg(long, global = true, value_name = "LIGHT", value_parser = parse_lighting)]
+    pub lighting: Option<Lighting>,
     /// Say which passes ran, which were skipped, and why.
     #[arg(long, global = true)]
     pub explain: bool,

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use canopy::scene::{Clock, FlyOptions, Pictures, ReferenceOptions, RenderOptions, Still, View};
+use canopy::scene::{Clock, FlyOptions, Overrides, Pictures, ReferenceOptions, RenderOptions, Still, View};
 use clap::CommandFactory;
 use clap::error::ErrorKind;
 
@@ -10,6 +10,10 @@ use super::arguments::{Arguments, CameraArguments, Common, Fly, Reference, Rende
 
 /// The scene of `canopy fly` without a name.
 const DEMO: &str = "scenes/demo.ron";
+
+fn overrides(common: &Common) -> Overrides {
+    Overrides { seed: common.seed, msaa: common.msaa, lighting: common.lighting.clone() }
+}
 
 /// The options of a flight.
 pub fn fly_options(fly: Fly, common: &Common) -> FlyOptions {
@@ -20,9 +24,8 @@ pub fn fly_options(fly: Fly, common: &Common) -> FlyOptions {
         view: view(&fly.view),
         clock: fly.clock.unwrap_or(0.0),
         underground: fly.underground,
-        seed: common.seed,
+        overrides: overrides(common),
         adapter: common.adapter.clone(),
-        msaa: common.msaa,
         quiet: common.quiet,
         explain: common.explain,
     }
@@ -36,9 +39,8 @@ pub fn render_options(render: Render, common: &Common) -> Result<RenderOptions, 
     Ok(RenderOptions {
         view: view(&render.view),
         size: render.size,
-        seed: common.seed,
+        overrides: overrides(common),
         adapter: common.adapter.clone(),
-        msaa: common.msaa,
         quiet: common.quiet,
         explain: common.explain,
         scene: render.scene,
@@ -67,7 +69,7 @@ pub fn reference_options(reference: Reference, common: &Common) -> Result<Refere
         bounces: reference.bounces,
         fog: !reference.clear_air,
         resume: reference.resume,
-        seed: common.seed,
+        overrides: overrides(common),
         quiet: common.quiet,
     })
 }
@@ -165,8 +167,13 @@ mod tests {
         let options = render("--at 2026-06-21T06:00Z --out a.png --at 2026-06-21T12:00Z --out b.PNG --quiet")?;
         let Pictures::Stills(stills) = options.pictures else { return Err("no stills".into()) };
         assert_eq!(stills[1], Still { out: "b.PNG".into(), at: Some("2026-06-21T12:00Z".parse()?) });
-        assert!(options.quiet && options.size == (1280, 720) && options.view == View::Scene && options.msaa.is_none());
-        assert_eq!(render("--out a.png --msaa 1")?.msaa, Some(1));
+        assert!(
+            options.quiet
+                && options.size == (1280, 720)
+                && options.view == View::Scene
+                && options.overrides == Overrides::default()
+        );
+        assert_eq!(render("--out a.png --msaa 1")?.overrides.msaa, Some(1));
         Ok(())
     }
 
@@ -221,6 +228,7 @@ mod tests {
             "--out a --frames 2 --at 2026-06-21T06:00Z --from 2026-06-21T06:00Z --to 2026-06-21T07:00Z",
             "--out a.png --seed -1",
             "--out a.png --msaa 2",
+            "--out a.png --lighting bright",
             "--out a.png --unknown",
         ] {
             assert_eq!(render(wrong).map(|_| ()).map_err(|error| error.exit_code()), Err(2), "{wrong}");

@@ -1,6 +1,7 @@
 //! Texts of the command line to values.
 
 use super::camera::Pose;
+use super::lighting::{Expressive, Lighting};
 
 /// Why an argument is not what it should be.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -8,6 +9,9 @@ pub enum ArgumentError {
     /// Not `WIDTHxHEIGHT`.
     #[error("`{0}` is no size; write width and height in pixels, each at least 1, as in 1280x720")]
     Size(String),
+    /// Not a kind of light.
+    #[error("`{0}` is no light; write local or expressive")]
+    Lighting(String),
     /// Not a number of samples.
     #[error("`{0}` samples per pixel: write 1 (off) or 4")]
     Samples(String),
@@ -35,6 +39,18 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), ArgumentError> {
     let parts = text.trim().split_once(['x', 'X', '×']);
     let size = parts.and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
     size.filter(|(width, height)| *width > 0 && *height > 0).ok_or_else(|| ArgumentError::Size(text.to_owned()))
+}
+
+/// Reads the name of a light: `local` or `expressive`, with all its default values.
+///
+/// # Errors
+/// [`ArgumentError::Lighting`].
+pub fn parse_lighting(text: &str) -> Result<Lighting, ArgumentError> {
+    match text.trim() {
+        "local" => Ok(Lighting::Local),
+        "expressive" => Ok(Lighting::Expressive(Expressive::default())),
+        _ => Err(ArgumentError::Lighting(text.to_owned())),
+    }
 }
 
 /// Reads the number of samples per pixel: 1 or 4, what every device can do.

@@ -191,7 +191,7 @@ fn numbered(out: &FilePath, number: u32, frames: u32) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Still;
+    use super::super::{Overrides, Still};
     use super::*;
 
     type Outcome = Result<(), Box<dyn std::error::Error>>;
@@ -213,9 +213,8 @@ mod tests {
             pictures,
             view,
             size: (64, 36),
-            seed: None,
+            overrides: Overrides::default(),
             adapter: None,
-            msaa: None,
             quiet: true,
             explain: false,
         }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::camera::Pose;
+use super::overrides::Overrides;
 use super::time::LocalTime;
 
 /// Everything about an interactive flight.
@@ -20,12 +21,10 @@ pub struct FlyOptions {
     pub clock: f64,
     /// Whether the camera may go under the ground.
     pub underground: bool,
-    /// Replaces the scene's seed.
-    pub seed: Option<u64>,
+    /// Replaces values of the scene.
+    pub overrides: Overrides,
     /// Part of the name of the graphics adapter to use; `None` lets the driver choose.
     pub adapter: Option<String>,
-    /// Samples per pixel, 1 or 4, instead of the scene's.
-    pub msaa: Option<u32>,
     /// No progress and no notes, only warnings and errors.
     pub quiet: bool,
     /// Print which passes ran, which were skipped, and why.
@@ -43,12 +42,10 @@ pub struct RenderOptions {
     pub view: View,
     /// Size of a picture in pixels, each at least 1; the device may allow less than what is asked.
     pub size: (u32, u32),
-    /// Replaces the scene's seed.
-    pub seed: Option<u64>,
+    /// Replaces values of the scene.
+    pub overrides: Overrides,
     /// Part of the name of the graphics adapter to use; `None` lets the driver choose.
     pub adapter: Option<String>,
-    /// Samples per pixel, 1 or 4, instead of the scene's.
-    pub msaa: Option<u32>,
     /// No progress and no notes, only warnings and errors.
     pub quiet: bool,
     /// Report which passes ran, which were skipped, and why.
@@ -76,8 +73,8 @@ pub struct ReferenceOptions {
     pub fog: bool,
     /// Go on from where an earlier picture of the same scene, light and camera stopped, and keep the state for the next.
     pub resume: bool,
-    /// Replaces the scene's seed.
-    pub seed: Option<u64>,
+    /// Replaces values of the scene.
+    pub overrides: Overrides,
     /// No progress and no notes, only warnings and errors.
     pub quiet: bool,
 }

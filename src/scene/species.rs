@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::check::Check;
+use super::lighting::Lighting;
 
 /// One species.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -18,6 +19,9 @@ pub struct Species {
     pub weight: f64,
     /// What its trees look like. Required.
     pub plant: PlantSource,
+    /// How its foliage is lit. Default: what is nearest to the ground truth.
+    #[serde(default)]
+    pub lighting: Option<Lighting>,
     /// Range of heights in metres, `(lowest, highest)`, each 0.1 to 150. Default (16, 26).
     #[serde(default = "default_height")]
     pub height: (f64, f64),
@@ -119,6 +123,9 @@ impl Species {
         check.ordered(&format!("{at}.height"), self.height, 0.1..=150.0, "m");
         if let Some(elevation) = self.elevation {
             check.interval(&format!("{at}.elevation"), elevation, ELEVATIONS, "m");
+        }
+        if let Some(lighting) = &self.lighting {
+            lighting.check(at, check);
         }
         check.number(&format!("{at}.slope_limit"), self.slope_limit, 0.0..=90.0, "degrees");
         if let Some(radius) = self.trunk_radius {

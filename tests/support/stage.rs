@@ -4,7 +4,7 @@ use std::path::Path;
 
 use canopy::{
     app::Stage,
-    scene::{LocalTime, Pose, Progress, Viewpoint},
+    scene::{LocalTime, Overrides, Pose, Progress, Viewpoint},
 };
 use chrono::{DateTime, Utc};
 use glam::{DVec2, DVec3};
@@ -57,7 +57,7 @@ pub fn build(text: &str, files: &[(&str, &[u8])]) -> Built {
 /// Builds the scene in `path`.
 #[track_caller]
 pub fn built(path: &Path, heard: &mut Heard) -> Stage {
-    match Stage::build(path, None, heard) {
+    match Stage::build(path, &Overrides::default(), heard) {
         Ok(stage) => stage,
         Err(error) => panic!("{error}"),
     }

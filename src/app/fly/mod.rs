@@ -46,8 +46,7 @@ pub fn fly(options: &FlyOptions, progress: &mut dyn Progress) -> Result<(), AppE
     display::check()?;
     let settings = adapter::settings(options.adapter.as_deref())?;
     adapter::check_size(&settings, options.size)?;
-    let mut stage = Stage::build(&options.scene, options.seed, progress)?;
-    stage.set_samples(options.msaa);
+    let stage = Stage::build(&options.scene, &options.overrides, progress)?;
     let session = Session::new(stage, options)?;
     let mut app = display::open(|| build(session, options, settings))?;
     match app.run() {

@@ -205,7 +205,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::scene::Silent;
+    use crate::scene::{Overrides, Silent};
 
     const SCENE: &str = "(
         terrain: Noise(size: 400, amplitude: 40, seed: 3),
@@ -226,13 +226,12 @@ mod tests {
             view,
             clock,
             underground: false,
-            seed: None,
+            overrides: Overrides::default(),
             adapter: None,
-            msaa: None,
             quiet: true,
             explain: false,
         };
-        let stage = Stage::build(&options.scene, None, &mut Silent)?;
+        let stage = Stage::build(&options.scene, &Overrides::default(), &mut Silent)?;
         Ok(Session::new(stage, &options)?)
     }
 

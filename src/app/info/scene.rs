@@ -58,8 +58,8 @@ fn describe(page: &mut Page, scene: &Scene, path: &Path) -> Result<(), AppError>
     let ground = build_terrain(&scene.terrain, &mut heard)?;
     let observer = stage::observer(scene, &ground, path)?;
     let plan = plants::plan(scene)?;
-    let mut individuals = Vec::with_capacity(plan.sources.len());
-    for source in &plan.sources {
+    let mut individuals = Vec::with_capacity(plan.individuals.len());
+    for source in plan.individuals.iter().map(|individual| &individual.source) {
         let (plant, warnings) = source.build()?;
         heard.warnings.extend(warnings);
         individuals.push(unbaked(plant));

@@ -1,0 +1,29 @@
+//! What a request says instead of a scene file.
+
+use super::{Lighting, Scene};
+
+/// Values that replace a scene's own. The default replaces nothing.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Overrides {
+    /// The seed.
+    pub seed: Option<u64>,
+    /// Samples per pixel, 1 or 4.
+    pub msaa: Option<u32>,
+    /// The light of all species. A species that has this kind of light already keeps its own values.
+    pub lighting: Option<Lighting>,
+}
+
+impl Overrides {
+    /// Puts the values in their places.
+    pub fn apply(&self, scene: &mut Scene) {
+        scene.seed = self.seed.unwrap_or(scene.seed);
+        scene.quality.msaa = self.msaa.unwrap_or(scene.quality.msaa);
+        let Some(lighting) = &self.lighting else { return };
+        for species in &mut scene.species {
+            let kind = |lighting: &Lighting| std::mem::discriminant(lighting);
+            if species.lighting.as_ref().map(kind) != Some(kind(lighting)) {
+                species.lighting = Some(lighting.clone());
+            }
+        }
+    }
+}
