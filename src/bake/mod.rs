@@ -5,6 +5,7 @@
 //! | [`ambient`] | ambient visibility k_a a vertex | [Monsi & Saeki 1953] |
 //! | [`billboard`] | crossed billboards with colour, normal, k_a | [Franzke 2005, 4.3] |
 //! | [`shadow_proxy`] | a lighter model with the same projected area | [Cook et al. 2007] |
+//! | [`transfer`] | radiance transfer of the sky a vertex and side | [Franzke 2005, 4.2.3] |
 //! | [`rasterize`] | which triangle each sample of a picture sees | |
 //! | [`cache`] | files on disk, found by the content they were made from | |
 //!
@@ -18,6 +19,7 @@ pub(crate) mod geometry;
 pub mod rasterize;
 pub mod shadow_proxy;
 pub(crate) mod surface;
+pub mod transfer;
 
 use std::path::PathBuf;
 use std::sync::Arc;
