@@ -15,4 +15,5 @@ mod shaders;
 mod support;
 mod terrain;
 mod trace;
+mod transfer;
 mod withstand;

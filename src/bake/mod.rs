@@ -6,6 +6,7 @@
 //! | [`billboard`] | crossed billboards with colour, normal, k_a | [Franzke 2005, 4.3] |
 //! | [`implicit`] | normals and k_a from the crown's implicit surface, and that surface | [Luft 2007] |
 //! | [`shadow_proxy`] | a lighter model with the same projected area | [Cook et al. 2007] |
+//! | [`transfer`] | radiance transfer of the sky a vertex and side | [Franzke 2005, 4.2.3] |
 //! | [`rasterize`] | which triangle each sample of a picture sees | |
 //! | [`cache`] | files on disk, found by the content they were made from | |
 //!
@@ -20,6 +21,7 @@ pub mod lighting;
 pub mod rasterize;
 pub mod shadow_proxy;
 pub(crate) mod surface;
+pub mod transfer;
 
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -19,6 +19,7 @@ pub mod quadrature;
 pub mod sh;
 mod state;
 pub mod sun;
+mod surroundings;
 
 pub use atmosphere::{Atmosphere, AtmosphereParams, SkyView};
 pub use error::LightError;
@@ -28,3 +29,4 @@ pub use night::{NightSky, StarField};
 pub use sh::Sh9Rgb;
 pub use state::{FogParams, KeyLight, LightSettings, LightState, MoonDisc, NightTerms};
 pub use sun::{Observer, SunPosition};
+pub use surroundings::Surroundings;

@@ -1,7 +1,5 @@
 //! All light of one instant, computed when the sun has moved and only then.
 
-use std::f32::consts::PI;
-
 use glam::{Mat3, Vec3};
 
 use super::atmosphere::{Atmosphere, SkyView, luminance};
@@ -9,13 +7,9 @@ use super::error::{LightError, check_range};
 use super::exposure::{ExposureSettings, ScotopicTint, exposure_from_ev100};
 use super::moon::{MOON_ANGULAR_RADIUS, Moon};
 use super::night::{NightSky, StarField};
-use super::quadrature::SphereQuadrature;
 use super::sh::{self, Sh9Rgb};
 use super::sun::{SUN_ANGULAR_RADIUS, SunPosition, direction_from};
-
-/// Rings a hemisphere and azimuths with which the sky is projected onto spherical harmonics.
-const SH_RINGS: usize = 24;
-const SH_AZIMUTHS: usize = 64;
+use super::surroundings::{Surroundings, ground_radiance, sky_illuminance};
 
 /// With the sun higher than this (sine of 5 degrees) moonlight is below 2e-4 of the daylight, and left out; it fades
 /// in below.
@@ -121,6 +115,8 @@ pub struct LightState {
     pub sky_sh: Sh9Rgb,
     /// Illuminance of the sky (without disc) on the horizontal ground, lux per channel, integrated from the picture.
     pub sky_illuminance: Vec3,
+    /// Radiance of the level ground under sky and key light, nits per channel.
+    pub ground_radiance: Vec3,
     /// The picture of the sky: sunlit air, moonlit air, night sky; without discs and single stars.
     pub sky_view: SkyView,
     /// The illuminance that exposure adapts to, lux: a function of the sun's elevation and the moon only.
@@ -188,8 +184,12 @@ impl LightState {
             _ => (KeyLight::Sun, sun_direction, sun_illuminance, SUN_ANGULAR_RADIUS as f32),
         };
 
-        let (sky_sh, sky_illuminance) =
-            project_sky(&sky_view, key_illuminance * key_direction.y.max(0.0), params.ground_albedo);
+        let sky_illuminance = sky_illuminance(&sky_view);
+        let key_horizontal = key_illuminance * key_direction.y.max(0.0);
+        let ground_radiance = ground_radiance(params.ground_albedo, sky_illuminance + key_horizontal);
+        let mut sky_sh = [Vec3::ZERO; 9];
+        sky_sh.copy_from_slice(&Surroundings { sky: &sky_view, ground: ground_radiance }.project(3));
+        sh::window_nonnegative(&mut sky_sh);
 
         let adaptation_illuminance = adaptation(atmosphere, sun_direction, moon.as_ref(), &settings.night);
         let ev100 = settings.exposure.ev100(adaptation_illuminance);
@@ -202,6 +202,7 @@ impl LightState {
             key_angular_radius,
             sky_sh,
             sky_illuminance,
+            ground_radiance,
             adaptation_illuminance,
             ev100,
             exposure: exposure_from_ev100(ev100),
@@ -221,6 +222,11 @@ impl LightState {
         })
     }
 
+    /// What lights a plant beside the key light's disc, in full: to be looked up, or projected at any band.
+    pub fn surroundings(&self) -> Surroundings<'_> {
+        Surroundings { sky: &self.sky_view, ground: self.ground_radiance }
+    }
+
     /// The colour in nits, per channel, that fog has in the direction `view`: the sky's, and below the horizon the
     /// horizon's.
     pub fn fog_radiance(&self, view: Vec3) -> Vec3 {
@@ -231,29 +237,6 @@ impl LightState {
     pub fn horizontal_illuminance(&self) -> Vec3 {
         self.sky_illuminance + self.key_illuminance * self.key_direction.y.max(0.0)
     }
-}
-
-/// Projects the sky, with the ground's diffuse reflection below it; also returns the sky's horizontal illuminance.
-fn project_sky(view: &SkyView, key_horizontal: Vec3, albedo: Vec3) -> (Sh9Rgb, Vec3) {
-    let rule = SphereQuadrature::new(SH_RINGS, SH_AZIMUTHS);
-    let mut radiance = [Vec3::ZERO; 9];
-    let mut sky_illuminance = Vec3::ZERO;
-    let mut add = |direction: Vec3, light: Vec3| {
-        for (c, y) in radiance.iter_mut().zip(sh::basis9(direction)) {
-            *c += light * y;
-        }
-    };
-    for &(direction, solid_angle) in rule.upper() {
-        let light = view.sample(direction) * solid_angle;
-        sky_illuminance += light * direction.y;
-        add(direction, light);
-    }
-    let bounce = albedo / PI * (sky_illuminance + key_horizontal);
-    for &(direction, solid_angle) in rule.lower() {
-        add(direction, bounce * solid_angle);
-    }
-    sh::window_nonnegative(&mut radiance);
-    (radiance, sky_illuminance)
 }
 
 /// The horizontal illuminance, lux, that exposure adapts to. The real moon counts with what it gives; the moon
