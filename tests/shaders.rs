@@ -9,7 +9,7 @@ use std::{
 use canopy::{
     light::atmosphere::SkyView,
     render::{
-        forest::{ForestViewUniform, PartUniform, PlaneUniform, PlantVertex, VariantUniform},
+        forest::{ForestViewUniform, PartUniform, PlaneUniform, PlantVertex, TransferUniform, VariantUniform},
         frame::uniforms::{CascadeUniform, FrameUniform, LightUniform, MAX_CASCADES, NOISE_PERIOD, ShadowUniform},
         shaders::SOURCES,
         sun_shadow::CascadeViewUniform,
@@ -26,7 +26,7 @@ use naga::{
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 
 /// All that the pipelines switch on or off.
-const DEFINES: [&str; 2] = ["FOLIAGE", "ALPHA_TO_COVERAGE"];
+const DEFINES: [&str; 3] = ["FOLIAGE", "ALPHA_TO_COVERAGE", "TRANSFER"];
 
 /// All combinations of [`DEFINES`].
 fn variants() -> impl Iterator<Item = Vec<&'static str>> {
@@ -206,6 +206,7 @@ fn gpu_structs_are_what_the_shaders_think() {
     twin!(layouts, "Plane", PlaneUniform { center, u, v, normal });
     twin!(layouts, "Variant", VariantUniform { planes, size, transmission, spread });
     twin!(layouts, "Part", PartUniform { base_color, transmission });
+    twin!(layouts, "Transfer", TransferUniform { scale, form });
     twin!(layouts, "Tree", PackedTree { xz, y, cell, look });
     twin!(layouts, "Tile", GpuTile { origin, spacing, first, morph_start, morph_end, clearance, level });
     twin!(layouts, "TileVertex", GpuTileVertex { height, parent_height, normal, parent_normal });
@@ -223,6 +224,7 @@ fn every_bound_struct_has_its_twin_tested() {
         "ForestView",
         "Variant",
         "Part",
+        "Transfer",
         "Tree",
         "Tile",
         "TileVertex",

@@ -28,15 +28,20 @@ fn sphere_cosine(cosine: f32) -> f32 {
     return (sqrt(1.0 - c * c) + acos(-c) * c) * 0.21220659;
 }
 
-// Exitant radiance towards the viewer; `visibility` of the key light in 0..1.
-fn shade(surface: Surface, visibility: f32) -> vec3<f32> {
+// What the surroundings bring to a surface that sees the share `ambient` of them evenly, over pi.
+fn even_sky(surface: Surface) -> vec3<f32> {
+    let through = surface.transmission * sky_irradiance(-surface.normal) * 0.5;
+    return (sky_irradiance(surface.normal) + through) * surface.ambient;
+}
+
+// Exitant radiance towards the viewer; `visibility` of the key light in 0..1, `sky`: irradiance of the surroundings over pi,
+// what is transmitted included.
+fn shade(surface: Surface, visibility: f32, sky: vec3<f32>) -> vec3<f32> {
     let cosine = dot(surface.normal, light.key_direction.xyz);
     let between = dot(surface.viewer, light.key_direction.xyz);
     let front = mix(max(cosine, 0.0), sphere_cosine(between), surface.spread);
     let back = mix(max(-cosine, 0.0), sphere_cosine(-between), surface.spread);
     let direct = (front + back * surface.transmission) * visibility
         * light.key_illuminance.rgb * INVERSE_PI;
-    var ambient = sky_irradiance(surface.normal);
-    ambient += surface.transmission * sky_irradiance(-surface.normal) * 0.5;
-    return surface.albedo * (direct + ambient * surface.ambient);
+    return surface.albedo * (direct + sky);
 }

@@ -1,7 +1,7 @@
 // Crossed billboards [Franzke 2005, 4.3]: two upright planes and a level one, eighteen pulled vertices a tree.
 #import canopy::frame::{frame, light}
 #import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, cross_threshold, tint_foliage, stand_ambient, scattered, leaf_visibility}
-#import canopy::lighting::{Surface, shade}
+#import canopy::lighting::{Surface, shade, even_sky}
 #import canopy::sky::{apply_fog, night_vision}
 #import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
 
@@ -104,7 +104,8 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.viewer = -normalize(in.relative);
     surface.spread = leaf_spread(in.layer / PLANES, level) * foliage;
     let map = ground_map(in.relative);
-    surface.ambient = scattered(properties.b) * stand_ambient(in.look.z, map.y);
+    let traced = variants[in.layer / PLANES].transmission.w > 0.5;
+    surface.ambient = select(scattered(properties.b), properties.b, traced) * stand_ambient(in.look.z, map.y);
     var visibility = terrain_visibility(map, in.look.y);
     if visibility > 0.0 {
         // The picture stands for a round crown: what faces the light lies before the plane that casts the shadow, what
@@ -117,7 +118,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         visibility *= mix(own, near.x * mix(0.75, 1.0, own), near.y);
     }
     visibility *= mix(1.0, leaf_visibility(properties.b), foliage);
-    var color = shade(surface, visibility);
+    var color = shade(surface, visibility, even_sky(surface));
     if frame.flags.y > 0.5 {
         color = mix(color, vec3(0.2, 0.35, 1.0) * dot(color, vec3(0.5)), 0.6);
     }

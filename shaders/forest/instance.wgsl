@@ -32,7 +32,7 @@ struct Variant {
     planes: array<Plane, 3>,
     // x: height in metres, y: crown radius, z: first layer of its pictures, w: 1 where it has a full model.
     size: vec4<f32>,
-    // Transmission of its leaves.
+    // Transmission of its leaves; w: 1 where k_a was traced and holds what leaves send each other.
     transmission: vec4<f32>,
     // How far the leaves of a texel face everywhere, 0..1, mip by mip.
     spread: array<vec4<f32>, 2>,
@@ -43,6 +43,8 @@ struct Instance {
     position: vec3<f32>,
     // Cosine and sine of the yaw.
     yaw: vec2<f32>,
+    // The yaw in 256ths of a turn.
+    yaw_code: u32,
     scale: f32,
     variant: u32,
     // -1..1
@@ -58,8 +60,10 @@ fn unpack_tree(tree: Tree) -> Instance {
     let cell = vec2(extractBits(bitcast<i32>(tree.cell), 0u, 16u), extractBits(bitcast<i32>(tree.cell), 16u, 16u));
     let offset = vec2(f32(tree.xz & 0xffffu), f32(tree.xz >> 16u)) * (view.cell_size / 65535.0);
     let xz = vec2<f32>(cell - view.anchor_cell) * view.cell_size + (offset - view.anchor_offset);
-    let yaw = f32(tree.look & 0xffu) * (6.28318531 / 256.0);
+    let yaw_code = tree.look & 0xffu;
+    let yaw = f32(yaw_code) * (6.28318531 / 256.0);
     var instance: Instance;
+    instance.yaw_code = yaw_code;
     instance.position = vec3(xz.x, tree.y - view.anchor_y, xz.y);
     instance.yaw = vec2(cos(yaw), sin(yaw));
     instance.scale = exp2(f32((tree.look >> 8u) & 0xfffu) * (8.0 / 4095.0) - 4.0);

@@ -1,9 +1,13 @@
 // The full model of a tree, near the camera.
 #import canopy::frame::{frame, light}
 #import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, model_threshold, tint_foliage, stand_ambient, scattered, leaf_visibility}
-#import canopy::lighting::{Surface, shade}
+#import canopy::lighting::{Surface, shade, even_sky}
 #import canopy::sky::{apply_fog, night_vision}
 #import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
+
+#ifdef TRANSFER
+#import canopy::transfer::side_light
+#endif
 
 struct Part {
     base_color: vec4<f32>,
@@ -34,10 +38,15 @@ struct Varying {
     // Ambient visibility, height above the foot in metres, relative height in the crown, tint.
     @location(3) look: vec4<f32>,
     @location(4) threshold: f32,
+#ifdef TRANSFER
+    // Irradiance of the surroundings over pi on the side of the normal and on the other.
+    @location(5) front_sky: vec3<f32>,
+    @location(6) back_sky: vec3<f32>,
+#endif
 }
 
 @vertex
-fn vertex(in: Vertex, @builtin(instance_index) index: u32) -> Varying {
+fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index) vertex: u32) -> Varying {
     let tree = unpack_tree(trees[visible[index]]);
     let local = turn(in.position, tree.yaw) * tree.scale;
     let relative = tree.position + local;
@@ -52,6 +61,14 @@ fn vertex(in: Vertex, @builtin(instance_index) index: u32) -> Varying {
     let height = max(variants[tree.variant].size.x * tree.scale, 0.01);
     out.look = vec4(ambient, local.y, local.y / height, tree.tint);
     out.threshold = model_threshold(length(tree.position.xz));
+#ifdef TRANSFER
+    out.front_sky = side_light(vertex, 0u, tree.yaw_code);
+#ifdef FOLIAGE
+    out.back_sky = side_light(vertex, 1u, tree.yaw_code);
+#else
+    out.back_sky = vec3(0.0);
+#endif
+#endif
     return out;
 }
 
@@ -98,9 +115,8 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
     }
 #endif
     // A leaf has two sides, and its own normal is that of the side that is seen.
-    if part.transmission.w < 0.5 && dot(normal, in.relative) > 0.0 {
-        normal = -normal;
-    }
+    let behind = part.transmission.w < 0.5 && dot(normal, in.relative) > 0.0;
+    normal = select(normal, -normal, behind);
 #else
     normal = detail_normal(normal, in.relative, in.uv);
     let keep = hash(vec3(in.uv * 97.0, in.look.y * 31.0));
@@ -116,16 +132,30 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
     surface.normal = normal;
     surface.transmission = part.transmission.rgb;
     let map = ground_map(in.relative);
-    surface.ambient = scattered(in.look.x) * stand_ambient(in.look.z, map.y);
+    let stand = stand_ambient(in.look.z, map.y);
+#ifdef TRANSFER
+#ifdef FOLIAGE
+    let near_sky = select(in.front_sky, in.back_sky, behind);
+    let far_sky = select(in.back_sky, in.front_sky, behind);
+    let sky = (near_sky + surface.transmission * far_sky) * stand;
+#else
+    let sky = in.front_sky * stand;
+#endif
+#else
+    surface.ambient = scattered(in.look.x) * stand;
+    let sky = even_sky(surface);
+#endif
     var visibility = terrain_visibility(map, in.look.y);
     if visibility > 0.0 {
         let near = cascaded_visibility(in.relative, normal, 1.0, in.clip.xy);
         visibility *= mix(1.0, near.x, near.y);
     }
 #ifdef FOLIAGE
+#ifndef TRANSFER
     visibility *= leaf_visibility(in.look.x);
 #endif
-    var color = shade(surface, visibility);
+#endif
+    var color = shade(surface, visibility, sky);
     if frame.flags.y > 0.5 {
         color = mix(color, vec3(0.15, 0.9, 0.2) * dot(color, vec3(0.5)), 0.6);
     }

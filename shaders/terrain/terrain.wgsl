@@ -1,6 +1,6 @@
 // The ground: tiles that morph into each other (src/terrain/tiles), coloured by slope, height, canopy cover and noise.
 #import canopy::frame::{frame, light, shadow}
-#import canopy::lighting::{Surface, shade}
+#import canopy::lighting::{Surface, shade, even_sky}
 #import canopy::sky::{apply_fog, night_vision}
 #import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
 
@@ -136,6 +136,6 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         let between = select(pow(max(1.0 - 0.92 * cover, 0.02), 1.0 / sine), 1.0, outside);
         visibility *= mix(between, near.x, near.y);
     }
-    let color = shade(surface, visibility);
+    let color = shade(surface, visibility, even_sky(surface));
     return vec4(night_vision(apply_fog(color, in.relative)), 1.0);
 }

@@ -9,6 +9,7 @@ use crate::{
         billboard::CrossSettings,
         implicit::{ImplicitSettings, NormalSource},
         lighting::LightingSettings,
+        transfer::{Channels, Interior, TransferSettings},
     },
     plant::{
         Plant,
@@ -144,6 +145,16 @@ fn lighting_settings(lighting: Option<&Lighting>) -> LightingSettings {
     match lighting {
         None => LightingSettings::default(),
         Some(Lighting::Local) => LightingSettings::Local,
+        Some(Lighting::Transfer(transfer)) => LightingSettings::Transfer(TransferSettings {
+            bands: transfer.bands.min(u8::MAX.into()) as u8,
+            channels: if transfer.color { Channels::Rgb } else { Channels::One },
+            rays: transfer.rays,
+            projection: TransferSettings::default().projection,
+            interior: match transfer.bounces.min(u8::MAX.into()) as u8 {
+                0 => Interior::Straight(1),
+                bounces => Interior::Diffuse(bounces),
+            },
+        }),
         Some(Lighting::Expressive(expressive)) => {
             let default = ImplicitSettings::default();
             let number = |value: Option<f64>| value.map(|value| value as f32);

@@ -4,12 +4,16 @@
 //! |---|---|--:|
 //! | [`LightingSettings::Local`] | nothing | 0 |
 //! | [`LightingSettings::Expressive`] | realigned normals, k_a ([`super::implicit`]) | 0: k_a is the normal's length |
+//! | [`LightingSettings::Transfer`] | how the sky reaches each side of each vertex ([`super::transfer`]) | see there; 20 for foliage with 3 bands |
 //!
 //! The models are alternatives: what a plant does not use is neither baked, nor kept, nor uploaded.
+
+use std::sync::Arc;
 
 use glam::Vec3;
 
 use super::implicit::{ImplicitSettings, NoSurface, bake_implicit};
+use super::transfer::{PackedPart, PackedTransfer, TransferFormat, TransferSettings, bake_transfer};
 use crate::plant::Plant;
 
 /// Which light a plant gets.
@@ -19,11 +23,13 @@ pub enum LightingSettings {
     Local,
     /// Normals and ambient term of the crown's implicit surface [Luft 2007].
     Expressive(ImplicitSettings),
+    /// The sky by radiance transfer, the sun by the leaves' own normals and the shadow map [Franzke 2005, 4.2].
+    Transfer(TransferSettings),
 }
 
 impl Default for LightingSettings {
     fn default() -> Self {
-        Self::Expressive(ImplicitSettings::default())
+        Self::Transfer(TransferSettings::default())
     }
 }
 
@@ -33,6 +39,7 @@ impl LightingSettings {
         match self {
             Self::Local => Self::Local,
             Self::Expressive(settings) => Self::Expressive(settings.in_range()),
+            Self::Transfer(settings) => Self::Transfer(settings.in_range()),
         }
     }
 }
@@ -45,6 +52,8 @@ pub enum BakedLighting {
     Local,
     /// Of the implicit surface.
     Expressive(ExpressiveLighting),
+    /// Of radiance transfer.
+    Transfer(TransferLighting),
 }
 
 /// What is kept of an implicit surface's bake.
@@ -58,15 +67,47 @@ pub struct ExpressiveLighting {
     pub no_surface: Option<NoSurface>,
 }
 
+/// What is kept of a transfer bake.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TransferLighting {
+    /// The coefficients, as the vertex shader reads them.
+    pub packed: PackedTransfer,
+    /// k_a, 0..=1: the light under an even sky of both sides, as a share of what they would get in the open.
+    pub ambient: Vec<Vec<f32>>,
+}
+
+impl TransferLighting {
+    /// With k_a from the coefficients.
+    pub fn new(packed: PackedTransfer) -> Self {
+        /// The first coefficient of a side in the open.
+        const OPEN: f32 = 0.282_094_79;
+        let baked = packed.unpack();
+        let count = baked.settings.coefficients();
+        let channels = baked.settings.channels.count();
+        let mean = |side: &[f32]| side.iter().take(channels).sum::<f32>() / channels as f32;
+        let ambient = baked.parts.iter().map(|part| {
+            let front = part.front.chunks_exact(count).map(mean);
+            let back = part.back.chunks_exact(count).map(mean).map(Some).chain(std::iter::repeat(None));
+            let both = front.zip(back).map(|(front, back)| back.map_or(front, |back| 0.5 * (front + back)));
+            both.map(|first| (first / OPEN).clamp(0.0, 1.0)).collect()
+        });
+        Self { ambient: ambient.collect(), packed }
+    }
+}
+
 impl BakedLighting {
     /// Bakes what `settings` ask for.
-    pub fn bake(plant: &Plant, settings: &LightingSettings) -> Self {
+    pub fn bake(plant: &Arc<Plant>, settings: &LightingSettings) -> Self {
         match settings {
             LightingSettings::Local => Self::Local,
             LightingSettings::Expressive(settings) => {
                 let baked = bake_implicit(plant, settings);
                 let no_surface = baked.report.no_surface;
                 Self::Expressive(ExpressiveLighting { normals: baked.normals, ambient: baked.ambient, no_surface })
+            }
+            LightingSettings::Transfer(settings) => {
+                let packed = bake_transfer(plant, settings).pack(TransferFormat::Snorm8);
+                Self::Transfer(TransferLighting::new(packed))
             }
         }
     }
@@ -86,6 +127,15 @@ impl BakedLighting {
         match self {
             Self::Local => &[],
             Self::Expressive(lighting) => lighting.ambient.get(part).map_or(&[], Vec::as_slice),
+            Self::Transfer(lighting) => lighting.ambient.get(part).map_or(&[], Vec::as_slice),
+        }
+    }
+
+    /// The transfer of part `part`, with its settings; `None` where another model lights the plant.
+    pub fn transfer(&self, part: usize) -> Option<(&TransferSettings, &PackedPart)> {
+        match self {
+            Self::Transfer(TransferLighting { packed, .. }) => Some((&packed.settings, packed.parts.get(part)?)),
+            _ => None,
         }
     }
 
@@ -97,6 +147,7 @@ impl BakedLighting {
             Self::Expressive(lighting) => {
                 lighting.normals.iter().map(Vec::len).eq(counts()) && lighting.ambient.iter().map(Vec::len).eq(counts())
             }
+            Self::Transfer(lighting) => lighting.ambient.iter().map(Vec::len).eq(counts()),
         }
     }
 
@@ -109,7 +160,7 @@ impl BakedLighting {
     pub fn warning(&self) -> Option<String> {
         match self {
             Self::Expressive(lighting) => lighting.no_surface.map(|reason| reason.to_string()),
-            Self::Local => None,
+            Self::Local | Self::Transfer(_) => None,
         }
     }
 }

@@ -24,6 +24,7 @@ pub const SOURCES: &[(&str, &str)] = sources![
     "common/sun_visibility.wgsl",
     "common/lighting.wgsl",
     "forest/instance.wgsl",
+    "forest/transfer.wgsl",
     "forest/model.wgsl",
     "forest/cross.wgsl",
     "sun_shadow/caster.wgsl",

@@ -13,6 +13,28 @@ pub enum Lighting {
     Local,
     /// By the implicit surface of the crown [Luft 2007]: light follows the crown's shape, its inside is dark.
     Expressive(Expressive),
+    /// The sky by radiance transfer, the sun by shadow maps [Franzke 2005]: nearest to the truth.
+    Transfer(Transfer),
+}
+
+/// Radiance transfer.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Transfer {
+    /// Bands of spherical harmonics, 2 to 6. More: truer, and memory grows with the square. Default 3.
+    pub bands: u32,
+    /// Whether light takes on colour on its way through the crown; three times the memory. Default false.
+    pub color: bool,
+    /// Rays of a vertex, 16 to 16384. More: a slower bake with less noise. Default 256.
+    pub rays: u32,
+    /// How often light is followed from leaf to leaf, 0 to 8; 0: straight through leaves only. Default 3.
+    pub bounces: u32,
+}
+
+impl Default for Transfer {
+    fn default() -> Self {
+        Self { bands: 3, color: false, rays: 256, bounces: 3 }
+    }
 }
 
 /// The light of an implicit surface. What is left out follows from the plant.
@@ -49,6 +71,11 @@ pub enum CrownNormals {
 
 impl Lighting {
     pub(super) fn check(&self, at: &str, check: &mut Check) {
+        if let Self::Transfer(transfer) = self {
+            check.count(&format!("{at}.lighting.bands"), transfer.bands, 2..=6);
+            check.count(&format!("{at}.lighting.rays"), transfer.rays, 16..=16_384);
+            check.count(&format!("{at}.lighting.bounces"), transfer.bounces, 0..=8);
+        }
         let Self::Expressive(expressive) = self else { return };
         let mut number = |name: &str, value: Option<f64>, range: RangeInclusive<f64>, unit: &str| {
             if let Some(value) = value {

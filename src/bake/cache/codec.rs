@@ -17,12 +17,16 @@ use glam::{Vec2, Vec3};
 use crate::bake::BakedPlant;
 use crate::bake::billboard::{Cross, CrossPlane, CrossTextures, SPREAD_LEVELS};
 use crate::bake::implicit::NoSurface;
-use crate::bake::lighting::{BakedLighting, ExpressiveLighting};
+use crate::bake::lighting::{BakedLighting, ExpressiveLighting, TransferLighting};
+use crate::bake::transfer::{
+    Channels, Interior, PackedPart, PackedTransfer, Projection, TransferFormat, TransferSettings,
+};
+use crate::light::sh::MAX_BANDS;
 use crate::plant::texture::MipChain;
 use crate::plant::{Plant, PlantMesh};
 
 /// Version of the format *and* of the bakes: to be raised whenever either gives other bytes for the same input.
-pub(super) const VERSION: u32 = 3;
+pub(super) const VERSION: u32 = 4;
 
 const MAGIC: [u8; 8] = *b"CANOPYBK";
 const HEAD: usize = 52;
@@ -31,6 +35,7 @@ const PAYLOAD: usize = HEAD + 32;
 /// What a file says of the lighting that it holds.
 const LOCAL: u32 = 0;
 const EXPRESSIVE: u32 = 1;
+const TRANSFER: u32 = 2;
 
 /// The file of a baked plant; the plant itself is not in it.
 pub(super) fn encode(baked: &BakedPlant, key: &[u8; 32]) -> Vec<u8> {
@@ -134,6 +139,29 @@ impl Writer {
                 self.float(first);
                 self.float(second);
             }
+            BakedLighting::Transfer(TransferLighting { packed, .. }) => {
+                self.count(TRANSFER);
+                let settings = &packed.settings;
+                self.count(u32::from(settings.bands));
+                self.count(settings.channels.count() as u32);
+                self.count(settings.rays);
+                self.count(match settings.projection {
+                    Projection::Quadrature => 0,
+                    Projection::Fit => 1,
+                });
+                let (kind, number) = match settings.interior {
+                    Interior::Straight(leaves) => (0, leaves),
+                    Interior::Diffuse(bounces) => (1, bounces),
+                };
+                self.count(kind);
+                self.count(u32::from(number));
+                self.list(&packed.parts, |out, part| {
+                    out.count(part.sides as u32);
+                    part.scale.iter().for_each(|scale| out.float(*scale));
+                    out.count(part.bytes.len() as u32);
+                    out.0.extend_from_slice(&part.bytes);
+                });
+            }
         }
     }
 
@@ -195,8 +223,46 @@ impl Reader<'_> {
                 };
                 Some(BakedLighting::Expressive(ExpressiveLighting { normals, ambient, no_surface }))
             }
+            TRANSFER => self.transfer().map(|packed| BakedLighting::Transfer(TransferLighting::new(packed))),
             _ => None,
         }
+    }
+
+    fn transfer(&mut self) -> Option<PackedTransfer> {
+        let settings = TransferSettings {
+            bands: self.count()?.try_into().ok()?,
+            channels: match self.count()? {
+                1 => Channels::One,
+                3 => Channels::Rgb,
+                _ => return None,
+            },
+            rays: self.count()?,
+            projection: match self.count()? {
+                0 => Projection::Quadrature,
+                1 => Projection::Fit,
+                _ => return None,
+            },
+            interior: match (self.count()?, self.count()?.try_into().ok()?) {
+                (0, leaves) => Interior::Straight(leaves),
+                (1, bounces) => Interior::Diffuse(bounces),
+                _ => return None,
+            },
+        };
+        if settings != settings.in_range() {
+            return None;
+        }
+        let format = TransferFormat::Snorm8;
+        let parts = self.list(|r| {
+            let sides = (r.count()? as usize).clamp(1, 2);
+            let mut scale = [0.0; MAX_BANDS];
+            for value in &mut scale {
+                *value = r.float()?;
+            }
+            let length = r.count()? as usize;
+            let bytes = r.bytes(length)?.to_vec();
+            Some(PackedPart { sides, vertex_bytes: format.vertex_bytes(&settings, sides), scale, bytes })
+        })?;
+        Some(PackedTransfer { settings, format, parts })
     }
 
     fn mesh(&mut self) -> Option<PlantMesh> {

@@ -9,6 +9,7 @@
 mod pass;
 mod prepare;
 mod resources;
+mod transfer;
 mod vertex;
 
 use bevy::{
@@ -27,6 +28,7 @@ pub(crate) use prepare::{
 };
 pub(crate) use resources::{ForestLayouts, prepare_forests};
 pub use resources::{ForestViewUniform, GpuForests, PartUniform, PlaneUniform, VariantUniform};
+pub use transfer::TransferUniform;
 pub use vertex::PlantVertex;
 
 /// Draws [`Forest`](super::components::Forest)s.
@@ -40,10 +42,11 @@ impl Plugin for ForestPassPlugin {
             .init_gpu_resource::<GpuForests>()
             .init_gpu_resource::<PreparedForests>()
             .init_gpu_resource::<ForestPipelines>()
+            .init_gpu_resource::<transfer::TransferLight>()
             .init_resource::<ForestStatistics>()
             .add_systems(
                 Render,
-                (prepare_forests, prepare_view_lists, prepare::prepare_pipelines)
+                (prepare_forests, prepare_view_lists, transfer::prepare_transfer_light, prepare::prepare_pipelines)
                     .chain()
                     .in_set(RenderSystems::PrepareResources)
                     .after(super::frame::prepare_frame),

@@ -32,14 +32,19 @@ pub fn forest_pass(
 ) {
     let frame = frame.of(view.entity());
     let (target, depth, camera) = view.into_inner();
-    let (Some(frame), Some([wood, foliage, crosses])) = (frame, pipelines.current) else { return };
+    let (Some(frame), Some(current)) = (frame, pipelines.current) else { return };
     let something = forests.iter().any(|(entity, _)| {
         prepared.get(entity).is_some_and(|forest| forest.lists.model_count() + forest.lists.cross_count() > 0)
     });
-    let (Some(wood), Some(foliage), Some(crosses)) =
-        (cache.get_render_pipeline(wood), cache.get_render_pipeline(foliage), cache.get_render_pipeline(crosses))
-    else {
-        return;
+    let ready = |id| cache.get_render_pipeline(id);
+    let [wood, foliage] = current.models.map(ready);
+    let transfer = current.transfer.map(|ids| ids.map(ready));
+    let (Some(wood), Some(foliage), Some(crosses)) = (wood, foliage, ready(current.crosses)) else { return };
+    let (traced_wood, traced_foliage) = match transfer {
+        Some([Some(wood), Some(foliage)]) => (wood, foliage),
+        Some(_) => return,
+        // No part asks for these.
+        None => (wood, foliage),
     };
     if !something {
         return;
@@ -62,13 +67,24 @@ pub fn forest_pass(
         let Some(lists) = prepared.get(entity) else { continue };
         pass.set_bind_group(0, frame, &[]);
         pass.set_bind_group(1, &lists.bind_group, &[0]);
-        for (kind, pipeline) in [(PartKind::Wood, wood), (PartKind::Foliage, foliage)] {
+        for (kind, traced, pipeline) in [
+            (PartKind::Wood, false, wood),
+            (PartKind::Wood, true, traced_wood),
+            (PartKind::Foliage, false, foliage),
+            (PartKind::Foliage, true, traced_foliage),
+        ] {
             pass.set_render_pipeline(pipeline);
             for (range, parts) in lists.lists.models.iter().zip(&forest.parts) {
                 if range.is_empty() {
                     continue;
                 }
-                for part in parts.iter().filter(|part| part.kind == kind && part.model.index_count > 0) {
+                for part in parts.iter().filter(|part| part.kind == kind && part.transfer.is_some() == traced) {
+                    if part.model.index_count == 0 {
+                        continue;
+                    }
+                    if let Some(group) = &part.transfer {
+                        pass.set_bind_group(3, group, &[]);
+                    }
                     pass.set_bind_group(2, &part.bind_group, &[]);
                     pass.set_vertex_buffer(0, part.model.vertices.slice(..));
                     pass.set_index_buffer(part.model.indices.slice(..), IndexFormat::Uint32);

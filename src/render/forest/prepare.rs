@@ -23,6 +23,7 @@ use glam::{DVec3, IVec2};
 
 use super::{
     resources::{ForestLayouts, ForestViewUniform, GpuForest, GpuForests},
+    transfer::TransferLight,
     vertex::PlantVertex,
 };
 use crate::{
@@ -161,7 +162,7 @@ pub fn prepare_view_lists(
 /// What a pipeline of the forest pass depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum PipelineKey {
-    Model { kind: PartKind, format: TextureFormat, samples: u32 },
+    Model { kind: PartKind, transfer: bool, format: TextureFormat, samples: u32 },
     Cross { format: TextureFormat, samples: u32 },
 }
 
@@ -169,8 +170,19 @@ enum PipelineKey {
 #[derive(Resource, Default)]
 pub struct ForestPipelines {
     pipelines: HashMap<PipelineKey, CachedRenderPipelineId>,
-    /// Pipelines of the prepared view: wood, foliage, crosses.
-    pub current: Option<[CachedRenderPipelineId; 3]>,
+    /// Pipelines of the prepared view.
+    pub current: Option<CurrentPipelines>,
+}
+
+/// Pipelines of one view.
+#[derive(Clone, Copy, Debug)]
+pub struct CurrentPipelines {
+    /// Wood, foliage.
+    pub models: [CachedRenderPipelineId; 2],
+    /// The same of plants that are lit by radiance transfer, where there are any.
+    pub transfer: Option<[CachedRenderPipelineId; 2]>,
+    /// Crosses.
+    pub crosses: CachedRenderPipelineId,
 }
 
 /// Requests the pipelines that the view needs.
@@ -180,6 +192,7 @@ pub fn prepare_pipelines(
     layouts: Res<ForestLayouts>,
     shaders: Res<CanopyShaders>,
     cache: Res<PipelineCache>,
+    light: Res<TransferLight>,
     mut pipelines: ResMut<ForestPipelines>,
 ) {
     let Some(view) = &frame.view else {
@@ -187,18 +200,18 @@ pub fn prepare_pipelines(
         return;
     };
     let (format, samples) = (view.format, view.samples);
-    let keys = [
-        PipelineKey::Model { kind: PartKind::Wood, format, samples },
-        PipelineKey::Model { kind: PartKind::Foliage, format, samples },
-        PipelineKey::Cross { format, samples },
-    ];
-    let ids = keys.map(|key| {
-        *pipelines
-            .pipelines
+    let known = &mut pipelines.pipelines;
+    let mut pipeline = |key| {
+        *known
             .entry(key)
             .or_insert_with(|| cache.queue_render_pipeline(describe(key, &frame_layout.0, &layouts, &shaders)))
-    });
-    pipelines.current = Some(ids);
+    };
+    let mut models = |transfer| {
+        [PartKind::Wood, PartKind::Foliage].map(|kind| pipeline(PipelineKey::Model { kind, transfer, format, samples }))
+    };
+    let (plain, transfer) = (models(false), light.is_used().then(|| models(true)));
+    let crosses = pipeline(PipelineKey::Cross { format, samples });
+    pipelines.current = Some(CurrentPipelines { models: plain, transfer, crosses });
 }
 
 fn describe(
@@ -207,8 +220,9 @@ fn describe(
     layouts: &ForestLayouts,
     shaders: &CanopyShaders,
 ) -> RenderPipelineDescriptor {
+    let transfer = matches!(key, PipelineKey::Model { transfer: true, .. });
     let (label, path, group, buffers, format, samples, foliage, cull_mode) = match key {
-        PipelineKey::Model { kind, format, samples } => {
+        PipelineKey::Model { kind, format, samples, .. } => {
             let foliage = kind == PartKind::Foliage;
             let cull = (!foliage).then_some(Face::Back);
             let group = layouts.part.clone();
@@ -223,13 +237,18 @@ fn describe(
     if foliage {
         defs.push("FOLIAGE".into());
     }
+    let mut layout = vec![frame.clone(), layouts.instances.clone(), group];
+    if transfer {
+        defs.push("TRANSFER".into());
+        layout.push(layouts.transfer.clone());
+    }
     let to_coverage = samples > 1 && foliage;
     if to_coverage {
         defs.push("ALPHA_TO_COVERAGE".into());
     }
     RenderPipelineDescriptor {
         label: Some(label.into()),
-        layout: vec![frame.clone(), layouts.instances.clone(), group],
+        layout,
         vertex: VertexState {
             shader: shaders.get(path),
             shader_defs: defs.clone(),

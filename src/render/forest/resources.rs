@@ -25,9 +25,12 @@ use bevy::{
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use super::vertex::PlantVertex;
+use super::{
+    transfer::{TransferLight, TransferUniform},
+    vertex::PlantVertex,
+};
 use crate::{
-    bake::{BakedPlant, billboard::SPREAD_LEVELS},
+    bake::{BakedPlant, billboard::SPREAD_LEVELS, lighting::BakedLighting},
     plant::{
         PartKind, PlantMaterial, PlantMesh,
         texture::{MipChain, color_mips, leaf_mips, normal_mips},
@@ -79,7 +82,7 @@ pub struct VariantUniform {
     pub planes: [PlaneUniform; PLANES],
     /// Height, crown radius, first layer of its pictures, 1 where it has a full model.
     pub size: [f32; 4],
-    /// Transmission of its leaves.
+    /// Transmission of its leaves; w: 1 where k_a was traced and holds what leaves send each other.
     pub transmission: [f32; 4],
     /// How far the leaves of a texel face everywhere, mip by mip.
     pub spread: [[f32; 4]; SPREAD_LEVELS / 4],
@@ -104,6 +107,8 @@ pub struct ForestLayouts {
     pub part: BindGroupLayoutDescriptor,
     /// Group 2 of crosses.
     pub cross: BindGroupLayoutDescriptor,
+    /// Group 3: radiance transfer.
+    pub transfer: BindGroupLayoutDescriptor,
     part_sampler: Sampler,
     cross_sampler: Sampler,
 }
@@ -155,6 +160,17 @@ impl FromWorld for ForestLayouts {
                     (texture_2d_array(float), texture_2d_array(float), sampler(SamplerBindingType::Filtering)),
                 ),
             ),
+            transfer: BindGroupLayoutDescriptor::new(
+                "canopy_transfer",
+                &BindGroupLayoutEntries::sequential(
+                    ShaderStages::VERTEX,
+                    (
+                        storage_buffer_read_only_sized(false, None),
+                        storage_buffer_read_only_sized(false, None),
+                        uniform_buffer_sized(false, std::num::NonZeroU64::new(size_of::<TransferUniform>() as u64)),
+                    ),
+                ),
+            ),
             part_sampler: part_sampler(AddressMode::Repeat),
             cross_sampler: part_sampler(AddressMode::ClampToEdge),
         }
@@ -181,6 +197,8 @@ pub struct GpuPart {
     pub proxy: GpuMesh,
     /// Group 2.
     pub bind_group: BindGroup,
+    /// Group 3 of plants that are lit by radiance transfer.
+    pub transfer: Option<BindGroup>,
 }
 
 /// A forest's GPU side.
@@ -234,6 +252,7 @@ pub fn prepare_forests(
     queue: Res<RenderQueue>,
     pipelines: Res<PipelineCache>,
     mut forests: ResMut<GpuForests>,
+    mut transfer: ResMut<TransferLight>,
 ) {
     let forests = &mut *forests;
     forests.order = scene.forests.iter().map(|(entity, _)| *entity).collect();
@@ -252,7 +271,7 @@ pub fn prepare_forests(
             continue;
         }
         forests.generations += 1;
-        let made = upload(forest, forests.generations, &layouts, &device, &queue, &pipelines);
+        let made = upload(forest, forests.generations, &layouts, &mut transfer, &device, &queue, &pipelines);
         forests.forests.insert(*entity, made);
     }
 }
@@ -261,6 +280,7 @@ fn upload(
     forest: &Forest,
     generation: u64,
     layouts: &ForestLayouts,
+    transfer: &mut TransferLight,
     device: &RenderDevice,
     queue: &RenderQueue,
     pipelines: &PipelineCache,
@@ -270,7 +290,7 @@ fn upload(
     let parts = forest
         .plants
         .iter()
-        .map(|plant| upload_parts(plant, layouts, &mut textures, device, queue, pipelines))
+        .map(|plant| upload_parts(plant, layouts, &mut textures, transfer, device, queue, pipelines))
         .collect();
     let sizes: Vec<VariantSize> = forest.plants.iter().map(variant_size).collect();
     let variants: Vec<VariantUniform> =
@@ -303,10 +323,11 @@ fn variant(index: usize, plant: &BakedPlant, size: &VariantSize) -> VariantUnifo
             normal: plane.normal.extend(0.0).to_array(),
         };
     }
+    let traced = f32::from(u8::from(matches!(plant.lighting, BakedLighting::Transfer(_))));
     VariantUniform {
         planes,
         size: [size.height, size.radius, (index * PLANES) as f32, 1.0],
-        transmission: plant.cross.transmission.extend(0.0).to_array(),
+        transmission: plant.cross.transmission.extend(traced).to_array(),
         spread: bytemuck::cast(plant.cross.spread),
     }
 }
@@ -370,6 +391,7 @@ fn upload_parts(
     plant: &BakedPlant,
     layouts: &ForestLayouts,
     textures: &mut TextureShelf,
+    transfer: &mut TransferLight,
     device: &RenderDevice,
     queue: &RenderQueue,
     pipelines: &PipelineCache,
@@ -397,6 +419,7 @@ fn upload_parts(
             model: upload_mesh(&part.mesh, plant.lighting.normals(index), plant.lighting.ambient(index), device),
             proxy: upload_mesh(proxy, None, &[], device),
             bind_group,
+            transfer: plant.lighting.transfer(index).map(|part| transfer.bind_group(part, layouts, device, pipelines)),
         });
     }
     parts

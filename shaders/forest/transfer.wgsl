@@ -1,0 +1,53 @@
+// Radiance transfer [Franzke 2005, 4.2.3]: the twin of src/bake/transfer/evaluate.rs on coefficients that
+// src/bake/transfer/pack.rs packed.
+#define_import_path canopy::transfer
+
+struct Transfer {
+    // What 127 stands for in each band, relative to the first coefficient.
+    scale: array<vec4<f32>, 2>,
+    // Words from one vertex to the next, bytes from one side to the other, bands, channels.
+    form: vec4<u32>,
+}
+
+// Coefficients from one yaw's light to the next.
+const STRIDE: u32 = 36u;
+
+// The surroundings' light as a plant of each yaw sees it.
+@group(3) @binding(0) var<storage, read> turned_light: array<vec4<f32>>;
+@group(3) @binding(1) var<storage, read> coefficients: array<u32>;
+@group(3) @binding(2) var<uniform> transfer: Transfer;
+
+fn snorm_at(byte: u32) -> f32 {
+    return f32(extractBits(bitcast<i32>(coefficients[byte / 4u]), 8u * (byte % 4u), 8u)) / 127.0;
+}
+
+fn half_at(byte: u32) -> f32 {
+    return unpack2x16float(coefficients[byte / 4u])[(byte / 2u) % 2u];
+}
+
+// Irradiance over pi that the surroundings bring to a side of a vertex: 0 the normal's, 1 the other.
+fn side_light(vertex: u32, side: u32, yaw: u32) -> vec3<f32> {
+    let channels = transfer.form.w;
+    let colored = channels == 3u;
+    let first = 4u * vertex * transfer.form.x + side * transfer.form.y;
+    var mean = vec3(half_at(first));
+    if colored {
+        mean = vec3(mean.x, half_at(first + 2u), half_at(first + 4u));
+    }
+    let light = yaw * STRIDE;
+    var sum = turned_light[light].rgb;
+    var byte = first + 2u * channels;
+    for (var band = 1u; band < transfer.form.z; band += 1u) {
+        let scale = transfer.scale[band / 4u][band % 4u];
+        for (var i = band * band; i < (band + 1u) * (band + 1u); i += 1u) {
+            var value = vec3(snorm_at(byte));
+            if colored {
+                value = vec3(value.x, snorm_at(byte + 1u), snorm_at(byte + 2u));
+            }
+            sum += turned_light[light + i].rgb * value * scale;
+            byte += channels;
+        }
+    }
+    // A few bands can fall below zero where next to nothing arrives.
+    return max(sum * mean, vec3(0.0));
+}

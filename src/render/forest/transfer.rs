@@ -1,0 +1,166 @@
+//! Radiance transfer on the GPU: a part's coefficients, and the light turned into every yaw that a tree can have.
+//!
+//! A packed tree has one of 256 yaws, so the light is turned for all of them at once when it has changed, exactly and at
+//! any band, and a vertex does nothing but two dot products. Without a plant that is lit by transfer there is no buffer,
+//! no binding, and nothing is computed.
+
+use std::{f32::consts::TAU, sync::Arc};
+
+use bevy::{
+    ecs::{
+        resource::Resource,
+        system::{Res, ResMut},
+    },
+    render::{
+        render_resource::{BindGroup, BindGroupEntries, Buffer, BufferDescriptor, BufferUsages, PipelineCache},
+        renderer::{RenderDevice, RenderQueue},
+    },
+};
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use super::resources::ForestLayouts;
+use crate::{
+    bake::transfer::{PackedPart, TransferSettings},
+    light::{
+        LightState,
+        sh::{MAX_BANDS, rotate_y},
+    },
+    render::{extract::ExtractedScene, frame::PreparedFrame, gpu, report::FrameReport},
+};
+
+/// Yaws of a packed tree.
+const YAWS: usize = 256;
+/// Coefficients from one yaw's light to the next: those of all bands.
+const STRIDE: usize = MAX_BANDS * MAX_BANDS;
+
+/// `Transfer` of `shaders/forest/transfer.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct TransferUniform {
+    /// What 127 stands for in each band, relative to the first coefficient; two unused.
+    pub scale: [[f32; 4]; 2],
+    /// Words from one vertex to the next, bytes from one side to the other, bands, channels.
+    pub form: [u32; 4],
+}
+
+impl TransferUniform {
+    fn new(settings: &TransferSettings, part: &PackedPart) -> Self {
+        let mut scale = [0.0; 8];
+        scale[..MAX_BANDS].copy_from_slice(&part.scale);
+        let side = crate::bake::transfer::TransferFormat::Snorm8.side_bytes(settings) as u32;
+        let (words, channels) = (part.vertex_bytes as u32 / 4, settings.channels.count() as u32);
+        Self { scale: bytemuck::cast(scale), form: [words, side, settings.bands.into(), channels] }
+    }
+}
+
+/// The light of the moment, turned.
+#[derive(Resource, Default)]
+pub struct TransferLight {
+    buffer: Option<Buffer>,
+    /// Most bands that a plant asks for.
+    bands: usize,
+    /// What the buffer holds.
+    known: Option<(Arc<LightState>, f32, usize)>,
+}
+
+impl TransferLight {
+    /// Group 3 of a part.
+    pub fn bind_group(
+        &mut self,
+        (settings, part): (&TransferSettings, &PackedPart),
+        layouts: &ForestLayouts,
+        device: &RenderDevice,
+        pipelines: &PipelineCache,
+    ) -> BindGroup {
+        self.bands = self.bands.max(settings.bands.into());
+        let light = self.buffer.get_or_insert_with(|| {
+            device.create_buffer(&BufferDescriptor {
+                label: Some("canopy_turned_light"),
+                size: (YAWS * STRIDE * size_of::<[f32; 4]>()) as u64,
+                usage: BufferUsages::STORAGE | BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        });
+        let coefficients = gpu::buffer_with(device, "canopy_transfer", BufferUsages::STORAGE, &part.bytes);
+        let uniform = [TransferUniform::new(settings, part)];
+        let uniform = gpu::buffer_with(device, "canopy_transfer_layout", BufferUsages::UNIFORM, &uniform);
+        device.create_bind_group(
+            "canopy_transfer",
+            &pipelines.get_bind_group_layout(&layouts.transfer),
+            &BindGroupEntries::sequential((
+                light.as_entire_binding(),
+                coefficients.as_entire_binding(),
+                uniform.as_entire_binding(),
+            )),
+        )
+    }
+
+    /// Whether any plant is lit by transfer.
+    pub fn is_used(&self) -> bool {
+        self.buffer.is_some()
+    }
+}
+
+/// Turns the light where it, the exposure or the number of bands has changed.
+pub fn prepare_transfer_light(
+    scene: Res<ExtractedScene>,
+    frame: Res<PreparedFrame>,
+    queue: Res<RenderQueue>,
+    report: Res<FrameReport>,
+    mut transfer: ResMut<TransferLight>,
+) {
+    let transfer = &mut *transfer;
+    let Some(buffer) = &transfer.buffer else {
+        report.skipped("transfer light", "no plant is lit by radiance transfer");
+        return;
+    };
+    let (Some(view), Some(daylight)) = (&frame.view, &scene.daylight) else { return };
+    let same = |(light, exposure, bands): &(Arc<LightState>, f32, usize)| {
+        Arc::ptr_eq(light, &daylight.0) && *exposure == view.exposure && *bands == transfer.bands
+    };
+    if transfer.known.as_ref().is_some_and(same) {
+        report.skipped("transfer light", "the light rests");
+        return;
+    }
+    let light = daylight.0.surroundings().project(transfer.bands);
+    queue.write_buffer(buffer, 0, bytemuck::cast_slice(&turned(&light, view.exposure)));
+    transfer.known = Some((daylight.0.clone(), view.exposure, transfer.bands));
+    report.ran("transfer light", format!("{} bands turned into {YAWS} yaws", transfer.bands));
+}
+
+/// `light` as each yaw's plant sees it, times `exposure`; zeros beyond its bands.
+fn turned(light: &[Vec3], exposure: f32) -> Vec<[f32; 4]> {
+    (0..YAWS)
+        .flat_map(|yaw| {
+            let mut seen = light.to_vec();
+            rotate_y(&mut seen, -(yaw as f32) * TAU / YAWS as f32);
+            seen.resize(STRIDE, Vec3::ZERO);
+            seen.into_iter().map(|value| (value * exposure).extend(0.0).to_array())
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Quat;
+
+    use super::*;
+    use crate::light::sh::{basis, evaluate};
+
+    #[test]
+    fn a_plant_sees_the_light_turned_the_other_way() {
+        let sun = Vec3::new(0.6, 0.5, -0.4).normalize();
+        let light: Vec<Vec3> = basis::<16>(sun).map(Vec3::splat).to_vec();
+        let turned = turned(&light, 2.0);
+        assert_eq!(turned.len(), YAWS * STRIDE);
+        for yaw in [0, 1, 64, 200] {
+            let row: Vec<f32> = turned[yaw * STRIDE..][..16].iter().map(|value| value[0]).collect();
+            let in_plant = Vec3::new(0.1, 0.7, 0.7).normalize();
+            let in_world = Quat::from_rotation_y(yaw as f32 * TAU / YAWS as f32) * in_plant;
+            let expected = 2.0 * evaluate(&light, in_world).x;
+            assert!((evaluate(&row, in_plant) - expected).abs() < 1e-4, "{yaw}");
+            assert!(turned[yaw * STRIDE + 16..][..20].iter().flatten().all(|value| *value == 0.0));
+        }
+    }
+}
