@@ -245,7 +245,7 @@ fn against_visibility(plants: &[Plant]) {
         let leaves = || plant.parts.iter().zip(&visibility).filter(|(part, _)| part.kind == PartKind::Foliage);
         let wanted: Vec<f32> = leaves().flat_map(|(_, values)| values).copied().collect();
         let points: Vec<Vec3> = leaves().flat_map(|(part, _)| &part.mesh.positions).copied().collect();
-        for factor in [1.0f32, 2.0, 4.0, 8.0] {
+        for factor in [0.5f32, 1.0, 2.0, 4.0] {
             let radius = factor * automatic.radius;
             let settings =
                 ImplicitSettings { radius: Some(radius), surface: false, ..with(NormalSource::Gradient, 1.0) };
@@ -257,8 +257,8 @@ fn against_visibility(plants: &[Plant]) {
             let rank = correlation(&ranks(&negative), &ranks(&wanted));
             let mut best = (f64::INFINITY, automatic);
             for least in [0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4] {
-                for core in [0.5, 0.7, 1.0, 1.4, 2.0] {
-                    for exponent in [0.5, 0.7, 1.0, 1.4, 2.0, 3.0] {
+                for core in [0.5, 0.7, 1.0, 1.4, 2.0, 3.0] {
+                    for exponent in [0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0] {
                         let tried = ImplicitParameters { least, core: core * automatic.core, exponent, ..automatic };
                         let error = rmse(&densities, &wanted, &tried);
                         if error < best.0 {

@@ -8,7 +8,7 @@
 //! Generators and points are both sorted into compact groups of eight ([`partition`](super::partition)). For a group
 //! of points the tree over the generators is walked once: boxes that are out of reach are skipped, boxes that lie
 //! within reach as a whole give a polynomial ([`moments`](super::moments)), and what remains, the rim of the ball, is
-//! summed in pairs, eight points side by side in vector registers. So the time grows with the surface of the ball of
+//! summed in pairs, eight points side by side in vector registers (glam's, as compilers do not find them here). So the time grows with the surface of the ball of
 //! influence, and not with its volume: a large ρ is as cheap as a small one.
 //!
 //! Accuracy: pairs are f32, sums of pairs and polynomials f64. Rounding moves each 1 - (d/ρ)² by at most
@@ -16,7 +16,7 @@
 //! error of F is at most 1e-5 (measured: 1e-6), whatever the plant's size and place. Points are independent of each
 //! other, so the result is the same for any number of threads.
 
-use glam::{DVec3, Vec3, Vec3A};
+use glam::{DVec3, Vec3, Vec3A, Vec4};
 use rayon::prelude::*;
 
 use super::generators::{Generator, Weighting};
@@ -25,6 +25,8 @@ use super::partition::{self, Aabb, Node};
 
 /// Points that are evaluated side by side.
 const LANES: usize = 8;
+/// The registers of four that they fill.
+const HALVES: usize = LANES / 4;
 /// Generators of a group.
 const GROUP: usize = 8;
 /// Radii and coordinates beyond this many metres (and radii below its inverse) overflow f32 somewhere.
@@ -165,8 +167,11 @@ impl DensityField {
             return;
         }
         let order = partition::compact_order(points, LANES);
-        let found: Vec<[FieldSample; LANES]> =
-            order.par_chunks(LANES).with_min_len(16).map(|members| self.eight::<GRADIENT>(members)).collect();
+        let found: Vec<[FieldSample; LANES]> = order
+            .par_chunks(LANES)
+            .with_min_len(16)
+            .map_init(Vec::new, |rim, members| self.eight::<GRADIENT>(members, rim))
+            .collect();
         for (members, samples) in order.chunks(LANES).zip(&found) {
             for ((_, index), sample) in members.iter().zip(samples) {
                 put(*index as usize, *sample);
@@ -174,14 +179,17 @@ impl DensityField {
         }
     }
 
-    /// The field at up to eight points that lie together.
-    fn eight<const GRADIENT: bool>(&self, members: &[(Vec3, u32)]) -> [FieldSample; LANES] {
+    /// The field at up to eight points that lie together. `rim` is scratch space.
+    fn eight<const GRADIENT: bool>(&self, members: &[(Vec3, u32)], rim: &mut Vec<u32>) -> [FieldSample; LANES] {
         let lane = |i: usize| members[i.min(members.len() - 1)].0;
-        let points: [[f32; LANES]; 3] = std::array::from_fn(|axis| std::array::from_fn(|i| lane(i)[axis]));
+        let points: [[Vec4; 3]; HALVES] = std::array::from_fn(|half| {
+            std::array::from_fn(|axis| Vec4::from_array(std::array::from_fn(|i| lane(4 * half + i)[axis])))
+        });
         let region = Aabb::around(members.iter().map(|(point, _)| *point));
         let center = region.center();
-        let mut sums = Sums { value: [0.0; LANES], slope: [0.0; LANES], pull: [[0.0; LANES]; 3] };
-        let inside = self.walk(&region, |group| self.add_pairs::<GRADIENT>(group, &points, &mut sums));
+        rim.clear();
+        let inside = self.walk(&region, |group| rim.push(group));
+        let sums = self.pairs::<GRADIENT>(rim, &points);
 
         let radius = f64::from(self.radius);
         let polynomial = inside.map(|moments| moments.polynomial(radius));
@@ -208,9 +216,9 @@ impl DensityField {
         })
     }
 
-    /// Calls `pair` with each group at the rim of the ball around `region` and returns the moments, about the region's
+    /// Calls `at_rim` with each group at the rim of the ball around `region` and returns the moments, about the region's
     /// centre, of all generators that reach all of it.
-    fn walk(&self, region: &Aabb, mut pair: impl FnMut(&Group)) -> Option<Moments> {
+    fn walk(&self, region: &Aabb, mut at_rim: impl FnMut(u32)) -> Option<Moments> {
         let reach = self.radius * self.radius;
         let center = region.center().as_dvec3();
         let mut inside: Option<Moments> = None;
@@ -225,7 +233,7 @@ impl DensityField {
                 at = node.next as usize;
             } else {
                 if node.group != Node::INNER {
-                    pair(&self.groups[node.group as usize]);
+                    at_rim(node.group);
                 }
                 at += 1;
             }
@@ -233,34 +241,41 @@ impl DensityField {
         inside
     }
 
-    fn add_pairs<const GRADIENT: bool>(&self, group: &Group, points: &[[f32; LANES]; 3], sums: &mut Sums) {
-        let scale = (self.radius * self.radius).recip();
-        let [mut value, mut slope] = [[0.0f32; LANES]; 2];
-        let mut pull = [[0.0f32; LANES]; 3];
-        for k in 0..GROUP {
-            let (x, y, z, weight) = (group.x[k], group.y[k], group.z[k], group.weight[k]);
-            for i in 0..LANES {
-                let (dx, dy, dz) = (points[0][i] - x, points[1][i] - y, points[2][i] - z);
-                let t = 1.0 - (dx * dx + dy * dy + dz * dz) * scale;
-                let t = if t > 0.0 { t } else { 0.0 };
-                let wt = weight * t;
-                slope[i] += wt;
-                value[i] += wt * t;
+    /// Sums over the generators of the groups in `rim`.
+    fn pairs<const GRADIENT: bool>(&self, rim: &[u32], points: &[[Vec4; 3]; HALVES]) -> Sums {
+        /// Groups that are summed in f32 before their sum is added in f64.
+        const RUN: usize = 4;
+        let scale = Vec4::splat((self.radius * self.radius).recip());
+        let mut sums = Sums { value: [0.0; LANES], slope: [0.0; LANES], pull: [[0.0; LANES]; 3] };
+        for run in rim.chunks(RUN) {
+            for (half, [qx, qy, qz]) in points.iter().enumerate() {
+                let [mut value, mut slope, mut px, mut py, mut pz] = [Vec4::ZERO; 5];
+                for group in run.iter().map(|&group| &self.groups[group as usize]) {
+                    for k in 0..GROUP {
+                        let (dx, dy, dz) = (*qx - group.x[k], *qy - group.y[k], *qz - group.z[k]);
+                        let t = (Vec4::ONE - (dx * dx + dy * dy + dz * dz) * scale).max(Vec4::ZERO);
+                        let wt = t * group.weight[k];
+                        slope += wt;
+                        value += wt * t;
+                        if GRADIENT {
+                            px += wt * dx;
+                            py += wt * dy;
+                            pz += wt * dz;
+                        }
+                    }
+                }
+                let gather = |sum: &mut [f64; LANES], part: Vec4| {
+                    let sum = sum.iter_mut().skip(4 * half);
+                    sum.zip(part.to_array()).for_each(|(sum, part)| *sum += f64::from(part));
+                };
+                gather(&mut sums.value, value);
+                gather(&mut sums.slope, slope);
                 if GRADIENT {
-                    pull[0][i] += wt * dx;
-                    pull[1][i] += wt * dy;
-                    pull[2][i] += wt * dz;
+                    sums.pull.iter_mut().zip([px, py, pz]).for_each(|(sum, part)| gather(sum, part));
                 }
             }
         }
-        let gather = |sum: &mut [f64; LANES], part: &[f32; LANES]| {
-            sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += f64::from(*part));
-        };
-        gather(&mut sums.value, &value);
-        gather(&mut sums.slope, &slope);
-        if GRADIENT {
-            sums.pull.iter_mut().zip(&pull).for_each(|(sum, part)| gather(sum, part));
-        }
+        sums
     }
 
     /// The field at one point, in f64 throughout.
@@ -269,6 +284,7 @@ impl DensityField {
         let here = point.as_vec3().into();
         let (mut value, mut gradient) = (0.0, DVec3::ZERO);
         let inside = self.walk(&Aabb { min: here, max: here }, |group| {
+            let group = &self.groups[group as usize];
             for k in 0..GROUP {
                 let away = (point - DVec3::new(group.x[k].into(), group.y[k].into(), group.z[k].into())) / radius;
                 let t = (1.0 - away.length_squared()).max(0.0);

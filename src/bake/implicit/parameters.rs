@@ -2,10 +2,10 @@
 //!
 //! [Luft 2007, 3.1] sets ρ and τ by hand and finds that adequate values follow from the model's size. Here:
 //!
-//! - ρ: a twentieth of the plant's longest extent, but at least twice the mean distance of its leaves, so that a
+//! - ρ: a tenth of the plant's longest extent, but at least three times the mean distance of its leaves, so that a
 //!   sparse plant does not fall into single leaves;
 //! - τ: a share of the median of F at the leaves, so that the surface keeps close to the crown whatever its density;
-//! - d_min: where the densest tenth of the leaves begins;
+//! - d_min: where the densest quarter of the leaves begins;
 //! - k_a_min and n: constants, fitted to the ambient visibility of [`crate::bake::ambient`] on our own broadleaf and
 //!   conifer and on an oak, a pine and an aspen (`benches/implicit.rs` prints how well they do).
 
@@ -16,17 +16,17 @@ use super::generators::{Generator, Weighting, even_share};
 use super::partition::Aabb;
 
 /// ρ as a share of the plant's longest extent.
-const RADIUS_SHARE: f32 = 0.05;
+const RADIUS_SHARE: f32 = 0.1;
 /// ρ in mean distances between leaves, at least.
-const RADIUS_SPACINGS: f32 = 2.0;
+const RADIUS_SPACINGS: f32 = 3.0;
 /// τ as a share of the median of F at the leaves.
 const THRESHOLD_SHARE: f32 = 0.25;
 /// The share of the leaves at which F - τ is below d_min.
-const CORE_QUANTILE: f64 = 0.9;
+const CORE_QUANTILE: f64 = 0.75;
 /// k_a_min.
-const LEAST: f32 = 0.1;
+const LEAST: f32 = 0.2;
 /// n.
-const EXPONENT: f32 = 1.0;
+const EXPONENT: f32 = 3.0;
 /// Leaves that are asked for the density.
 const SAMPLES: usize = 4096;
 
@@ -214,8 +214,8 @@ mod tests {
         assert!((small.radius / 1.0e-4 / (large.radius / 1.0e3) - 1.0).abs() < 1e-4);
         assert!((small.threshold / large.threshold - 1.0).abs() < 1e-3);
         assert!((small.core / large.core - 1.0).abs() < 1e-2);
-        // Twice the distance of the leaves, as a twentieth of 20 would be too little.
-        assert!((1.5..2.5).contains(&(large.radius / 1.0e3)), "{}", large.radius);
+        // Three times the distance of the leaves, as a tenth of 20 would be too little.
+        assert!((2.3..3.5).contains(&(large.radius / 1.0e3)), "{}", large.radius);
         assert_eq!(radius(&[], 10.0, &ImplicitSettings::default()), 0.0);
     }
 }
