@@ -4,28 +4,31 @@
 //!    relative error of each against f64. The loop does every n-th vertex only (`--every`), and its time is multiplied.
 //! 2. Field, surface and realigned normals together, and what follows from the model.
 //! 3. A share of the generators: angle between normals and difference of k_a to the full result, and time.
-//! 4. k_a against the ambient visibility of `bake::ambient` (a turbid medium, all directions): rank correlation, and
-//!    RMSE with the automatic values and with the best k_a_min, d_min and n of a search.
+//! 4. k_a against traced visibility (the share of the whole sphere that a ray out of the vertex reaches): rank correlation,
+//!    and RMSE with the automatic values and with the best k_a_min, d_min and n of a search.
 //!
 //! The tree is our own broadleaf with 60,000 triangles; where CANOPY_DATA names the data folder also its oak, pine
 //! and aspen. The contestants of a table take turns in one run; medians are printed, as Markdown.
 
 use std::hint::black_box;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
-use canopy::bake::ambient::{AmbientSettings, ambient_visibility};
 use canopy::bake::implicit::ambient_term::ambient_term;
 use canopy::bake::implicit::density::DensityField;
 use canopy::bake::implicit::generators::{Generator, generators};
 use canopy::bake::implicit::{
     ImplicitBake, ImplicitParameters, ImplicitSettings, NormalSource, Weighting, bake_implicit,
 };
+use canopy::bake::transfer::direction_set;
 use canopy::plant::gltf::{GltfOptions, load_plant};
 use canopy::plant::grow::{GrowParameters, grow};
-use canopy::plant::{PartKind, Plant};
+use canopy::plant::{PartKind, Plant, PlantMesh};
+use canopy::trace::{PlantTracer, Ray, offset_origin};
 use clap::Parser;
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 /// Cost and error of light from implicit surfaces.
 #[derive(Parser)]
@@ -234,13 +237,31 @@ fn rmse(densities: &[f32], wanted: &[f32], parameters: &ImplicitParameters) -> f
     (sum / wanted.len() as f64).sqrt()
 }
 
+/// The share of the sphere's directions in which nothing of the plant is met, vertex by vertex.
+fn traced_visibility(plant: &Plant) -> Vec<Vec<f32>> {
+    const DIRECTIONS: usize = 256;
+    let tracer = PlantTracer::new(&Arc::new(plant.clone()));
+    let directions = direction_set(DIRECTIONS as u32);
+    let seen = |mesh: &PlantMesh, vertex: usize| {
+        let (position, normal) = (mesh.positions[vertex], mesh.normals[vertex]);
+        let open = directions.iter().filter(|direction| {
+            let side = if normal.dot(**direction) < 0.0 { -normal } else { normal };
+            let origin = offset_origin(position, side, **direction);
+            !tracer.occluded(&Ray { origin, direction: **direction, t_max: f32::INFINITY })
+        });
+        open.count() as f32 / DIRECTIONS as f32
+    };
+    let of_part = |mesh: &PlantMesh| (0..mesh.positions.len()).into_par_iter().map(|v| seen(mesh, v)).collect();
+    plant.parts.iter().map(|part| of_part(&part.mesh)).collect()
+}
+
 fn against_visibility(plants: &[Plant]) {
     println!(
-        "\n| k_a against ambient visibility | ρ | rank correlation | RMSE, automatic | RMSE, fitted | k_a_min | d_min / automatic \
+        "\n| k_a against traced visibility | ρ | rank correlation | RMSE, automatic | RMSE, fitted | k_a_min | d_min / automatic \
          | n |\n|---|---|---|---|---|---|---|---|"
     );
     for plant in plants {
-        let visibility = ambient_visibility(plant, &AmbientSettings { least: 0.0, ..AmbientSettings::default() });
+        let visibility = traced_visibility(plant);
         let automatic = bake_implicit(plant, &with(NormalSource::Gradient, 1.0)).report.parameters;
         let leaves = || plant.parts.iter().zip(&visibility).filter(|(part, _)| part.kind == PartKind::Foliage);
         let wanted: Vec<f32> = leaves().flat_map(|(_, values)| values).copied().collect();

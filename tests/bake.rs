@@ -448,6 +448,7 @@ proptest! {
         let plant = Plant { name: String::new(), parts };
         let implicit =
             ImplicitSettings { radius: Some(radius), threshold: Some(threshold), ..ImplicitSettings::default() };
+        let plant = Arc::new(plant);
         let lighting = BakedLighting::bake(&plant, &LightingSettings::Expressive(implicit).in_range());
         prop_assert!(lighting.fits(&plant));
         for part in 0..plant.parts.len() {

@@ -33,15 +33,16 @@ struct Vertex {
 struct Varying {
     @builtin(position) clip: vec4<f32>,
     @location(0) relative: vec3<f32>,
-    @location(1) normal: vec3<f32>,
+    @location(1) @interpolate(perspective, centroid) normal: vec3<f32>,
     @location(2) uv: vec2<f32>,
-    // Ambient visibility, height above the foot in metres, relative height in the crown, tint.
-    @location(3) look: vec4<f32>,
+    // Ambient visibility, height above the foot in metres, relative height in the crown, tint. Light is taken inside the
+    // triangle: extrapolated to the middle of a pixel that a sliver of a leaf only touches, it would sparkle.
+    @location(3) @interpolate(perspective, centroid) look: vec4<f32>,
     @location(4) threshold: f32,
 #ifdef TRANSFER
     // Irradiance of the surroundings over pi on the side of the normal and on the other.
-    @location(5) front_sky: vec3<f32>,
-    @location(6) back_sky: vec3<f32>,
+    @location(5) @interpolate(perspective, centroid) front_sky: vec3<f32>,
+    @location(6) @interpolate(perspective, centroid) back_sky: vec3<f32>,
 #endif
 }
 
