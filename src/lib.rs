@@ -23,8 +23,8 @@
 //! }
 //! ```
 //!
-//! The rooms: [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`bake`], [`light`] and [`lod`]
-//! know no App and no GPU; [`render`] draws what they make; [`app`] is the interactive program. ARCHITECTURE.md in
+//! The rooms: [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`trace`], [`bake`], [`light`] and
+//! [`lod`] know no App and no GPU; [`render`] draws what they make; [`app`] is the interactive program. ARCHITECTURE.md in
 //! the repository shows how a tree gets from a file to a pixel.
 
 pub mod app;
