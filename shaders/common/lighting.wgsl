@@ -28,6 +28,14 @@ fn sphere_cosine(cosine: f32) -> f32 {
     return (sqrt(1.0 - c * c) + acos(-c) * c) * 0.21220659;
 }
 
+// Share of the sky's light that comes through the share `depth` (0..1) of a stand whose crowns cover the share `cover` of
+// the ground, by Beer and Lambert's law [Monsi & Saeki 1953]. The exponent is fitted to the path tracer in a stand of 300
+// stems a hectare: 1.5 would be the mean of the hemisphere over one layer of crowns, but crowns stand behind crowns. What
+// leaves pass on is the 0.05.
+fn sky_through(cover: f32, depth: f32) -> f32 {
+    return mix(0.05, 1.0, pow(1.0 - 0.92 * clamp(cover, 0.0, 1.0), 2.5 * clamp(depth, 0.0, 1.0)));
+}
+
 // What the surroundings bring to a surface that sees the share `ambient` of them evenly, over pi.
 fn even_sky(surface: Surface) -> vec3<f32> {
     let through = surface.transmission * sky_irradiance(-surface.normal) * 0.5;

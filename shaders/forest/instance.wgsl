@@ -1,6 +1,8 @@
 // Trees of 16 bytes: src/scatter/packed.rs packs what this unpacks.
 #define_import_path canopy::instance
 
+#import canopy::lighting::sky_through
+
 struct Tree {
     xz: u32,
     y: f32,
@@ -104,7 +106,7 @@ fn leaf_visibility(k: f32) -> f32 {
     return min(0.35 + 2.0 * k, 1.1);
 }
 
-// Light that the neighbours' crowns leave: darkest at the forest's floor.
+// Share of the sky that the neighbours' crowns leave at a relative height in the stand.
 fn stand_ambient(relative_height: f32, cover: f32) -> f32 {
-    return mix(1.0 - 0.55 * cover, 1.0, smoothstep(0.0, 0.95, relative_height));
+    return sky_through(cover, 1.0 - relative_height);
 }

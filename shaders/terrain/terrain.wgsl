@@ -1,6 +1,6 @@
 // The ground: tiles that morph into each other (src/terrain/tiles), coloured by slope, height, canopy cover and noise.
 #import canopy::frame::{frame, light, shadow}
-#import canopy::lighting::{Surface, shade, even_sky}
+#import canopy::lighting::{Surface, shade, even_sky, sky_through}
 #import canopy::sky::{apply_fog, night_vision}
 #import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
 
@@ -123,7 +123,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.albedo = albedo;
     surface.normal = normal;
     surface.transmission = vec3(0.0);
-    surface.ambient = (1.0 - 0.55 * cover) * (0.8 + 0.2 * grain.r);
+    surface.ambient = sky_through(cover, 1.0) * (0.8 + 0.2 * grain.r);
     if outside {
         surface.ambient = 0.85;
     }

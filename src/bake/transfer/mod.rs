@@ -28,13 +28,16 @@
 //! # Projection or fit
 //! The coefficients that reproduce the transfer function best are its projection; those that reproduce the light of
 //! the *skies that occur* best are a fit to them ([`Projection::Fit`]). Both are a fixed matrix applied to the sampled
-//! directions, so they cost the same. `benches/transfer.rs` has both, band by band; the fit is the default.
+//! directions, so they cost the same. `benches/transfer.rs` has both, band by band; the fit is the default. What it
+//! pays: with 2 bands a free level leaf gets 11 % too little of an even sky, with 3 or more less than 3 %.
 //!
 //! # Limits
 //! Light reaches a vertex from its own plant and from infinitely far away, not from its neighbours (4.3.3). The sun's
 //! disc is not meant to be put into the light: a few bands hold it badly, and a shadow map would count the plant's own
 //! shadow twice. The side and the cosine are the *vertex normal's*, whatever a leaf's true plane. A vertex that other
 //! geometry swallows is dark, and darkens its triangles. Light that bounces is interpolated over a triangle's corners.
+//! The bright surroundings of a low sun are narrow, and few bands hold them as badly as they hold the disc: most of
+//! the error that remains is theirs (`benches/transfer.rs`, table of the hours).
 
 mod bounce;
 mod evaluate;
@@ -93,7 +96,7 @@ pub enum Interior {
     /// brightly as one that scatters; a leaf under a bright spot does not spread it.
     Straight(u8),
     /// Leaves and wood reflect and transmit diffusely, and light is followed over this many of them (1..=8) [Franzke
-    /// 2005, 4.2.3, note 4; Sloan et al. 2002, 5]. Each takes about a tenth of the rays' time.
+    /// 2005, 4.2.3, note 4; Sloan et al. 2002, 5].
     Diffuse(u8),
 }
 

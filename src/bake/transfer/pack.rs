@@ -8,9 +8,9 @@
 //! ```
 //!
 //! A transfer function is not negative, so by the addition theorem the coefficients of its band l are at most
-//! sqrt(2 l + 1) c_0 long: eight bits relative to c_0 are spent on what can occur, in the dark inside of a crown as in
-//! the light. `scale_l` is the largest ratio of the part's vertices, at most that bound; what lies beyond it (fitted
-//! coefficients may, where there is next to no light) is clamped.
+//! sqrt(2 l + 1) c_0 long, and fitted ones not much longer: eight bits relative to c_0 are spent on what can occur, in
+//! the dark inside of a crown as in the light. `scale_l` is the largest ratio among the part's sides that get at least
+//! a 64th of the light of the brightest; what exceeds it in darker ones is clamped.
 //!
 //! Errors, for light of the coefficients l: Float16 at most 2^-11 of each coefficient (2^-25 below 6e-5); Snorm8 at
 //! most `|c_0| sum_l scale_l / 254 sum_m |l_lm|` and 2^-11 of c_0's share. `benches/transfer.rs` has what that
@@ -170,20 +170,20 @@ fn encode(values: &[f32], format: TransferFormat, scale: &[f32; MAX_BANDS], chan
     }
 }
 
-/// The largest ratio to c_0 in each band, at most what a transfer function can have.
+/// The largest ratio to c_0 in each band, of sides that are not nearly dark.
 fn scales(part: &TransferPart, count: usize, channels: usize) -> [f32; MAX_BANDS] {
+    let sides = || part.front.chunks_exact(count).chain(part.back.chunks_exact(count));
+    let brightest = sides().flat_map(|values| &values[..channels]).fold(0.0f32, |max, value| max.max(*value));
     let mut scale = [0.0f32; MAX_BANDS];
-    for values in part.front.chunks_exact(count).chain(part.back.chunks_exact(count)) {
+    for values in sides() {
         for (i, value) in values.iter().enumerate().skip(channels) {
-            let band = (i / channels).isqrt();
-            let ratio = (value / values[i % channels]).abs();
-            if values[i % channels] > 0.0 && ratio.is_finite() {
+            let first = values[i % channels];
+            let ratio = (value / first).abs();
+            if first > 0.0 && first >= brightest / 64.0 && ratio.is_finite() {
+                let band = (i / channels).isqrt();
                 scale[band] = scale[band].max(ratio);
             }
         }
-    }
-    for (band, scale) in scale.iter_mut().enumerate().skip(1) {
-        *scale = scale.min(((2 * band + 1) as f32).sqrt());
     }
     scale
 }
