@@ -5,9 +5,9 @@
 //!   D(q) = (1 - (|q - p| / ρ)²)²  within ρ of p, else 0          F(q) = sum of w D(q)     (τ is taken off later)
 //! ```
 //!
-//! Generators and points are both sorted into compact groups of eight ([`partition`](super::partition)). For a group
+//! Generators and points are both sorted into compact groups of eight (`partition.rs`). For a group
 //! of points the tree over the generators is walked once: boxes that are out of reach are skipped, boxes that lie
-//! within reach as a whole give a polynomial ([`moments`](super::moments)), and what remains, the rim of the ball, is
+//! within reach as a whole give a polynomial (`moments.rs`), and what remains, the rim of the ball, is
 //! summed in pairs, eight points side by side in vector registers (glam's, as compilers do not find them here). So the time grows with the surface of the ball of
 //! influence, and not with its volume: a large ρ is as cheap as a small one.
 //!

@@ -1,12 +1,12 @@
 //! The implicit surface F = τ as a closed triangle mesh [Luft 2007, 2.3], by marching cubes [Lorensen & Cline 1987].
 //!
 //! Only cells near the surface are visited. A cube around everything is cut into eight again and again; a piece whose
-//! bounds of F ([`DensityField::bounds`]) do not hold τ is dropped. The bounds are rigorous, so no piece of the surface can be missed, neither
+//! bounds of F (`DensityField::bounds`) do not hold τ is dropped. The bounds are rigorous, so no piece of the surface can be missed, neither
 //! a lone twig nor a hollow, and every edge that the surface crosses has all its four cells: the mesh
 //! is closed and manifold, each edge has two triangles. The field is evaluated at the corners of what remains.
 //!
 //! Limits: what is thinner than a cell and slips between its corners is not seen. More than [`MOST_CELLS`] cells are
-//! not kept; the cells are doubled until they fit, which [`Surface::cell`] tells.
+//! not kept; the cells are doubled until they fit, which the bake's report tells.
 
 use glam::{UVec3, Vec3, Vec3A};
 use rayon::prelude::*;
@@ -87,7 +87,7 @@ pub(super) fn extract(field: &DensityField, region: &Aabb, threshold: f32, cell:
 fn extract_with(field: &DensityField, region: &Aabb, threshold: f32, cell: f32) -> Option<Extracted> {
     let size = region.size().max_element() + 2.0 * field.radius();
     let along = ((size / cell).ceil() as u32 + 2).next_power_of_two();
-    // Half a cell off the middle, so that a symmetric crown's surface does not run through the nodes.
+    // Off the middle, so that a symmetric crown's surface does not run through the nodes.
     let middle = region.center() - Vec3A::new(0.31, 0.43, 0.37) * cell;
     let lattice = Lattice { origin: Vec3::from(middle - 0.5 * cell * along as f32), cell };
     let cells = cells_at_surface(field, lattice, along, threshold)?;

@@ -13,7 +13,7 @@
 //! | [`generators`] | generator points, an even share of them (3.1) |
 //! | [`density`] | density field and gradient (2.3, eq. 2 and 3) |
 //! | [`isosurface`], [`simplify_surface`] | the surface as a closed mesh (2.3, 3.1) |
-//! | [`ambient_term`] | k_a from the density (3.2, eq. 4) |
+//! | [`ambient_term`](mod@ambient_term) | k_a from the density (3.2, eq. 4) |
 //! | [`foliage_normals`] | realigned normals (3.3) |
 //! | [`packing`] | k_a as the length of the normal (3.2) |
 //! | [`parameters`] | settings, and values that follow from the model (3.1) |
