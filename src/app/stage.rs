@@ -110,6 +110,8 @@ impl Stage {
             map_size: quality.shadow_map_size,
             cascades: quality.cascades as usize,
             distance: quality.shadow_distance,
+            // A billboard's level plane would draw a line across the crowns of full models.
+            proxy_distance: quality.near_distance + quality.fade_band,
             ..SunShadowSettings::default()
         }
     }
