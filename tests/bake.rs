@@ -358,13 +358,15 @@ fn sixty_thousand_triangles_are_baked_in_seconds() {
         assert!(time < Duration::from_secs(limit), "{what} took {time:?}");
     };
     let mut lighting = BakedLighting::Local;
-    timed("lighting", 10, &mut || lighting = BakedLighting::bake(&plant, &LightingSettings::default()));
+    let settings =
+        BakeSettings { lighting: LightingSettings::Expressive(ImplicitSettings::default()), ..BakeSettings::default() };
+    timed("lighting", 10, &mut || lighting = BakedLighting::bake(&plant, &settings.lighting));
     timed("crossed billboards", 15, &mut || drop(bake_cross(&plant, &lighting, &CrossSettings::default())));
     timed("shadow proxy", 10, &mut || drop(shadow_proxy(&plant, 12_000)));
     let folder = tempfile::tempdir().unwrap();
     let cache = Cache::new(folder.path());
-    bake_plant(Arc::clone(&plant), &BakeSettings::default(), Some(&cache));
-    timed("from the cache", 1, &mut || drop(bake_plant(Arc::clone(&plant), &BakeSettings::default(), Some(&cache))));
+    bake_plant(Arc::clone(&plant), &settings, Some(&cache));
+    timed("from the cache", 1, &mut || drop(bake_plant(Arc::clone(&plant), &settings, Some(&cache))));
 }
 
 #[test]

@@ -274,7 +274,7 @@ fn plant_vertices_are_what_the_shaders_read() {
             };
             let wanted = match attribute.format {
                 bevy::render::render_resource::VertexFormat::Float32x3 => 3,
-                bevy::render::render_resource::VertexFormat::Snorm8x4 => 4,
+                bevy::render::render_resource::VertexFormat::Unorm10_10_10_2 => 4,
                 bevy::render::render_resource::VertexFormat::Float16x2 => 2,
                 other => panic!("{other:?}: say here how many components it has"),
             };

@@ -38,7 +38,7 @@ fn sky_through(cover: f32, depth: f32) -> f32 {
 
 // What the surroundings bring to a surface that sees the share `ambient` of them evenly, over pi.
 fn even_sky(surface: Surface) -> vec3<f32> {
-    let through = surface.transmission * sky_irradiance(-surface.normal) * 0.5;
+    let through = surface.transmission * sky_irradiance(-surface.normal);
     return (sky_irradiance(surface.normal) + through) * surface.ambient;
 }
 

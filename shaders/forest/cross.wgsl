@@ -117,7 +117,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         let own = mix(1.0, smoothstep(-0.6, 0.3, side), foliage);
         visibility *= mix(own, near.x * mix(0.75, 1.0, own), near.y);
     }
-    visibility *= mix(1.0, leaf_visibility(properties.b), foliage);
+    visibility *= select(mix(1.0, leaf_visibility(properties.b), foliage), 1.0, traced);
     var color = shade(surface, visibility, even_sky(surface));
     if frame.flags.y > 0.5 {
         color = mix(color, vec3(0.2, 0.35, 1.0) * dot(color, vec3(0.5)), 0.6);

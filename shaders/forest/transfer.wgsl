@@ -21,8 +21,10 @@ fn snorm_at(byte: u32) -> f32 {
     return f32(extractBits(bitcast<i32>(coefficients[byte / 4u]), 8u * (byte % 4u), 8u)) / 127.0;
 }
 
+// A half that is not negative, by its bits: unpack2x16float is not on every device.
 fn half_at(byte: u32) -> f32 {
-    return unpack2x16float(coefficients[byte / 4u])[(byte / 2u) % 2u];
+    let bits = extractBits(coefficients[byte / 4u], 8u * (byte % 4u), 15u);
+    return bitcast<f32>(bits << 13u) * 5.192297e33;
 }
 
 // Irradiance over pi that the surroundings bring to a side of a vertex: 0 the normal's, 1 the other.
