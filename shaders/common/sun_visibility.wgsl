@@ -11,9 +11,10 @@ fn ground_map(relative: vec3<f32>) -> vec2<f32> {
 }
 
 // Light that clears the terrain: a penumbra that widens with the distance to the ridge is approximated by one of
-// fixed height, the sun's disc over a kilometre.
+// fixed height, the sun's disc over a kilometre. It lies below the horizon: open ground, whose horizon is itself, once
+// stood in the middle of it and had half its light.
 fn terrain_visibility(map: vec2<f32>, height_above_ground: f32) -> f32 {
-    return smoothstep(-6.0, 6.0, height_above_ground + 0.5 - map.x);
+    return smoothstep(-6.0, 0.0, height_above_ground - map.x);
 }
 
 // `bias` is 1 for solid surfaces; less where the position is known to lie off the caster.

@@ -71,7 +71,7 @@ impl Stage {
             None
         } else {
             let crowns: Vec<VariantBounds> = plants.iter().map(crown).collect();
-            Some(Arc::new(cover_map(&packed, &crowns, COVER_TEXEL, None)?))
+            Some(Arc::new(cover_map(&packed, &crowns, COVER_TEXEL, None)?.smoothed()))
         };
         progress.end();
         progress.note(&format!("{} trees: {:.2} s", stand.trees.len(), started.elapsed().as_secs_f64()));

@@ -45,6 +45,39 @@ impl CoverMap {
     }
 }
 
+impl CoverMap {
+    /// The map with the mean of each texel's neighbourhood, weighted 1, 2, 1 along both axes, and a border of one texel
+    /// for what spreads beyond it: the light of a place does not end at a texel's edge.
+    pub fn smoothed(&self) -> Self {
+        let (columns, rows) = (self.columns as usize, self.rows as usize);
+        if self.cover.len() != columns * rows || self.cover.is_empty() {
+            return self.clone();
+        }
+        let value = |column: Option<usize>, row: Option<usize>| match (column, row) {
+            (Some(column), Some(row)) if column < columns && row < rows => {
+                u32::from(self.cover[row * columns + column])
+            }
+            _ => 0,
+        };
+        // Texel `at` of the larger map has the neighbours at - 2, at - 1 and at of this one.
+        let taps = |at: usize| [(at.checked_sub(2), 1), (at.checked_sub(1), 2), (Some(at), 1)];
+        let sum = |column: usize, row: usize| -> u32 {
+            let weighted =
+                |(r, wr): (Option<usize>, u32)| taps(column).map(|(c, wc)| wr * wc * value(c, r)).iter().sum::<u32>();
+            taps(row).map(weighted).iter().sum()
+        };
+        let rows_out = 0..rows + 2;
+        let cover = rows_out.flat_map(|row| (0..columns + 2).map(move |column| (column, row)));
+        Self {
+            origin: self.origin - self.texel,
+            texel: self.texel,
+            columns: self.columns + 2,
+            rows: self.rows + 2,
+            cover: cover.map(|(column, row)| ((sum(column, row) + 8) / 16) as u8).collect(),
+        }
+    }
+}
+
 /// A stand whose crowns can be mapped.
 pub trait Crowns {
     /// Foot (X, Z), variant and scale of each tree.

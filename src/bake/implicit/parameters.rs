@@ -6,9 +6,9 @@
 //!   sparse plant does not fall into single leaves;
 //! - τ: a share of the median of F at the leaves, so that the surface keeps close to the crown whatever its density;
 //! - d_min: where the densest quarter of the leaves begins;
-//! - k_a_min and n: constants, chosen by the ambient visibility of [`crate::bake::ambient`] on our own broadleaf, an
-//!   oak, a pine and an aspen. `benches/implicit.rs` prints how well they do: a sparse crown as the aspen's comes out
-//!   too dark, and wants k_a_min and d_min of its own.
+//! - k_a_min and n: constants, chosen on our own broadleaf, an oak, a pine and an aspen. `benches/implicit.rs` prints how
+//!   well they do against traced visibility: a sparse crown as the aspen's comes out too dark, and wants k_a_min and
+//!   d_min of its own.
 
 use glam::Vec3;
 

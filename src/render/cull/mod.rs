@@ -198,14 +198,14 @@ impl SeenShadows<'_> {
 
 /// Casters of one cascade, whose box lies in scene metres; `origin` is the stand's own origin there.
 ///
-/// Trees within `proxy_distance` metres of the box's centre cast as proxies, the others as billboards. With `seen`,
+/// Trees at a distance of the box's centre in `proxies`, metres, cast as proxies, the others as billboards. With `seen`,
 /// casters whose shadow no pixel of the view can show are left out.
 pub fn cull_cascade(
     stand: &PackedStand,
     sizes: &[VariantSize],
     origin: DVec3,
     cascade: &CascadeBox,
-    proxy_distance: f64,
+    proxies: Range<f64>,
     seen: Option<&SeenShadows>,
 ) -> DrawLists {
     let mut models = vec![Vec::new(); sizes.len()];
@@ -232,7 +232,7 @@ pub fn cull_cascade(
                 continue;
             }
             let offset = foot - center;
-            if offset.x.hypot(offset.z) < proxy_distance {
+            if proxies.contains(&offset.x.hypot(offset.z)) {
                 models[variant].push(tree);
             } else {
                 crosses.push(tree);

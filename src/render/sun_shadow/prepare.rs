@@ -44,6 +44,9 @@ use crate::{
     },
 };
 
+/// Metres a texel from which on casters are billboards.
+const PROXY_TEXEL: f64 = 0.2;
+
 /// Format of the maps.
 pub const SHADOW_FORMAT: TextureFormat = TextureFormat::Depth32Float;
 
@@ -53,7 +56,7 @@ pub const SHADOW_FORMAT: TextureFormat = TextureFormat::Depth32Float;
 pub struct CascadeViewUniform {
     /// Metres relative to the box's centre to the map's clip space.
     pub clip_from_anchor: [[f32; 4]; 4],
-    /// To the light.
+    /// To the light; w: half the map's side in texels.
     pub direction: [f32; 4],
 }
 
@@ -284,9 +287,12 @@ pub fn prepare_shadows(
         let content = DrawnCascade { key, seen_by: seen.as_ref().map(|_| this_view) };
         let uniform = CascadeViewUniform {
             clip_from_anchor: place.clip_from_anchor().to_cols_array_2d(),
-            direction: place.direction.as_vec3().extend(0.0).to_array(),
+            direction: place.direction.as_vec3().extend((place.half_width / place.texel) as f32).to_array(),
         };
         queue.write_buffer(&maps.cascade_uniforms, index as u64 * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));
+        // A coarse map could not show a proxy; and near the camera, a finer map has the trees' own shadows already.
+        let served = index.checked_sub(1).map_or(0.0, |finer| 0.7 * maps.cascades[finer].radius);
+        let proxies = if place.texel < PROXY_TEXEL { served..settings.proxy_distance } else { 0.0..0.0 };
         let mut work = CascadeWork { index, content, forests: Vec::new() };
         for (entity, forest) in forests.iter() {
             let lists = cull_cascade(
@@ -294,8 +300,7 @@ pub fn prepare_shadows(
                 &forest.sizes,
                 forest.forest.origin,
                 &place,
-                // Where the finest map serves; a coarser one could not show the difference.
-                if index == 0 { settings.proxy_distance } else { 0.0 },
+                proxies.clone(),
                 seen.as_ref(),
             );
             let buffers = maps.casters.entry(entity).or_insert_with(|| CasterBuffers {

@@ -1,0 +1,142 @@
+//! Question: how near is a near tree's picture to the truth, and by which light of its foliage?
+//!
+//! One tree and a small stand, at noon and against a low sun, are drawn with each light and traced by
+//! [`canopy::app::reference`] from the same view in the same light, with the same tone curve. Every picture is compared
+//! with the traced one: mean FLIP at 67 pixels per degree over the whole picture, and where the trees are (where the
+//! picture without trees differs from the traced one) the relative RMSE and the light, both linear.
+//!
+//! With `--out` the pictures stay, and each row of the table is one more picture: local, expressive, transfer, traced.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use canopy::{
+    app::{Picture, Renderer, Stage, reference},
+    plant::texture::srgb_to_linear,
+    render::components::Ground,
+    scene::{LocalTime, Overrides, ReferenceOptions, Silent, View, parse_lighting, parse_size},
+};
+use clap::Parser;
+use nv_flip::{FlipImageRgb8, FlipPool, flip};
+
+/// Pictures of near trees against the path tracer.
+#[derive(Parser, Debug)]
+#[command(name = "near")]
+struct Arguments {
+    /// Picture size in pixels.
+    #[arg(long, default_value = "480x480", value_parser = parse_size)]
+    size: (u32, u32),
+    /// Samples a pixel of the traced pictures.
+    #[arg(long, default_value_t = 128)]
+    spp: u32,
+    /// Folder for the pictures.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Given by cargo.
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
+const SCENES: [&str; 2] = ["one_tree", "small_stand"];
+const LIGHTS: [&str; 3] = ["local", "expressive", "transfer"];
+/// Noon, with the sun high behind the camera, and evening, with the sun low on the left before it.
+const HOURS: [(&str, &str); 2] = [("noon", "2026-06-21T12:30+01:00"), ("low sun", "2026-06-21T19:15+01:00")];
+const PIXELS_PER_DEGREE: f32 = 67.0;
+
+fn main() -> anyhow::Result<()> {
+    let arguments = Arguments::parse();
+    let temporary = tempfile::tempdir()?;
+    let folder = arguments.out.clone().unwrap_or_else(|| temporary.path().to_owned());
+    std::fs::create_dir_all(&folder)?;
+    println!(
+        "| scene | hour | light | mean FLIP | relative RMSE of the trees | light of the trees |\n|---|---|---|--:|--:|--:|"
+    );
+    for scene in SCENES {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/scenes").join(scene).with_extension("ron");
+        for (hour, at) in HOURS {
+            let at: LocalTime = at.parse()?;
+            let name = |what: &str| folder.join(format!("{scene}-{}-{what}.png", hour.replace(' ', "-")));
+            let traced = trace(&arguments, &path, at, &name("traced"))?;
+            let bare = draw(&arguments, &path, None, at)?;
+            let mut row = Vec::new();
+            for light in LIGHTS {
+                let drawn = draw(&arguments, &path, Some(light), at)?;
+                let (flip, relative, share) = compare(&traced, &drawn, &bare);
+                println!("| {scene} | {hour} | {light} | {flip:.4} | {relative:.3} | {share:.2} |");
+                drawn.save(&name(light), &[])?;
+                row.push(drawn);
+            }
+            row.push(traced);
+            beside(&row).save(&name("all"), &[])?;
+        }
+    }
+    Ok(())
+}
+
+/// The scene in one light; without one, the scene without its trees.
+fn draw(arguments: &Arguments, scene: &Path, light: Option<&str>, at: LocalTime) -> anyhow::Result<Picture> {
+    let overrides = Overrides { lighting: light.map(parse_lighting).transpose()?, ..Overrides::default() };
+    let stage = Stage::build(scene, &overrides, &mut Silent)?;
+    let view = stage.scene.camera.start;
+    let view = view.viewpoint(stage.terrain.height(view.position.0, view.position.2), stage.scene.camera.field_of_view);
+    let mut renderer = Renderer::new(arguments.size, None, stage.scene.quality.msaa)?;
+    match light {
+        Some(_) => renderer.show(&stage),
+        None => {
+            renderer.app().world_mut().spawn(Ground { cover: None, ..stage.ground() });
+        }
+    }
+    Ok(renderer.draw(&stage, &view, at.utc())?)
+}
+
+fn trace(arguments: &Arguments, scene: &Path, at: LocalTime, out: &Path) -> anyhow::Result<Picture> {
+    let options = ReferenceOptions {
+        scene: scene.to_owned(),
+        out: out.to_owned(),
+        at: Some(at),
+        view: View::Scene,
+        size: arguments.size,
+        samples: arguments.spp,
+        bounces: None,
+        fog: true,
+        resume: false,
+        overrides: Overrides { lighting: Some(canopy::scene::Lighting::Local), ..Overrides::default() },
+        quiet: true,
+    };
+    let file = reference(&options, &mut Silent)?;
+    let image = image::open(&file).with_context(|| file.display().to_string())?.to_rgb8();
+    Ok(Picture { width: image.width(), height: image.height(), pixels: image.into_raw() })
+}
+
+/// Mean FLIP; where `bare` differs from `truth`: relative RMSE, and light as a share of the truth's.
+fn compare(truth: &Picture, drawn: &Picture, bare: &Picture) -> (f32, f64, f64) {
+    let flip_image = |picture: &Picture| FlipImageRgb8::with_data(picture.width, picture.height, &picture.pixels);
+    let mean = FlipPool::from_image(&flip(flip_image(truth), flip_image(drawn), PIXELS_PER_DEGREE)).mean();
+    let linear = |code: u8| f64::from(srgb_to_linear(f32::from(code) / 255.0));
+    let (mut squared, mut square, mut sum, mut of) = (0.0, 0.0, 0.0, 0.0);
+    let pixels = truth.pixels.chunks_exact(3).zip(drawn.pixels.chunks_exact(3)).zip(bare.pixels.chunks_exact(3));
+    for ((truth, drawn), bare) in pixels {
+        if truth.iter().zip(bare).all(|(a, b)| a.abs_diff(*b) < 40) {
+            continue;
+        }
+        for (a, b) in truth.iter().zip(drawn) {
+            let (a, b) = (linear(*a), linear(*b));
+            squared += (a - b).powi(2);
+            square += a * a;
+            sum += b;
+            of += a;
+        }
+    }
+    (mean, (squared / square).sqrt(), sum / of)
+}
+
+/// The pictures of one size beside each other.
+fn beside(pictures: &[Picture]) -> Picture {
+    let (width, height) = pictures.first().map_or((0, 0), |picture| (picture.width, picture.height));
+    let row = 3 * width as usize;
+    let pixels = (0..height as usize)
+        .flat_map(|y| pictures.iter().flat_map(move |picture| &picture.pixels[y * row..(y + 1) * row]))
+        .copied()
+        .collect();
+    Picture { width: width * pictures.len() as u32, height, pixels }
+}
