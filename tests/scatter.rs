@@ -838,7 +838,7 @@ fn a_smoothed_cover_spreads_evenly_and_keeps_its_sum() {
     assert_eq!((smooth.columns, smooth.rows, smooth.origin), (5, 4, DVec2::new(8.0, -16.0)));
     let sum = |map: &CoverMap| map.cover.iter().map(|&value| u32::from(value)).sum::<u32>();
     assert_eq!(sum(&smooth), sum(&map));
-    assert_eq!(smooth.cover[5 + 2], 160 / 4);
+    assert_eq!(smooth.cover[5 + 2], 45);
     assert_eq!(smooth.at(DVec2::new(28.0, -4.0)), 45.0 / 255.0);
     let empty = CoverMap { origin: DVec2::ZERO, texel: 8.0, columns: 0, rows: 0, cover: Vec::new() };
     assert_eq!(empty.smoothed(), empty);

@@ -4,7 +4,7 @@
 struct CascadeView {
     // Metres relative to the box's centre to the map's clip space, reversed depth.
     clip_from_anchor: mat4x4<f32>,
-    // To the light; w: half the map's side in texels.
+    // To the light.
     direction: vec4<f32>,
 }
 

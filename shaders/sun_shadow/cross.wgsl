@@ -7,15 +7,8 @@
 
 struct Varying {
     @builtin(position) clip: vec4<f32>,
-    // In texels of the level.
-    @location(0) place: vec2<f32>,
-    // Layer and level.
-    @location(1) @interpolate(flat) picture: vec2<i32>,
-}
-
-// Map texels that a vector (metres) spans.
-fn span(vector: vec3<f32>) -> f32 {
-    return length((cascade.clip_from_anchor * vec4(vector, 0.0)).xy) * cascade.direction.w;
+    @location(0) uv: vec2<f32>,
+    @location(1) @interpolate(flat) layer: u32,
 }
 
 const VERTICES_A_TREE: u32 = 12u;
@@ -41,24 +34,23 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     }
     var out: Varying;
     out.clip = clamp_caster(tree.position + (center + corner.x * u + corner.y * v) * tree.scale);
-    // One texel of a level that is twice as fine as what a map's texel covers: a map is coarser than what a filter would
-    // add, but a cross has few texels, and their sum must hold. The light is parallel, so the level is one for the picture.
-    let size = vec2<f32>(textureDimensions(color_pictures));
-    let spans = 2.0 * tree.scale * vec2(span(u), span(v));
-    let covered = size / max(spans, vec2(1e-3));
-    let coarsest = f32(textureNumLevels(color_pictures) - 1u);
-    let level = i32(clamp(log2(max(0.5 * max(covered.x, covered.y), 1.0)), 0.0, coarsest));
-    let uv = vec2(0.5 + 0.5 * corner.x, 0.5 - 0.5 * corner.y);
-    out.place = uv * vec2<f32>(textureDimensions(color_pictures, level));
-    out.picture = vec2(i32(variants[tree.variant].size.z) + i32(plane_index), level);
+    out.uv = vec2(0.5 + 0.5 * corner.x, 0.5 - 0.5 * corner.y);
+    out.layer = u32(variants[tree.variant].size.z) + plane_index;
     return out;
+}
+
+// One texel, as in model.wgsl, but of a level that is twice as fine: a cross has few texels, and their sum must hold.
+fn alpha(uv: vec2<f32>, layer: u32) -> f32 {
+    let size = vec2<f32>(textureDimensions(color_pictures));
+    let texels = max(fwidth(uv.x) * size.x, fwidth(uv.y) * size.y);
+    let level = clamp(i32(log2(max(0.5 * texels, 1.0))), 0, i32(textureNumLevels(color_pictures)) - 1);
+    let place = clamp(uv, vec2(0.0), vec2(0.9999)) * vec2<f32>(textureDimensions(color_pictures, level));
+    return textureLoad(color_pictures, vec2<i32>(place), i32(layer), level).a;
 }
 
 @fragment
 fn fragment(in: Varying) {
-    let size = vec2<f32>(textureDimensions(color_pictures, in.picture.y));
-    let place = vec2<i32>(clamp(in.place, vec2(0.0), size - 0.5));
-    if textureLoad(color_pictures, place, in.picture.x, in.picture.y).a < 0.5 {
+    if alpha(in.uv, in.layer) < 0.5 {
         discard;
     }
 }

@@ -157,12 +157,7 @@ impl FromWorld for ForestLayouts {
                 "canopy_cross",
                 &BindGroupLayoutEntries::sequential(
                     ShaderStages::FRAGMENT,
-                    (
-                        // The caster's vertices choose its level.
-                        texture_2d_array(float).visibility(ShaderStages::VERTEX_FRAGMENT),
-                        texture_2d_array(float),
-                        sampler(SamplerBindingType::Filtering),
-                    ),
+                    (texture_2d_array(float), texture_2d_array(float), sampler(SamplerBindingType::Filtering)),
                 ),
             ),
             transfer: BindGroupLayoutDescriptor::new(

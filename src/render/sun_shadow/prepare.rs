@@ -56,7 +56,7 @@ pub const SHADOW_FORMAT: TextureFormat = TextureFormat::Depth32Float;
 pub struct CascadeViewUniform {
     /// Metres relative to the box's centre to the map's clip space.
     pub clip_from_anchor: [[f32; 4]; 4],
-    /// To the light; w: half the map's side in texels.
+    /// To the light.
     pub direction: [f32; 4],
 }
 
@@ -287,7 +287,7 @@ pub fn prepare_shadows(
         let content = DrawnCascade { key, seen_by: seen.as_ref().map(|_| this_view) };
         let uniform = CascadeViewUniform {
             clip_from_anchor: place.clip_from_anchor().to_cols_array_2d(),
-            direction: place.direction.as_vec3().extend((place.half_width / place.texel) as f32).to_array(),
+            direction: place.direction.as_vec3().extend(0.0).to_array(),
         };
         queue.write_buffer(&maps.cascade_uniforms, index as u64 * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));
         // A coarse map could not show a proxy; and near the camera, a finer map has the trees' own shadows already.
