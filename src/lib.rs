@@ -24,7 +24,7 @@
 //! ```
 //!
 //! The rooms: [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`bake`], [`light`], [`lod`],
-//! [`trace`] and [`reference`] know no App and no GPU; [`render`] draws what they make; [`app`] is the interactive
+//! [`trace`] and [`mod@reference`] know no App and no GPU; [`render`] draws what they make; [`app`] is the interactive
 //! program. ARCHITECTURE.md in the repository shows how a tree gets from a file to a pixel.
 
 pub mod app;

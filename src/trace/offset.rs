@@ -6,7 +6,7 @@ use glam::Vec3;
 /// `geometric_normal` (either side's): moved off the surface to the side the ray goes to, farther than the rounding
 /// error of a point that was interpolated from a triangle's corners.
 ///
-/// [Wächter & Binder 2019, "A Fast and Robust Method for Avoiding Self-Intersection", Ray Tracing Gems 6]: each
+/// [Wächter & Binder 2019, "A Fast and Robust Method for Avoiding Self-Intersection", Ray Tracing Gems 6], where each
 /// coordinate moves by up to 256 units in its last place, and within 1/32 m of zero, where these are tiny, by up to
 /// 2^-16 m. For plants of centimetres, and near zero on triangles of a kilometre, [`super::SurfacePoint::leave`] is
 /// the right one.
