@@ -29,6 +29,7 @@
 
 pub mod app;
 pub mod bake;
+mod files;
 pub mod light;
 pub mod lod;
 pub mod plant;

@@ -1,12 +1,9 @@
 //! Pictures on disk: PNG with the settings that made it in its text chunks.
 
-use std::{
-    fs,
-    io::{BufWriter, Write},
-    path::Path,
-};
+use std::{io::Write, path::Path};
 
 use super::error::AppError;
+use crate::files::write_whole;
 
 /// A rendered picture.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -27,19 +24,8 @@ impl Picture {
     /// # Errors
     /// [`AppError::Write`].
     pub fn save(&self, path: &Path, notes: &[(&str, String)]) -> Result<(), AppError> {
-        let failed = |source| AppError::Write { path: path.to_owned(), source };
-        let folder = match path.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
-        fs::create_dir_all(folder).map_err(failed)?;
-        let file = tempfile::Builder::new().prefix(".canopy-").suffix(".tmp").tempfile_in(folder).map_err(failed)?;
-        let mut writer = BufWriter::new(file);
-        self.encode(&mut writer, notes).map_err(|error| failed(std::io::Error::other(error)))?;
-        let file = writer.into_inner().map_err(|error| failed(error.into_error()))?;
-        readable_by_all(file.as_file()).map_err(failed)?;
-        file.persist(path).map_err(|error| failed(error.error))?;
-        Ok(())
+        write_whole(path, |writer| self.encode(writer, notes).map_err(std::io::Error::other))
+            .map_err(|source| AppError::Write { path: path.to_owned(), source })
     }
 
     fn encode(&self, writer: impl Write, notes: &[(&str, String)]) -> Result<(), png::EncodingError> {
@@ -55,16 +41,4 @@ impl Picture {
         writer.write_image_data(&self.pixels)?;
         writer.finish()
     }
-}
-
-/// A temporary file is its owner's alone; a picture is like any other file.
-#[cfg(unix)]
-fn readable_by_all(file: &fs::File) -> std::io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    file.set_permissions(fs::Permissions::from_mode(0o644))
-}
-
-#[cfg(not(unix))]
-fn readable_by_all(_: &fs::File) -> std::io::Result<()> {
-    Ok(())
 }

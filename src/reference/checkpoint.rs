@@ -9,13 +9,14 @@
 //! then renamed.
 
 use std::fs;
-use std::io::{ErrorKind, Write};
+use std::io::ErrorKind;
 use std::path::Path;
 
 use glam::DVec3;
 
 use super::error::ReferenceError;
 use super::film::Film;
+use crate::files;
 
 const MAGIC: &[u8; 8] = b"CANOPYR1";
 const HEADER: usize = 8 + 32 + 12;
@@ -25,28 +26,7 @@ const HASH: usize = 32;
 /// Writes bytes to `path` so that they appear whole or not at all.
 pub(super) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), ReferenceError> {
     let failed = |source| ReferenceError::Write { path: path.to_owned(), source };
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    fs::create_dir_all(folder).map_err(failed)?;
-    let mut file = tempfile::Builder::new().prefix(".canopy-").suffix(".tmp").tempfile_in(folder).map_err(failed)?;
-    file.write_all(bytes).map_err(failed)?;
-    readable_by_all(file.as_file()).map_err(failed)?;
-    file.persist(path).map_err(|error| failed(error.error))?;
-    Ok(())
-}
-
-/// A temporary file is its owner's alone; a result is like any other file.
-#[cfg(unix)]
-fn readable_by_all(file: &fs::File) -> std::io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    file.set_permissions(fs::Permissions::from_mode(0o644))
-}
-
-#[cfg(not(unix))]
-fn readable_by_all(_: &fs::File) -> std::io::Result<()> {
-    Ok(())
+    files::write_whole(path, |writer| writer.write_all(bytes)).map_err(failed)
 }
 
 impl Film {
