@@ -54,8 +54,10 @@ struct Cascade {
     size: vec4<f32>,
 }
 
+const MAX_CASCADES: i32 = 4;
+
 struct Shadow {
-    cascades: array<Cascade, 4>,
+    cascades: array<Cascade, MAX_CASCADES>,
     // x: number of cascades, y: one over the map's size in texels.
     count: vec4<f32>,
     ground: GroundMap,

@@ -61,11 +61,8 @@ fn apply_fog(color: vec3<f32>, relative: vec3<f32>) -> vec3<f32> {
 }
 
 // The eye's loss of colour in the dark and its shift to blue [Jensen et al. 2000, eq. 4; Larson et al. 1997, eq. 10]:
-// the twin of ScotopicTint::apply in src/light/exposure.rs. `color` is exposed.
+// the twin of ScotopicTint::apply in src/light/exposure.rs. `color` is exposed. By day the amount is zero.
 fn night_vision(color: vec3<f32>) -> vec3<f32> {
-    if light.night.w <= 0.0 {
-        return color;
-    }
     let xyz = mat3x3<f32>(
         vec3(0.4124564, 0.2126729, 0.0193339),
         vec3(0.3575761, 0.7151522, 0.1191920),

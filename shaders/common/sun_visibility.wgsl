@@ -2,7 +2,7 @@
 // horizon that the terrain raises towards the light (src/terrain/sun_horizon.rs).
 #define_import_path canopy::sun_visibility
 
-#import canopy::frame::{frame, light, shadow, shadow_map, shadow_sampler, ground_texture, sky_sampler}
+#import canopy::frame::{frame, light, shadow, shadow_map, shadow_sampler, ground_texture, sky_sampler, MAX_CASCADES}
 
 // x: height above the ground that the light clears, y: share of ground under crowns.
 fn ground_map(relative: vec3<f32>) -> vec2<f32> {
@@ -49,8 +49,8 @@ fn cascaded_visibility(relative: vec3<f32>, normal: vec3<f32>, bias: f32, pixel:
     let distance = length(relative);
     let jittered = distance / mix(0.93, 1.0, pixel_noise(pixel));
     var index = 0;
-    for (var i = 0; i < last; i += 1) {
-        index += i32(jittered >= shadow.cascades[i].size.y);
+    for (var i = 0; i < MAX_CASCADES - 1; i += 1) {
+        index += i32((i < last) & (jittered >= shadow.cascades[i].size.y));
     }
     let radius = shadow.cascades[max(last, 0)].size.y;
     let known = select(0.0, 1.0 - smoothstep(0.85 * radius, radius, distance), last >= 0);

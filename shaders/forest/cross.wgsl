@@ -119,9 +119,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     }
     visibility *= select(mix(1.0, leaf_visibility(properties.b), foliage), 1.0, traced);
     var color = shade(surface, visibility, even_sky(surface));
-    if frame.flags.y > 0.5 {
-        color = mix(color, vec3(0.2, 0.35, 1.0) * dot(color, vec3(0.5)), 0.6);
-    }
+    color = mix(color, vec3(0.2, 0.35, 1.0) * dot(color, vec3(0.5)), 0.6 * frame.flags.y);
     return vec4(night_vision(apply_fog(color, in.relative)), coverage);
 }
 

@@ -116,7 +116,7 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
     }
 #endif
     // A leaf has two sides, and its own normal is that of the side that is seen.
-    let behind = part.transmission.w < 0.5 && dot(normal, in.relative) > 0.0;
+    let behind = (part.transmission.w < 0.5) & (dot(normal, in.relative) > 0.0);
     normal = select(normal, -normal, behind);
 #else
     normal = detail_normal(normal, in.relative, in.uv);
@@ -157,8 +157,6 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
 #endif
 #endif
     var color = shade(surface, visibility, sky);
-    if frame.flags.y > 0.5 {
-        color = mix(color, vec3(0.15, 0.9, 0.2) * dot(color, vec3(0.5)), 0.6);
-    }
+    color = mix(color, vec3(0.15, 0.9, 0.2) * dot(color, vec3(0.5)), 0.6 * frame.flags.y);
     return vec4(night_vision(apply_fog(color, in.relative)), coverage);
 }

@@ -232,12 +232,18 @@ pub fn cull_cascade(
                 continue;
             }
             let offset = foot - center;
+            let top = (foot + DVec3::Y * height).dot(cascade.direction);
             if proxies.contains(&offset.x.hypot(offset.z)) {
-                models[variant].push(tree);
+                models[variant].push((top, tree));
             } else {
-                crosses.push(tree);
+                crosses.push((top, tree));
             }
         }
     }
-    DrawLists::assemble(models, crosses)
+    // Nearest to the light first: what lies behind is hidden before its alpha is looked up.
+    let sorted = |mut list: Vec<(f64, u32)>| -> Vec<u32> {
+        list.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        list.into_iter().map(|(_, tree)| tree).collect()
+    };
+    DrawLists::assemble(models.into_iter().map(sorted).collect(), sorted(crosses))
 }
