@@ -2,7 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use canopy::app::{AppError, info};
+use canopy::{
+    app::{AppError, Stage, info},
+    plant::PartKind,
+    scene::{Overrides, Silent},
+};
 
 use crate::support::{
     glb::TreeFile,
@@ -158,4 +162,46 @@ fn info_of_the_real_data() {
             println!("skipped: no {file}");
         }
     }
+}
+
+/// A scene of `trees` (lines of a table) whose broadleaves are lit `light`.
+fn lit_stand(folder: &Path, trees: &str, light: &str) -> Result<Stage, AppError> {
+    let scene = format!(
+        "(terrain: Flat(size: 200), place: (latitude: 48, longitude: 9), species: [\
+         (name: \"tree\", plant: Grown(form: Broadleaf, individuals: 1, triangles: 5000, seed: 1), lighting: {light}), \
+         (name: \"other\", plant: Grown(form: Conifer, individuals: 1, triangles: 5000, seed: 2), lighting: Local)], \
+         trees: Inventory(path: \"trees.csv\"))"
+    );
+    std::fs::write(folder.join("scene.ron"), scene).expect("a temporary file");
+    std::fs::write(folder.join("trees.csv"), format!("x,y,height,species\n{trees}")).expect("a temporary file");
+    Stage::build(&folder.join("scene.ron"), &Overrides::default(), &mut Silent)
+}
+
+#[test]
+fn a_small_tree_is_darkened_by_its_tall_neighbour() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let build = |trees: &str, light: &str| match lit_stand(folder.path(), trees, light) {
+        Ok(stage) => stage,
+        Err(error) => panic!("{error}"),
+    };
+    let close = "0,0,24,tree\n3,1,14,tree\n-30,0,12,other\n";
+    let far = "0,0,24,tree\n80,1,14,tree\n-30,0,12,other\n";
+    let light = "Expressive(together: true, radius: 3)";
+    // Mean k_a over the foliage of the tree at `place` of the table.
+    let ambient = |stage: &Stage, place: f64| {
+        let tree = stage.stand.trees.iter().find(|tree| (tree.position(stage.stand.cell_size).x - place).abs() < 0.1);
+        let plant = &stage.plants[usize::from(tree.expect("a tree there").variant())];
+        let foliage = plant.plant.parts.iter().position(|part| part.kind == PartKind::Foliage).expect("foliage");
+        let values = plant.lighting.ambient(foliage);
+        values.iter().sum::<f32>() / values.len() as f32
+    };
+    let (close_stage, far_stage) = (build(close, light), build(far, light));
+    assert_eq!(close_stage.plants.len(), 3, "one plant for each tree, and the conifer");
+    let (near, alone) = (ambient(&close_stage, 3.0), ambient(&far_stage, 80.0));
+    assert!(near < 0.95 * alone, "{near} beside its neighbour, {alone} alone");
+    assert_eq!(build(close, "Expressive()").plants.len(), 2, "instances of two plants otherwise");
+
+    let crowd: String = (0..64).map(|row| format!("{},{},12,tree\n", row % 8 * 9, row / 8 * 9)).collect();
+    let error = lit_stand(folder.path(), &crowd, light).err().expect("63 is the most beside the conifer");
+    assert_says(&error.to_string(), &["64 trees", "63", "together"]);
 }

@@ -114,6 +114,17 @@ pub enum AppError {
         /// Most there can be.
         limit: usize,
     },
+    /// More trees that are lit together than a forest can tell apart.
+    #[error(
+        "{count} trees are to be lit together, but beside the scene's other plants a forest holds at most {limit} such \
+         trees; place fewer, or take `together` out of their species' lighting"
+    )]
+    TooManyTogether {
+        /// Trees.
+        count: usize,
+        /// Most there can be.
+        limit: usize,
+    },
     /// More trees than the device's largest buffer holds.
     #[error(
         "the scene has {count} trees, but this device holds at most {limit}; lower the stems per hectare, take a \

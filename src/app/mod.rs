@@ -12,6 +12,7 @@ mod picture;
 mod plants;
 mod reference;
 mod stage;
+mod together;
 mod tone;
 mod trees;
 

@@ -5,7 +5,7 @@ use std::{path::Path, sync::Arc, time::Instant};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{error::AppError, ground, plants, trees};
+use super::{error::AppError, ground, plants, together, trees};
 use crate::{
     bake::{BakeSource, BakedPlant, bake_plant, cache::Cache},
     light::{MoonSetting, sun::Observer},
@@ -59,12 +59,13 @@ impl Stage {
 
         let has_trees = !matches!(scene.trees, scene::Trees::None);
         let species = if has_trees { plants::plan(&scene)? } else { plants::PlantPlan::default() };
-        let baked = bake(&species, &scene.quality, progress)?;
-        let plants: Vec<BakedPlant> = baked;
+        let plants = bake(&species, &scene.quality, progress)?;
 
         let started = Instant::now();
         progress.begin("Trees", 0);
-        let stand = trees::build_stand(&scene, &species, &plants, &terrain, progress)?;
+        let mut stand = trees::build_stand(&scene, &species, &plants, &terrain, progress)?;
+        progress.end();
+        let plants = together::light_together(&scene, &species, plants, &mut stand, progress)?;
         let bounds: Vec<VariantBounds> = plants.iter().map(variant_bounds).collect();
         let packed = PackedStand::new(&stand, DEFAULT_CELL_SIZE, &bounds)?;
         let cover = if stand.trees.is_empty() {
@@ -73,7 +74,6 @@ impl Stage {
             let crowns: Vec<VariantBounds> = plants.iter().map(crown).collect();
             Some(Arc::new(cover_map(&packed, &crowns, COVER_TEXEL, None)?.smoothed()))
         };
-        progress.end();
         progress.note(&format!("{} trees: {:.2} s", stand.trees.len(), started.elapsed().as_secs_f64()));
         if has_trees && stand.trees.is_empty() {
             progress.warn("the scene's rules leave no place for any tree: only the ground is drawn");

@@ -57,6 +57,10 @@ pub struct Expressive {
     pub normals: CrownNormals,
     /// Share of a leaf's own normal, 0 to 1. Default 0.
     pub own_normal: Option<f64>,
+    /// Whether all trees of such species are lit together, so that a small tree is darkened by its tall neighbour [Luft
+    /// 2007, 5]. Each tree then is a model of its own, of which a scene has at most 64. The first such species' values
+    /// count for all. Default false.
+    pub together: bool,
 }
 
 /// Where the normals of an implicit surface's light come from.
