@@ -93,7 +93,7 @@ pub const HELP: [(&str, &str); 20] = [
     ("P", "save a picture into the working directory"),
     ("O", "overlay"),
     ("H", "this help"),
-    ("Esc", "free the mouse, then quit"),
+    ("Esc", "free the mouse, close the panel, then quit"),
 ];
 
 /// The physical keys of travel, which lie where W, A, S, D, Q and E lie on an American keyboard, and their directions

@@ -49,8 +49,9 @@ pub struct News {
     pub species: usize,
     /// Number of the individual among those of the species.
     pub individual: usize,
-    /// Seconds since the order.
-    pub seconds: f64,
+    /// Seconds since the order; `None` for a preview of an order that was replaced meanwhile. While a key is held no other may
+    /// come.
+    pub seconds: Option<f64>,
     /// What it is.
     pub content: Content,
 }
@@ -217,13 +218,17 @@ impl State {
         Err(wait)
     }
 
-    /// Takes up what came of a piece, unless its order was replaced or taken back meanwhile.
+    /// Takes up what came of a piece, unless its order was taken back or, but for a preview, replaced meanwhile.
     fn finish(&mut self, piece: &Piece, content: Content) {
-        let Some(job) = self.jobs.get_mut(&piece.species).filter(|job| job.number == piece.number) else { return };
-        if job.note(&content) {
+        let Some(job) = self.jobs.get_mut(&piece.species) else { return };
+        let current = job.number == piece.number;
+        if !current && !matches!(content, Content::Light { preview: true, .. }) {
+            return;
+        }
+        if current && job.note(&content) {
             self.jobs.remove(&piece.species);
         }
-        let seconds = piece.ordered.elapsed().as_secs_f64();
+        let seconds = current.then(|| piece.ordered.elapsed().as_secs_f64());
         self.news.push(News { species: piece.species, individual: piece.individual, seconds, content });
     }
 }
@@ -310,12 +315,15 @@ impl Baker {
         }
     }
 
-    /// Drops what was wanted of a species.
+    /// Drops what was wanted of a species, and what came of it that nobody has taken yet.
     pub fn cancel(&mut self, species: usize) {
-        self.shared.state().jobs.remove(&species);
+        let mut state = self.shared.state();
+        state.jobs.remove(&species);
+        state.news.retain(|news| news.species != species);
     }
 
-    /// What was baked since the last call, in its order; nothing of orders that were replaced or taken back.
+    /// What was baked since the last call, in its order; nothing of orders that were taken back, and of those that were replaced
+    /// only previews.
     pub fn news(&mut self) -> Vec<News> {
         std::mem::take(&mut self.shared.state().news)
     }
@@ -423,6 +431,44 @@ mod tests {
         baker.order(order(&plants, ImplicitSettings::default()));
         baker.cancel(0);
         assert!(all_news(&mut baker).is_empty());
+        Ok(())
+    }
+
+    /// A held key replaces order after order, faster than one preview is made.
+    #[test]
+    fn a_replaced_order_still_shows_its_preview_and_nothing_else() -> Outcome {
+        let (plants, now) = (plants(1)?, Instant::now());
+        let job = |number| Job {
+            number,
+            ordered: now,
+            order: order(&plants, ImplicitSettings::default()),
+            previewed: 0,
+            lit: Vec::new(),
+            crossed: 0,
+        };
+        let mut state = State::default();
+        state.jobs.insert(0, job(2));
+        let old = job(1).quick().ok_or("nothing to do")?;
+        let light = |preview| Content::Light {
+            preview,
+            lighting: Arc::new(BakedLighting::Local),
+            values: implicit_parameters(&plants[0], &ImplicitSettings::default()),
+            no_surface: None,
+        };
+        state.finish(&old, light(false));
+        assert!(state.news.is_empty());
+        state.finish(&old, light(true));
+        assert!(state.news.len() == 1 && state.news[0].seconds.is_none());
+        assert_eq!(state.jobs[&0].progress(), Progress::Preview);
+        // The thorough lane waits for the preview, then for the keys to rest.
+        assert!(matches!(state.next(Lane::Thorough, now), Err(None)));
+        let new = state.next(Lane::Quick, now).map_err(|_| "nothing to do")?;
+        state.finish(&new, light(true));
+        assert!(matches!(state.next(Lane::Thorough, now), Err(Some(rest)) if rest == REST));
+        assert!(state.next(Lane::Thorough, now + REST).is_ok_and(|piece| piece.number == 2));
+        state.jobs.clear();
+        state.finish(&new, light(true));
+        assert_eq!(state.news.len(), 2);
         Ok(())
     }
 

@@ -149,7 +149,9 @@ impl LightPanel {
 
     /// Orders what an open panel does not know yet of the chosen species.
     fn ask_for_values(&mut self) {
-        if self.open && self.species.get(self.chosen).is_some_and(|species| species.values.is_none()) {
+        let unknown = self.species.get(self.chosen).is_some_and(|species| species.values.is_none());
+        // A bake that is under way will tell.
+        if self.open && unknown && self.baker.progress(self.chosen).is_none() {
             self.order(self.chosen, None);
         }
     }
@@ -200,7 +202,7 @@ impl LightPanel {
                 }
             };
             if individual + 1 == species.variants.len() {
-                species.times[stage] = Some(seconds);
+                species.times[stage] = seconds.or(species.times[stage]);
             }
         }
         Some(plants)

@@ -26,11 +26,13 @@ const KEYS: [(&str, &str); 5] = [
 /// Draws the panel.
 pub fn light_panel(ui: &mut Ui, panel: &LightPanel) {
     let Some(species) = panel.species.get(panel.chosen) else { return };
-    ui.set_max_width(WIDTH);
+    ui.set_width(WIDTH);
     let (number, all) = (panel.chosen + 1, panel.species.len());
     let which = if all > 1 { format!(" ({number} of {all})") } else { String::new() };
     ui.label(small(format!("Leaves of \"{}\"{which}", species.name)).strong());
-    Grid::new("canopy_light").num_columns(2).spacing([10.0, 2.0]).show(ui, |ui| {
+    // A grid remembers its columns by its name.
+    let name = ("canopy_light", species.tuning.lines().len());
+    Grid::new(name).num_columns(2).spacing([10.0, 2.0]).show(ui, |ui| {
         for (number, line) in species.tuning.lines().iter().enumerate() {
             let chosen = number == panel.line;
             let value = species.tuning.value(*line, species.values.as_ref());
