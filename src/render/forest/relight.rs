@@ -85,17 +85,19 @@ mod tests {
     fn a_bake_under_another_light_differs_in_light_alone() -> Result<(), Box<dyn std::error::Error>> {
         let plant = Arc::new(grow(&GrowParameters::broadleaf(), 1, 5000)?);
         let baked = |lighting| bake_plant(plant.clone(), &BakeSettings { lighting, ..BakeSettings::default() }, None).0;
-        let local = baked(LightingSettings::Local);
-        let fresh = baked(LightingSettings::Expressive(ImplicitSettings::default()));
-        assert!(local.cross != fresh.cross && same_outline(&local.cross, &fresh.cross));
-        let lit = BakedPlant { lighting: fresh.lighting.clone(), cross: fresh.cross.clone(), ..local.clone() };
-        assert!(differ_in_light(&[local.clone()], &[lit.clone()]));
-        assert!(!differ_in_light(&[local.clone()], &[lit.clone(), lit.clone()]));
+        let local = [baked(LightingSettings::Local)];
+        let fresh = [baked(LightingSettings::Expressive(ImplicitSettings::default()))];
+        assert!(local[0].cross != fresh[0].cross && same_outline(&local[0].cross, &fresh[0].cross));
+        let (lighting, cross) = (fresh[0].lighting.clone(), fresh[0].cross.clone());
+        let lit = [BakedPlant { lighting, cross, ..local[0].clone() }];
+        assert!(differ_in_light(&local, &lit));
+        assert!(!differ_in_light(&local, &[&lit[..], &lit[..]].concat()));
         // Another proxy casts another shadow, other colours have another outline.
-        assert!(!differ_in_light(&[local.clone()], &[fresh]));
-        let mut cross = (*lit.cross).clone();
+        assert!(!differ_in_light(&local, &fresh));
+        let mut cross = (*lit[0].cross).clone();
         cross.textures.color[0].levels[0][3] ^= 0x80;
-        assert!(!differ_in_light(&[local], &[BakedPlant { cross: Arc::new(cross), ..lit }]));
+        let [lit] = lit;
+        assert!(!differ_in_light(&local, &[BakedPlant { cross: Arc::new(cross), ..lit }]));
         Ok(())
     }
 }

@@ -49,9 +49,9 @@ pub struct News {
     pub species: usize,
     /// Number of the individual among those of the species.
     pub individual: usize,
-    /// Seconds since the order; `None` for a preview of an order that was replaced meanwhile. While a key is held no other may
+    /// When it was ordered; `None` for a preview of an order that was replaced meanwhile. While a key is held no other may
     /// come.
-    pub seconds: Option<f64>,
+    pub ordered: Option<Instant>,
     /// What it is.
     pub content: Content,
 }
@@ -228,8 +228,8 @@ impl State {
         if current && job.note(&content) {
             self.jobs.remove(&piece.species);
         }
-        let seconds = current.then(|| piece.ordered.elapsed().as_secs_f64());
-        self.news.push(News { species: piece.species, individual: piece.individual, seconds, content });
+        let ordered = current.then_some(piece.ordered);
+        self.news.push(News { species: piece.species, individual: piece.individual, ordered, content });
     }
 }
 
@@ -458,7 +458,7 @@ mod tests {
         state.finish(&old, light(false));
         assert!(state.news.is_empty());
         state.finish(&old, light(true));
-        assert!(state.news.len() == 1 && state.news[0].seconds.is_none());
+        assert!(state.news.len() == 1 && state.news[0].ordered.is_none());
         assert_eq!(state.jobs[&0].progress(), Progress::Preview);
         // The thorough lane waits for the preview, then for the keys to rest.
         assert!(matches!(state.next(Lane::Thorough, now), Err(None)));

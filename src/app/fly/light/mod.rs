@@ -56,7 +56,7 @@ struct Turned {
     values: Option<ImplicitParameters>,
     /// Why an individual has its leaves' own normals.
     no_surface: Vec<Option<String>>,
-    /// Seconds from the last turn to its preview, light in full and crosses, each of all individuals.
+    /// Seconds from the key to the frame that uploads its preview, light in full and crosses, each of all individuals.
     times: [Option<f64>; 3],
 }
 
@@ -180,7 +180,7 @@ impl LightPanel {
                 shown.clone_from_slice(own);
             }
         }
-        for News { species, individual, seconds, content } in news {
+        for News { species, individual, ordered, content } in news {
             let Some(species) = self.species.get_mut(species) else { continue };
             let Some(plant) = plants.get_mut(species.variants.start + individual) else { continue };
             let stage = match content {
@@ -202,6 +202,7 @@ impl LightPanel {
                 }
             };
             if individual + 1 == species.variants.len() {
+                let seconds = ordered.map(|ordered| ordered.elapsed().as_secs_f64());
                 species.times[stage] = seconds.or(species.times[stage]);
             }
         }
