@@ -2,11 +2,11 @@
 //!
 //! Two threads of their own wait for orders. The quick one makes previews, of a share of the generators, one plant after
 //! the other. The thorough one begins when the previews are there and the keys have been at rest for a moment. The latest order of a
-//! species wins: what an older one still had to do is dropped, and what comes of a bake that was under way too. So a
-//! preview never waits for a bake in full that nobody wants any more.
+//! species wins: what an older one still had to do is dropped, and of a bake that was under way only a preview is still
+//! shown. So a preview never waits for a bake in full that nobody wants any more.
 //!
-//! The thorough thread has a rayon pool of all cores but one (at least one thread), the quick one a pool of one thread:
-//! together they never have more threads than there are cores, and mostly leave one to the frame.
+//! The thorough thread has a rayon pool of all cores but one, the quick one a pool of one thread: of two cores or more they
+//! never ask for more than there are, and leave one to the frame unless a preview comes while a bake that was dropped ends.
 
 use std::{
     collections::BTreeMap,

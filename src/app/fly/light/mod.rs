@@ -88,9 +88,10 @@ impl LightPanel {
 
     /// Opens or closes the panel; `false` where the scene has no species.
     pub fn toggle(&mut self) -> bool {
-        self.open = !self.open && !self.species.is_empty();
+        let something = !self.species.is_empty();
+        self.open = !self.open && something;
         self.ask_for_values();
-        self.open || !self.species.is_empty()
+        something
     }
 
     /// Does what a key asks for; a text is what to write for the user.
