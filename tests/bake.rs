@@ -394,7 +394,7 @@ fn real_tree(path: &Path) {
     }
     let bounds = baked.plant.bounds().unwrap();
     let mut proxy = Plant::clone(&baked.plant);
-    proxy.parts.iter_mut().zip(&baked.shadow_proxy).for_each(|(part, mesh)| part.mesh = mesh.clone());
+    proxy.parts.iter_mut().zip(baked.shadow_proxy.iter()).for_each(|(part, mesh)| part.mesh = mesh.clone());
     for toward in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::new(0.5, 0.7, -0.5).normalize()] {
         let mut view = View::framing(bounds, toward);
         (view.right, view.up) = (1.3 * view.right, 1.3 * view.up);

@@ -91,5 +91,5 @@ impl Ours {
 
 fn full_casters(plant: &BakedPlant) -> BakedPlant {
     let shadow_proxy = plant.plant.parts.iter().map(|part| part.mesh.clone()).collect();
-    BakedPlant { shadow_proxy, ..plant.clone() }
+    BakedPlant { shadow_proxy: Arc::new(shadow_proxy), ..plant.clone() }
 }

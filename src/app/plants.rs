@@ -141,7 +141,7 @@ fn sources(species: &Species) -> Result<Vec<IndividualSource>, AppError> {
 }
 
 /// What a species' light asks of the bake.
-fn lighting_settings(lighting: Option<&Lighting>) -> LightingSettings {
+pub fn lighting_settings(lighting: Option<&Lighting>) -> LightingSettings {
     match lighting {
         None => LightingSettings::default(),
         Some(Lighting::Local) => LightingSettings::Local,

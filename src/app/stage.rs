@@ -1,6 +1,6 @@
 //! From a validated scene to what the renderer shows: terrain, plants, stand, baked and packed.
 
-use std::{path::Path, sync::Arc, time::Instant};
+use std::{ops::Range, path::Path, sync::Arc, time::Instant};
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -34,6 +34,8 @@ pub struct Stage {
     pub stand: Arc<PackedStand>,
     /// Their plants, by variant.
     pub plants: Arc<Vec<BakedPlant>>,
+    /// Variants of each of the scene's species.
+    pub variants: Vec<Range<u16>>,
     /// Share of ground under crowns; `None` without trees.
     pub cover: Option<Arc<CoverMap>>,
     /// Place on earth.
@@ -78,7 +80,8 @@ impl Stage {
         if has_trees && stand.trees.is_empty() {
             progress.warn("the scene's rules leave no place for any tree: only the ground is drawn");
         }
-        Ok(Self { terrain, stand: Arc::new(packed), plants: Arc::new(plants), cover, observer, scene })
+        let (stand, plants, variants) = (Arc::new(packed), Arc::new(plants), species.variants);
+        Ok(Self { terrain, stand, plants, variants, cover, observer, scene })
     }
 
     /// The forest of the scene, or `None` without trees.

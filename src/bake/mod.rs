@@ -31,17 +31,18 @@ use billboard::{Cross, CrossSettings, bake_cross};
 use cache::{Cache, CacheKey};
 use lighting::{BakedLighting, LightingSettings};
 
-/// A plant with everything that is derived from it once and kept in the cache.
+/// A plant with everything that is derived from it once and kept in the cache. What is made apart is shared apart: a copy
+/// is cheap, and who draws plants sees by the pointers what of one has changed.
 #[derive(Clone, Debug)]
 pub struct BakedPlant {
     /// The full model.
     pub plant: Arc<Plant>,
     /// What lights the foliage.
-    pub lighting: BakedLighting,
+    pub lighting: Arc<BakedLighting>,
     /// A lighter model (parts in the plant's order) with the same projected area, which casts the near shadow.
-    pub shadow_proxy: Vec<PlantMesh>,
+    pub shadow_proxy: Arc<Vec<PlantMesh>>,
     /// Crossed billboards.
-    pub cross: Cross,
+    pub cross: Arc<Cross>,
 }
 
 /// How a plant is baked. Values out of range are moved into it.
@@ -126,8 +127,8 @@ pub fn bake_plant(plant: Arc<Plant>, settings: &BakeSettings, cache: Option<&Cac
 fn bake_fresh(plant: Arc<Plant>, settings: &BakeSettings) -> BakedPlant {
     let triangles: usize = plant.parts.iter().map(|part| part.mesh.triangles.len()).sum();
     let target = (triangles as f64 * f64::from(settings.shadow_share)).round() as usize;
-    let lighting = BakedLighting::bake(&plant, &settings.lighting);
-    let cross = bake_cross(&plant, &lighting, &settings.cross);
-    let shadow_proxy = shadow_proxy::shadow_proxy(&plant, target);
+    let lighting = Arc::new(BakedLighting::bake(&plant, &settings.lighting));
+    let cross = Arc::new(bake_cross(&plant, &lighting, &settings.cross));
+    let shadow_proxy = Arc::new(shadow_proxy::shadow_proxy(&plant, target));
     BakedPlant { plant, lighting, shadow_proxy, cross }
 }

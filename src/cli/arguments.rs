@@ -88,7 +88,7 @@ pub struct CameraArguments {
 #[derive(Debug, Args)]
 #[command(
     after_help = "Keys: W A S D Q E move, mouse looks, wheel sets the speed, Shift hurries, F flies the scene's \
-                        path, H shows all keys.
+                        path, L opens a panel that turns the light of the leaves, H shows all keys.
 
 Examples:
   canopy fly

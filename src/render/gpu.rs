@@ -113,16 +113,22 @@ pub fn texture_array(
         view_formats: &[],
     });
     for (layer, chain) in layers.iter().enumerate() {
-        for (level, texels) in chain.levels.iter().take(levels).enumerate() {
-            let (level_width, level_height) = ((width >> level).max(1), (height >> level).max(1));
-            if texels.len() == (level_width * level_height * 4) as usize {
-                write_level(queue, &texture, layer as u32, level as u32, level_width, level_height, 4, texels);
-            }
-        }
+        write_layer(queue, &texture, layer as u32, chain);
     }
     let view = texture
         .create_view(&TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..Default::default() });
     (texture, view)
+}
+
+/// Writes all levels that an RGBA8 `texture` has of `chain` into one of its layers; those of another size are left out.
+pub fn write_layer(queue: &RenderQueue, texture: &Texture, layer: u32, chain: &MipChain) {
+    let (width, height) = (texture.width(), texture.height());
+    for (level, texels) in (0..texture.mip_level_count()).zip(&chain.levels) {
+        let (level_width, level_height) = ((width >> level).max(1), (height >> level).max(1));
+        if texels.len() == (level_width * level_height * 4) as usize {
+            write_level(queue, texture, layer, level, level_width, level_height, 4, texels);
+        }
+    }
 }
 
 /// A plain texture with one mip chain down to `smallest` texels.

@@ -73,7 +73,56 @@ pub enum CrownNormals {
     Smooth,
 }
 
+impl Expressive {
+    /// Range of [`radius`](Self::radius), metres.
+    pub const RADIUS: RangeInclusive<f64> = 1e-6..=1e3;
+    /// Range of [`threshold`](Self::threshold) and [`core`](Self::core), leaves.
+    pub const DENSITY: RangeInclusive<f64> = 0.0..=1e6;
+    /// Range of [`exponent`](Self::exponent).
+    pub const EXPONENT: RangeInclusive<f64> = 0.01..=100.0;
+    /// Range of [`share`](Self::share).
+    pub const SHARE: RangeInclusive<f64> = 1e-3..=1.0;
+    /// Range of [`least`](Self::least) and [`own_normal`](Self::own_normal).
+    pub const UNIT: RangeInclusive<f64> = 0.0..=1.0;
+}
+
 impl Lighting {
+    /// The light as a scene file writes it behind `lighting:`, as in `Expressive(radius: 0.8, normals: Smooth)`. What is as
+    /// it is when left out is left out. A scene that has it gets the same light, to the last bit.
+    pub fn to_ron(&self) -> String {
+        let mut fields = Vec::new();
+        let name = match self {
+            Self::Local => return "Local".to_owned(),
+            Self::Expressive(expressive) => {
+                for (name, value) in [
+                    ("radius", expressive.radius),
+                    ("threshold", expressive.threshold),
+                    ("least", expressive.least),
+                    ("core", expressive.core),
+                    ("exponent", expressive.exponent),
+                    ("share", expressive.share),
+                    ("own_normal", expressive.own_normal),
+                ] {
+                    fields.extend(value.map(|value| format!("{name}: {value}")));
+                }
+                if expressive.normals != CrownNormals::default() {
+                    fields.push(format!("normals: {:?}", expressive.normals));
+                }
+                "Expressive"
+            }
+            Self::Transfer(transfer) => {
+                let default = Transfer::default();
+                let mut field = |differs: bool, text: String| fields.extend(differs.then_some(text));
+                field(transfer.bands != default.bands, format!("bands: {}", transfer.bands));
+                field(transfer.color != default.color, format!("color: {}", transfer.color));
+                field(transfer.rays != default.rays, format!("rays: {}", transfer.rays));
+                field(transfer.bounces != default.bounces, format!("bounces: {}", transfer.bounces));
+                "Transfer"
+            }
+        };
+        format!("{name}({})", fields.join(", "))
+    }
+
     pub(super) fn check(&self, at: &str, check: &mut Check) {
         if let Self::Transfer(transfer) = self {
             check.count(&format!("{at}.lighting.bands"), transfer.bands, 2..=6);
@@ -86,12 +135,12 @@ impl Lighting {
                 check.number(&format!("{at}.lighting.{name}"), value, range, unit);
             }
         };
-        number("radius", expressive.radius, 1e-6..=1e3, "m");
-        number("threshold", expressive.threshold, 0.0..=1e6, "leaves");
-        number("least", expressive.least, 0.0..=1.0, "");
-        number("core", expressive.core, 0.0..=1e6, "leaves");
-        number("exponent", expressive.exponent, 0.01..=100.0, "");
-        number("share", expressive.share, 1e-3..=1.0, "");
-        number("own_normal", expressive.own_normal, 0.0..=1.0, "");
+        number("radius", expressive.radius, Expressive::RADIUS, "m");
+        number("threshold", expressive.threshold, Expressive::DENSITY, "leaves");
+        number("least", expressive.least, Expressive::UNIT, "");
+        number("core", expressive.core, Expressive::DENSITY, "leaves");
+        number("exponent", expressive.exponent, Expressive::EXPONENT, "");
+        number("share", expressive.share, Expressive::SHARE, "");
+        number("own_normal", expressive.own_normal, Expressive::UNIT, "");
     }
 }

@@ -11,6 +11,10 @@ use bevy::{
 };
 use canopy::{
     app::{Picture, Renderer, Stage},
+    bake::{
+        BakeSettings, BakedPlant, bake_plant, billboard::CrossSettings, implicit::ImplicitSettings,
+        lighting::LightingSettings,
+    },
     render::{
         components::{CanopyCamera, CastsCanopyShadow, Forest, SunShadowSettings},
         forest::GpuForests,
@@ -163,6 +167,53 @@ fn a_forest_that_is_despawned_frees_what_it_held() {
     settled(&mut renderer, stage, &from);
     assert_eq!(Arc::strong_count(&stage.terrain), 1, "the ground is held after it was despawned");
     assert_eq!(stage.cover.as_ref().map(Arc::strong_count), Some(1), "the cover is held");
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+/// Gives every forest these plants.
+fn set_plants(renderer: &mut Renderer, plants: &Arc<Vec<BakedPlant>>) {
+    for forest in forests(renderer) {
+        if let Some(mut forest) = renderer.app().world_mut().get_mut::<Forest>(forest) {
+            forest.plants = plants.clone();
+        }
+    }
+}
+
+#[test]
+fn another_light_is_drawn_as_if_it_had_always_been_there() {
+    let gpu = gpu();
+    // Near and far trees: models and crosses.
+    let built = grove(1);
+    let stage = &built.stage;
+    let from = view(stage, (0.0, 10.0, 60.0), 0.0, -5.0);
+    let settings = BakeSettings {
+        lighting: LightingSettings::Expressive(ImplicitSettings::default()),
+        cross: CrossSettings { resolution: 64, ..CrossSettings::default() },
+        ..BakeSettings::default()
+    };
+    let lit = |plant: &BakedPlant| {
+        let (baked, _) = bake_plant(plant.plant.clone(), &settings, None);
+        BakedPlant { lighting: baked.lighting, cross: baked.cross, ..plant.clone() }
+    };
+    let plants = Arc::new(stage.plants.iter().map(lit).collect::<Vec<_>>());
+
+    let mut renderer = showing(stage);
+    let before = settled(&mut renderer, stage, &from);
+    let generations = |renderer: &mut Renderer| -> Vec<u64> {
+        let forests = renderer.app().sub_app(RenderApp).world().resource::<GpuForests>();
+        forests.iter().map(|(_, forest)| forest.generation).collect()
+    };
+    let generation = generations(&mut renderer);
+    set_plants(&mut renderer, &plants);
+    let relit = settled(&mut renderer, stage, &from);
+    keep(&relit, "relit");
+    assert_eq!(generations(&mut renderer), generation, "shadows are drawn anew for a light in the leaves");
+    let mut fresh = showing(stage);
+    set_plants(&mut fresh, &plants);
+    assert!(settled(&mut fresh, stage, &from) == relit, "relit plants are drawn otherwise than new ones");
+    assert!(before != relit);
+    set_plants(&mut renderer, &stage.plants);
+    assert!(settled(&mut renderer, stage, &from) == before, "the way back leads elsewhere");
     assert_eq!(gpu.messages(), Vec::<String>::new());
 }
 

@@ -29,6 +29,8 @@ pub enum Command {
     Help,
     /// Show the small overlay.
     Overlay,
+    /// Open or close the panel of the leaves' light.
+    Light,
     /// Back to where and when the flight began.
     Home,
     /// Set the clock by this many minutes.
@@ -50,8 +52,28 @@ impl Command {
     }
 }
 
+/// Something that a key asks of the open panel of the leaves' light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Turn {
+    /// Choose the next line, downwards or upwards.
+    Line(bool),
+    /// Choose the next species, forwards or backwards.
+    Species(bool),
+    /// Turn the chosen line.
+    Value {
+        /// Whether up.
+        up: bool,
+        /// Whether by a small step.
+        fine: bool,
+    },
+    /// Take the chosen line back to what it is of itself.
+    Reset,
+    /// Write the values for a scene file.
+    Write,
+}
+
 /// All keys and what they do, as the help shows them.
-pub const HELP: [(&str, &str); 19] = [
+pub const HELP: [(&str, &str); 20] = [
     ("W A S D", "fly forward, left, back, right"),
     ("E  Q", "up, down"),
     ("Shift", "five times as fast"),
@@ -67,10 +89,11 @@ pub const HELP: [(&str, &str); 19] = [
     ("Home", "back to the start, place and time"),
     ("U", "under the ground or not"),
     ("T", "tint: full models green, crosses blue"),
+    ("L", "panel: turn the light of the leaves; it takes the arrows"),
     ("P", "save a picture into the working directory"),
     ("O", "overlay"),
     ("H", "this help"),
-    ("Esc", "free the mouse, then quit"),
+    ("Esc", "free the mouse, close the panel, then quit"),
 ];
 
 /// The physical keys of travel, which lie where W, A, S, D, Q and E lie on an American keyboard, and their directions
@@ -114,6 +137,7 @@ pub fn command(code: KeyCode, key: &Key, shift: bool, repeat: bool) -> Option<Co
             "p" => Command::Picture,
             "h" => Command::Help,
             "o" => Command::Overlay,
+            "l" => Command::Light,
             "," => Command::Minutes(-60),
             "." => Command::Minutes(60),
             "[" => Command::Minutes(-10),
@@ -126,6 +150,27 @@ pub fn command(code: KeyCode, key: &Key, shift: bool, repeat: bool) -> Option<Co
         _ => return None,
     };
     (!repeat || command.repeats()).then_some(command)
+}
+
+/// What a pressed key asks of the open panel. Tab and what cannot be taken back at once do not repeat.
+pub fn turn(key: &Key, shift: bool, repeat: bool) -> Option<Turn> {
+    let turn = match key {
+        Key::ArrowDown => Turn::Line(true),
+        Key::ArrowUp => Turn::Line(false),
+        Key::ArrowRight => Turn::Value { up: true, fine: shift },
+        Key::ArrowLeft => Turn::Value { up: false, fine: shift },
+        _ if repeat => return None,
+        Key::Tab => Turn::Species(!shift),
+        Key::Backspace => Turn::Reset,
+        Key::Enter => Turn::Write,
+        _ => return None,
+    };
+    Some(turn)
+}
+
+/// Whether a key turns the view.
+pub fn turns_view(key: KeyCode) -> bool {
+    TURN.iter().any(|(turn, _)| *turn == key)
 }
 
 /// The flight that the held keys and the mouse ask for within a step. `held` tells whether a key is down, `mouse` is
@@ -170,6 +215,16 @@ mod tests {
         assert_eq!(command(KeyCode::PageDown, &Key::PageDown, true, true), Some(Command::Months(-1)));
         assert_eq!(command(KeyCode::KeyT, &Key::Character("t".into()), false, true), None);
         assert_eq!(command(KeyCode::Escape, &Key::Escape, false, true), None);
+    }
+
+    #[test]
+    fn the_panel_has_its_own_keys() {
+        assert_eq!(typed(KeyCode::KeyL, "l"), Some(Command::Light));
+        assert_eq!(turn(&Key::ArrowLeft, true, true), Some(Turn::Value { up: false, fine: true }));
+        assert_eq!((turn(&Key::Tab, true, false), turn(&Key::Tab, false, true)), (Some(Turn::Species(false)), None));
+        // What the panel does not know goes to the flight.
+        assert_eq!(turn(&Key::Character("t".into()), false, false), None);
+        assert!(turns_view(KeyCode::ArrowUp) && !turns_view(KeyCode::KeyW));
     }
 
     #[test]

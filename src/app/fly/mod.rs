@@ -2,12 +2,13 @@
 //!
 //! `motion`, `tour`, `clock` and `session` are the flight itself and know neither window nor renderer; `controls`
 //! says which key does what; `window` brings both together; `overlay`, `picture` and `explain` show and keep what is
-//! seen; `timing` measures.
+//! seen; `light` turns the light of the leaves while looking; `timing` measures.
 
 mod clock;
 mod controls;
 mod display;
 mod explain;
+mod light;
 mod motion;
 mod overlay;
 mod picture;
@@ -77,12 +78,21 @@ fn build(session: Session, options: &FlyOptions, settings: WgpuSettings) -> App 
             .set(LogPlugin { level: Level::WARN, filter: adapter::LOG_FILTER.to_owned(), ..LogPlugin::default() }),
     );
     app.add_plugins((CanopyPlugins, EguiPlugin::default(), timing::TimingPlugin))
+        .insert_resource(light::LightPanel::new(&session.stage))
         .insert_resource(session)
         .add_systems(Startup, window::set_up)
         .add_systems(PostStartup, window::follow)
         .add_systems(
             Update,
-            (window::catch_mouse, window::obey, window::fly, window::follow, picture::take_picture).chain(),
+            (
+                window::catch_mouse,
+                window::obey,
+                light::follow_light,
+                window::fly,
+                window::follow,
+                picture::take_picture,
+            )
+                .chain(),
         )
         .add_systems(EguiPrimaryContextPass, overlay::draw_overlays);
     // Letters that the overlay shows for the first time must reach the device with the frame that shows them.

@@ -6,7 +6,12 @@ use bevy_egui::{
     egui::{Align2, Area, Color32, Context, CornerRadius, Frame, Grid, Id, Margin, RichText, Stroke, Ui, Visuals},
 };
 
-use super::{controls::HELP, session::Session, timing::FrameTimes};
+use super::{
+    controls::HELP,
+    light::{LightPanel, light_panel},
+    session::Session,
+    timing::FrameTimes,
+};
 use crate::render::{
     components::Daylight,
     report::{FrameReport, PassOutcome},
@@ -15,9 +20,9 @@ use crate::render::{
 /// Points between an overlay and the window's edge.
 const EDGE: f32 = 8.0;
 /// Points of the overlays' text.
-const SMALL: f32 = 12.0;
+pub(super) const SMALL: f32 = 12.0;
 /// Colour of what stands before a value.
-const NAME: Color32 = Color32::from_gray(185);
+pub(super) const NAME: Color32 = Color32::from_gray(185);
 const FRAME_TIME: &str = "Time from one frame's completion on the device to the next one's, over the last 120 frames: \
                           what the CPU needs, what the device needs, and the wait for the screen. Half of the frames \
                           take no longer than p50, 95 of 100 no longer than p95.";
@@ -31,6 +36,7 @@ const POSITION: &str = "Metres east (x) and south (z) of the terrain's centre, a
 pub fn draw_overlays(
     mut contexts: EguiContexts,
     mut session: ResMut<Session>,
+    light: Res<LightPanel>,
     frames: Res<FrameTimes>,
     report: Res<FrameReport>,
     daylight: Option<Res<Daylight>>,
@@ -54,6 +60,9 @@ pub fn draw_overlays(
             numbers(ui, &session, &frames, sun);
             passes(ui, &report);
         });
+    }
+    if light.open && !session.help {
+        panel(context, "canopy_light_panel", Align2::RIGHT_TOP, [-EDGE, EDGE], |ui| light_panel(ui, &light));
     }
     if let Some(message) = session.message() {
         // An area remembers its size by its name: each message has its own.
@@ -80,7 +89,7 @@ fn panel(context: &Context, name: &str, align: Align2, offset: [f32; 2], content
     });
 }
 
-fn small(text: impl Into<String>) -> RichText {
+pub(super) fn small(text: impl Into<String>) -> RichText {
     RichText::new(text).size(SMALL)
 }
 

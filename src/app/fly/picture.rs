@@ -8,7 +8,7 @@ use std::{
 use bevy::{
     ecs::{
         observer::On,
-        system::{Commands, ResMut},
+        system::{Commands, Res, ResMut},
     },
     image::Image,
     log::warn,
@@ -16,11 +16,11 @@ use bevy::{
 };
 use chrono::{DateTime, Utc};
 
-use super::session::Session;
+use super::{light::LightPanel, session::Session};
 use crate::app::{error::AppError, notes::notes, picture::Picture};
 
 /// Captures this frame where the session asks for it.
-pub fn take_picture(mut commands: Commands, session: ResMut<Session>) {
+pub fn take_picture(mut commands: Commands, session: ResMut<Session>, panel: Res<LightPanel>) {
     if !session.picturing {
         return;
     }
@@ -28,6 +28,7 @@ pub fn take_picture(mut commands: Commands, session: ResMut<Session>) {
     if session.tinted {
         notes.push(("View", "trees tinted by level of detail".to_owned()));
     }
+    notes.extend(panel.notes().map(|light| ("Light", light)));
     let save = move |captured: On<ScreenshotCaptured>, mut session: ResMut<Session>| {
         let outcome = picture(&captured.image).and_then(|picture| {
             let file = free_name(SystemTime::now());

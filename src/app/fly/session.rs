@@ -167,7 +167,7 @@ impl Session {
     /// Carries out a command, as far as it concerns the flight; what concerns the window is done there.
     pub fn carry_out(&mut self, command: Command) {
         match command {
-            Command::Leave => {}
+            Command::Leave | Command::Light => {}
             Command::Picture => self.picturing = true,
             Command::Tour if self.tour.is_none() => {
                 self.say("this scene has no camera path; add `camera: (path: [...])` to its file".to_owned());

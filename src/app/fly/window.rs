@@ -1,5 +1,7 @@
 //! The window's side: the mouse is caught and freed, keys become commands, the camera's entity follows the flight.
 
+use std::io::Write;
+
 use bevy::{
     app::AppExit,
     camera::Camera3d,
@@ -22,6 +24,7 @@ use bevy_egui::input::EguiWantsInput;
 
 use super::{
     controls::{self, Command},
+    light::LightPanel,
     session::Session,
 };
 use crate::{
@@ -82,6 +85,7 @@ pub fn obey(
     mut keys: MessageReader<KeyboardInput>,
     held: Res<ButtonInput<KeyCode>>,
     mut session: ResMut<Session>,
+    mut panel: ResMut<LightPanel>,
     mut cursor: Single<&mut CursorOptions, With<PrimaryWindow>>,
     mut exit: MessageWriter<AppExit>,
     mut shift: Local<bool>,
@@ -96,9 +100,23 @@ pub fn obey(
         if !pressed {
             continue;
         }
+        if panel.open
+            && let Some(turn) = controls::turn(&key.logical_key, *shift, key.repeat)
+        {
+            if let Some(text) = panel.turn(turn) {
+                write(&text, &mut session);
+            }
+            continue;
+        }
         let Some(command) = controls::command(key.key_code, &key.logical_key, *shift, key.repeat) else { continue };
         match command {
             Command::Leave if caught(&cursor) => set_caught(&mut cursor, false),
+            Command::Leave if panel.open => panel.open = false,
+            Command::Light => {
+                if !panel.toggle() {
+                    session.say("this scene has no species whose light could be turned".to_owned());
+                }
+            }
             Command::Leave => {
                 exit.write(AppExit::Success);
             }
@@ -109,6 +127,15 @@ pub fn obey(
     *shift = held.any_pressed(SHIFTS);
 }
 
+/// Writes a text for the user to take.
+fn write(text: &str, session: &mut Session) {
+    let mut out = std::io::stdout();
+    session.say(match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Ok(()) => "written into the terminal".to_owned(),
+        Err(error) => format!("the terminal cannot be written to: {error}"),
+    });
+}
+
 /// Flies for the time since the last frame.
 pub fn fly(
     time: Res<Time<Real>>,
@@ -116,6 +143,7 @@ pub fn fly(
     motion: Res<AccumulatedMouseMotion>,
     wheel: Res<AccumulatedMouseScroll>,
     cursor: Single<&CursorOptions, With<PrimaryWindow>>,
+    panel: Res<LightPanel>,
     mut session: ResMut<Session>,
 ) {
     let seconds = time.delta_secs_f64();
@@ -125,7 +153,8 @@ pub fn fly(
         MouseScrollUnit::Pixel => f64::from(wheel.delta.y) / PIXELS_A_NOTCH,
     };
     // A key that was pressed and released between two slow frames still counts.
-    let held = |key| keys.pressed(key) || keys.just_pressed(key);
+    let pressed = |key| keys.pressed(key) || keys.just_pressed(key);
+    let held = |key| pressed(key) && !(panel.open && controls::turns_view(key));
     let controls = controls::controls(held, mouse, notches, seconds);
     session.fly(&controls, seconds);
 }

@@ -113,9 +113,9 @@ fn unbaked(plant: Plant) -> BakedPlant {
     let textures = CrossTextures { color: Vec::new(), properties: Vec::new() };
     BakedPlant {
         plant: Arc::new(plant),
-        lighting: BakedLighting::Local,
-        shadow_proxy: Vec::new(),
-        cross: Cross { planes: Vec::new(), textures, transmission: Vec3::ZERO, spread: [0.0; SPREAD_LEVELS] },
+        lighting: Arc::new(BakedLighting::Local),
+        shadow_proxy: Arc::default(),
+        cross: Arc::new(Cross { planes: Vec::new(), textures, transmission: Vec3::ZERO, spread: [0.0; SPREAD_LEVELS] }),
     }
 }
 

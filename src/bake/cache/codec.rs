@@ -103,7 +103,8 @@ pub(super) fn decode(file: &[u8], key: &[u8; 32], plant: &Arc<Plant>) -> Option<
         && shadow_proxy.len() == plant.parts.len()
         && textures.color.len() == planes.len()
         && textures.properties.len() == planes.len();
-    let cross = Cross { planes, textures, transmission, spread };
+    let cross = Arc::new(Cross { planes, textures, transmission, spread });
+    let (lighting, shadow_proxy) = (Arc::new(lighting), Arc::new(shadow_proxy));
     fits.then(|| BakedPlant { plant: Arc::clone(plant), lighting, shadow_proxy, cross })
 }
 
@@ -311,18 +312,18 @@ mod tests {
         let plane = CrossPlane { center: Vec3::ONE, u: Vec3::X, v: Vec3::Y, normal: Vec3::Z };
         BakedPlant {
             plant: Arc::new(Plant { name: "small".into(), parts: vec![part] }),
-            lighting: BakedLighting::Expressive(ExpressiveLighting {
+            lighting: Arc::new(BakedLighting::Expressive(ExpressiveLighting {
                 normals: vec![vec![Vec3::X, Vec3::Y, Vec3::Z]],
                 ambient: vec![vec![0.0, 0.5, 1.0]],
                 no_surface: Some(NoSurface::Threshold { threshold: 2.0, greatest: 1.5 }),
-            }),
-            shadow_proxy: vec![mesh],
-            cross: Cross {
+            })),
+            shadow_proxy: Arc::new(vec![mesh]),
+            cross: Arc::new(Cross {
                 planes: vec![plane],
                 textures: CrossTextures { color: vec![chain.clone()], properties: vec![chain] },
                 transmission: Vec3::new(0.1, 0.2, 0.3),
                 spread: [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 1.0],
-            },
+            }),
         }
     }
 

@@ -111,17 +111,38 @@ pub struct ImplicitBake {
 /// that has no surface keeps its own normals, and the report says why.
 pub fn bake_implicit(plant: &Plant, settings: &ImplicitSettings) -> ImplicitBake {
     let settings = settings.in_range();
-    let parts: Vec<Part> = plant.parts.iter().map(|p| Part { kind: p.kind, mesh: Cow::Borrowed(&p.mesh) }).collect();
-    let (parts, origin) = centered(parts);
-    let all = foliage_generators(&parts);
-    let radius = parameters::radius(&all, extent(&parts), &settings);
-    let generators = generators::even_share(&all, settings.generator_share);
-    let field = DensityField::new(&generators, radius, settings.weighting);
-    let parameters = parameters::parameters(&all, &field, &settings);
+    let (parts, origin) = centered(parts_of(plant));
+    let Basis { generators, field, parameters } = basis(&parts, &settings);
     let mut baked = bake_parts(&parts, &generators, &field, parameters, &settings);
     let places = baked.surface.iter_mut().flat_map(|surface| surface.positions.iter_mut());
     places.for_each(|place| *place += origin);
     baked
+}
+
+/// The values that a bake of `plant` with `settings` goes by, without the bake: a tenth of its time, or less.
+pub fn implicit_parameters(plant: &Plant, settings: &ImplicitSettings) -> ImplicitParameters {
+    basis(&centered(parts_of(plant)).0, &settings.in_range()).parameters
+}
+
+fn parts_of(plant: &Plant) -> Vec<Part<'_>> {
+    plant.parts.iter().map(|part| Part { kind: part.kind, mesh: Cow::Borrowed(&part.mesh) }).collect()
+}
+
+/// What a bake stands on.
+struct Basis {
+    generators: Vec<Generator>,
+    field: DensityField,
+    parameters: ImplicitParameters,
+}
+
+/// Generators, field and values of a lone plant, by `settings` that are in range.
+fn basis(parts: &[Part], settings: &ImplicitSettings) -> Basis {
+    let all = foliage_generators(parts);
+    let radius = parameters::radius(&all, extent(parts), settings);
+    let generators = generators::even_share(&all, settings.generator_share);
+    let field = DensityField::new(&generators, radius, settings.weighting);
+    let parameters = parameters::parameters(&all, &field, settings);
+    Basis { generators, field, parameters }
 }
 
 /// The surface with at most `target` triangles, or as near to it as its separate lobes allow, and with normals of

@@ -8,6 +8,7 @@
 
 mod pass;
 mod prepare;
+mod relight;
 mod resources;
 mod transfer;
 mod vertex;

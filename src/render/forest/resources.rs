@@ -14,7 +14,7 @@ use bevy::{
         render_resource::{
             AddressMode, BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer,
             BufferUsages, FilterMode, MipmapFilterMode, PipelineCache, Sampler, SamplerBindingType, SamplerDescriptor,
-            ShaderStages, TextureFormat, TextureSampleType, TextureView,
+            ShaderStages, Texture, TextureFormat, TextureSampleType, TextureView,
             binding_types::{
                 sampler, storage_buffer_read_only_sized, texture_2d, texture_2d_array, uniform_buffer_sized,
             },
@@ -26,6 +26,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::{
+    relight,
     transfer::{TransferLight, TransferUniform},
     vertex::PlantVertex,
 };
@@ -191,6 +192,8 @@ pub struct GpuMesh {
 pub struct GpuPart {
     /// Wood or foliage.
     pub kind: PartKind,
+    /// [`PartUniform`] of group 2.
+    pub(super) uniform: Buffer,
     /// The full model.
     pub model: GpuMesh,
     /// What casts the near shadow.
@@ -204,7 +207,8 @@ pub struct GpuPart {
 /// A forest's GPU side.
 pub struct GpuForest {
     stand: Arc<PackedStand>,
-    plants: Arc<Vec<BakedPlant>>,
+    /// What the buffers and textures hold.
+    pub(super) plants: Arc<Vec<BakedPlant>>,
     /// What the entity asks for now.
     pub forest: Forest,
     /// [`PackedTree`]s.
@@ -217,6 +221,8 @@ pub struct GpuForest {
     pub max_scale: f32,
     /// Parts by variant.
     pub parts: Vec<Vec<GpuPart>>,
+    /// Normals, k_a and foliage of the crosses, three layers a variant.
+    pub(super) cross_properties: Texture,
     /// Group 2 of the crosses.
     pub cross_bind_group: BindGroup,
     /// Counts up with every change of content, so that shadows know.
@@ -261,8 +267,11 @@ pub fn prepare_forests(
     for (entity, forest) in &scene.forests {
         if let Some(known) = forests.forests.get_mut(entity)
             && Arc::ptr_eq(&known.stand, &forest.stand)
-            && Arc::ptr_eq(&known.plants, &forest.plants)
+            && (Arc::ptr_eq(&known.plants, &forest.plants) || relight::differ_in_light(&known.plants, &forest.plants))
         {
+            if !Arc::ptr_eq(&known.plants, &forest.plants) {
+                relight::relight(known, &forest.plants, &layouts, &mut transfer, &device, &queue, &pipelines);
+            }
             if known.forest.origin != forest.origin {
                 forests.generations += 1;
                 known.generation = forests.generations;
@@ -293,6 +302,7 @@ fn upload(
         .map(|plant| upload_parts(plant, layouts, &mut textures, transfer, device, queue, pipelines))
         .collect();
     let sizes: Vec<VariantSize> = forest.plants.iter().map(variant_size).collect();
+    let (cross_properties, cross_bind_group) = upload_crosses(&forest.plants, layouts, device, queue, pipelines);
     let variants: Vec<VariantUniform> =
         forest.plants.iter().zip(&sizes).enumerate().map(|(i, (plant, size))| variant(i, plant, size)).collect();
     GpuForest {
@@ -304,7 +314,8 @@ fn upload(
         sizes,
         max_scale: forest.stand.cells.iter().map(|cell| cell.max_scale).fold(0.0, f32::max),
         parts,
-        cross_bind_group: upload_crosses(&forest.plants, layouts, device, queue, pipelines),
+        cross_properties,
+        cross_bind_group,
         generation,
     }
 }
@@ -313,7 +324,7 @@ fn variant_size(plant: &BakedPlant) -> VariantSize {
     VariantSize { height: plant.plant.height(), radius: plant.plant.reach() }
 }
 
-fn variant(index: usize, plant: &BakedPlant, size: &VariantSize) -> VariantUniform {
+pub(super) fn variant(index: usize, plant: &BakedPlant, size: &VariantSize) -> VariantUniform {
     let mut planes = [PlaneUniform::default(); PLANES];
     for (slot, plane) in planes.iter_mut().zip(&plant.cross.planes) {
         *slot = PlaneUniform {
@@ -323,7 +334,7 @@ fn variant(index: usize, plant: &BakedPlant, size: &VariantSize) -> VariantUnifo
             normal: plane.normal.extend(0.0).to_array(),
         };
     }
-    let traced = f32::from(u8::from(matches!(plant.lighting, BakedLighting::Transfer(_))));
+    let traced = f32::from(u8::from(matches!(*plant.lighting, BakedLighting::Transfer(_))));
     VariantUniform {
         planes,
         size: [size.height, size.radius, (index * PLANES) as f32, 1.0],
@@ -402,11 +413,8 @@ fn upload_parts(
         let empty = PlantMesh::default();
         let proxy = plant.shadow_proxy.get(index).unwrap_or(&empty);
         let material = &part.material;
-        let uniform = PartUniform {
-            base_color: material.base_color.extend(1.0).to_array(),
-            transmission: material.transmission.extend(f32::from(u8::from(plant.lighting.is_realigned()))).to_array(),
-        };
-        let uniform = gpu::buffer_with(device, "canopy_plant_part", BufferUsages::UNIFORM, &[uniform]);
+        let usage = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
+        let uniform = gpu::buffer_with(device, "canopy_plant_part", usage, &[part_uniform(material, &plant.lighting)]);
         let color = textures.color(material, part.kind, device, queue);
         let normal = textures.normal(material, device, queue);
         let bind_group = device.create_bind_group(
@@ -416,8 +424,9 @@ fn upload_parts(
         );
         parts.push(GpuPart {
             kind: part.kind,
-            model: upload_mesh(&part.mesh, plant.lighting.normals(index), plant.lighting.ambient(index), device),
-            proxy: upload_mesh(proxy, None, &[], device),
+            uniform,
+            model: upload_mesh(&part.mesh, &vertices(&part.mesh, &plant.lighting, index), device),
+            proxy: upload_mesh(proxy, &vertices(proxy, &BakedLighting::Local, index), device),
             bind_group,
             transfer: plant.lighting.transfer(index).map(|part| transfer.bind_group(part, layouts, device, pipelines)),
         });
@@ -425,44 +434,54 @@ fn upload_parts(
     parts
 }
 
-/// `normals` replace the mesh's own; where `ambient` ends, k_a is 1.
-fn upload_mesh(mesh: &PlantMesh, normals: Option<&[Vec3]>, ambient: &[f32], device: &RenderDevice) -> GpuMesh {
-    let normals = normals.unwrap_or(&mesh.normals);
-    let vertices: Vec<PlantVertex> = mesh
-        .positions
-        .iter()
-        .enumerate()
-        .map(|(i, &position)| {
-            let normal = normals.get(i).copied().unwrap_or(Vec3::Y);
-            let uv = mesh.uvs.get(i).copied().unwrap_or_default();
-            PlantVertex::new(position, normal, ambient.get(i).copied().unwrap_or(1.0), uv)
-        })
-        .collect();
+pub(super) fn part_uniform(material: &PlantMaterial, lighting: &BakedLighting) -> PartUniform {
+    PartUniform {
+        base_color: material.base_color.extend(1.0).to_array(),
+        transmission: material.transmission.extend(f32::from(u8::from(lighting.is_realigned()))).to_array(),
+    }
+}
+
+/// The vertices of `mesh`, which is part `part` of a plant, with the normals and the k_a of its `lighting`; what is missing
+/// there is the mesh's own, or 1.
+pub(super) fn vertices(mesh: &PlantMesh, lighting: &BakedLighting, part: usize) -> Vec<PlantVertex> {
+    let (normals, ambient) = (lighting.normals(part).unwrap_or(&mesh.normals), lighting.ambient(part));
+    let vertex = |(i, &position): (usize, &Vec3)| {
+        let normal = normals.get(i).copied().unwrap_or(Vec3::Y);
+        let uv = mesh.uvs.get(i).copied().unwrap_or_default();
+        PlantVertex::new(position, normal, ambient.get(i).copied().unwrap_or(1.0), uv)
+    };
+    mesh.positions.iter().enumerate().map(vertex).collect()
+}
+
+fn upload_mesh(mesh: &PlantMesh, vertices: &[PlantVertex], device: &RenderDevice) -> GpuMesh {
     let indices: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
+    let vertex = BufferUsages::VERTEX | BufferUsages::COPY_DST;
     GpuMesh {
-        vertices: gpu::buffer_with(device, "canopy_plant_vertices", BufferUsages::VERTEX, &vertices),
+        vertices: gpu::buffer_with(device, "canopy_plant_vertices", vertex, vertices),
         indices: gpu::buffer_with(device, "canopy_plant_indices", BufferUsages::INDEX, &indices),
         index_count: indices.len() as u32,
     }
 }
 
+/// The pictures of all crosses: the texture of their properties, and both kinds in a bind group.
 fn upload_crosses(
     plants: &[BakedPlant],
     layouts: &ForestLayouts,
     device: &RenderDevice,
     queue: &RenderQueue,
     pipelines: &PipelineCache,
-) -> BindGroup {
+) -> (Texture, BindGroup) {
     let colors: Vec<&MipChain> = plants.iter().flat_map(|plant| &plant.cross.textures.color).collect();
     let properties: Vec<&MipChain> = plants.iter().flat_map(|plant| &plant.cross.textures.properties).collect();
     let upload = |label: &str, format: TextureFormat, layers: &[&MipChain]| {
-        gpu::texture_array(device, queue, label, format, layers, gpu::SMALLEST_TESTED_MIP).1
+        gpu::texture_array(device, queue, label, format, layers, gpu::SMALLEST_TESTED_MIP)
     };
-    let colors = upload("canopy_cross_color", TextureFormat::Rgba8UnormSrgb, &colors);
-    let properties = upload("canopy_cross_properties", TextureFormat::Rgba8Unorm, &properties);
-    device.create_bind_group(
+    let (_, colors) = upload("canopy_cross_color", TextureFormat::Rgba8UnormSrgb, &colors);
+    let (texture, properties) = upload("canopy_cross_properties", TextureFormat::Rgba8Unorm, &properties);
+    let bind_group = device.create_bind_group(
         "canopy_cross",
         &pipelines.get_bind_group_layout(&layouts.cross),
         &BindGroupEntries::sequential((&colors, &properties, &layouts.cross_sampler)),
-    )
+    );
+    (texture, bind_group)
 }

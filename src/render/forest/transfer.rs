@@ -19,7 +19,7 @@ use bevy::{
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use super::resources::ForestLayouts;
+use super::resources::{ForestLayouts, GpuForests};
 use crate::{
     bake::transfer::{PackedPart, TransferSettings},
     light::{
@@ -106,12 +106,16 @@ impl TransferLight {
 pub fn prepare_transfer_light(
     scene: Res<ExtractedScene>,
     frame: Res<PreparedFrame>,
+    forests: Res<GpuForests>,
     queue: Res<RenderQueue>,
     report: Res<FrameReport>,
     mut transfer: ResMut<TransferLight>,
 ) {
     let transfer = &mut *transfer;
-    let Some(buffer) = &transfer.buffer else {
+    // Plants may have come into another light since.
+    let lit =
+        || forests.iter().flat_map(|(_, forest)| forest.parts.iter().flatten()).any(|part| part.transfer.is_some());
+    let Some(buffer) = transfer.buffer.as_ref().filter(|_| lit()) else {
         report.skipped("transfer light", "no plant is lit by radiance transfer");
         return;
     };

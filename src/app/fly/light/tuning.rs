@@ -1,0 +1,412 @@
+//! What can be turned in the light of a species, by which steps and within which ranges. Pure.
+//!
+//! Numbers that span decades go by factors, shares by equal steps; either is rounded, so that what is written into a scene
+//! file reads well. A number that was not set yet starts from what follows from the plant.
+
+use std::ops::RangeInclusive;
+
+use crate::{
+    bake::implicit::ImplicitParameters,
+    scene::{CrownNormals, Expressive, Lighting},
+};
+
+/// Something that can be turned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Line {
+    /// The scene's own light or that of an implicit surface.
+    Light,
+    /// ρ.
+    Radius,
+    /// τ.
+    Threshold,
+    /// d_min.
+    Core,
+    /// n.
+    Exponent,
+    /// k_a_min.
+    Least,
+    /// Where normals come from.
+    Normals,
+    /// Share of a leaf's own normal.
+    OwnNormal,
+    /// Share of the leaves that are generators.
+    Share,
+}
+
+/// All lines from top to bottom.
+pub const LINES: [Line; 9] = [
+    Line::Light,
+    Line::Radius,
+    Line::Threshold,
+    Line::Core,
+    Line::Exponent,
+    Line::Least,
+    Line::Normals,
+    Line::OwnNormal,
+    Line::Share,
+];
+
+/// How a number is turned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Step {
+    /// By a factor; below the number is the lower end of the range.
+    Factor(f64),
+    /// By a hundredth or five.
+    Hundredths,
+}
+
+/// Factor of a step, and of a fine one. Rounding to three digits must not eat the latter.
+const FACTORS: (f64, f64) = (1.2, 1.02);
+/// Hundredths of a step, and of a fine one.
+const HUNDREDTHS: (f64, f64) = (5.0, 1.0);
+
+impl Line {
+    /// What the panel calls it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Light => "light",
+            Self::Radius => "radius \u{3c1}",
+            Self::Threshold => "threshold \u{3c4}",
+            Self::Core => "core d_min",
+            Self::Exponent => "exponent n",
+            Self::Least => "least k_a_min",
+            Self::Normals => "normals",
+            Self::OwnNormal => "leaf's own normal",
+            Self::Share => "share of leaves",
+        }
+    }
+
+    /// What it is and what turning it up does.
+    pub fn tip(self) -> &'static str {
+        match self {
+            Self::Light => "How this species is lit in this session: as its scene says, or by an implicit surface.",
+            Self::Radius => "How far a leaf's influence reaches. Larger: a smoother crown.",
+            Self::Threshold => "Density at the surface. Larger: a surface closer to the densest foliage.",
+            Self::Core => "Density from which on the ambient light is that of the core. Larger: brighter.",
+            Self::Exponent => "Below 1 the crown darkens late on the way inside, above 1 early.",
+            Self::Least => "Ambient light of the crown's core.",
+            Self::Normals => {
+                "Nearest: that of the surface's nearest vertex, as published. Smooth: the density's gradient."
+            }
+            Self::OwnNormal => "Share of each leaf's own normal in the result.",
+            Self::Share => "Share of the leaves that make the surface. Smaller: a faster bake, a little off.",
+        }
+    }
+
+    fn unit(self) -> &'static str {
+        if self == Self::Radius { " m" } else { "" }
+    }
+
+    fn number(self) -> Option<(RangeInclusive<f64>, Step)> {
+        Some(match self {
+            Self::Light | Self::Normals => return None,
+            Self::Radius => (Expressive::RADIUS, Step::Factor(*Expressive::RADIUS.start())),
+            Self::Threshold | Self::Core => (Expressive::DENSITY, Step::Factor(1e-3)),
+            Self::Exponent => (Expressive::EXPONENT, Step::Factor(*Expressive::EXPONENT.start())),
+            Self::Share => (Expressive::SHARE, Step::Factor(*Expressive::SHARE.start())),
+            Self::Least | Self::OwnNormal => (Expressive::UNIT, Step::Hundredths),
+        })
+    }
+
+    fn field(self, expressive: &mut Expressive) -> Option<&mut Option<f64>> {
+        match self {
+            Self::Light | Self::Normals => None,
+            Self::Radius => Some(&mut expressive.radius),
+            Self::Threshold => Some(&mut expressive.threshold),
+            Self::Core => Some(&mut expressive.core),
+            Self::Exponent => Some(&mut expressive.exponent),
+            Self::Least => Some(&mut expressive.least),
+            Self::OwnNormal => Some(&mut expressive.own_normal),
+            Self::Share => Some(&mut expressive.share),
+        }
+    }
+
+    /// What the number is where it is not set; `None` as long as nobody knows what follows from the plant.
+    fn automatic(self, used: Option<&ImplicitParameters>) -> Option<f64> {
+        let value = match self {
+            Self::Light | Self::Normals => return None,
+            Self::OwnNormal => 0.0,
+            Self::Share => 1.0,
+            Self::Radius => used?.radius.into(),
+            Self::Threshold => used?.threshold.into(),
+            Self::Core => used?.core.into(),
+            Self::Exponent => used?.exponent.into(),
+            Self::Least => used?.least.into(),
+        };
+        f64::is_finite(value).then_some(value)
+    }
+}
+
+/// The light of a species: what the scene says, and what was made of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tuning {
+    scene: Lighting,
+    expressive: Expressive,
+    is_expressive: bool,
+}
+
+impl Tuning {
+    /// The scene's own light.
+    pub fn new(scene: Lighting) -> Self {
+        let (expressive, is_expressive) = match &scene {
+            Lighting::Expressive(expressive) => (expressive.clone(), true),
+            Lighting::Local | Lighting::Transfer(_) => (Expressive::default(), false),
+        };
+        Self { scene, expressive, is_expressive }
+    }
+
+    /// The light as it is now.
+    pub fn lighting(&self) -> Lighting {
+        if self.is_expressive { Lighting::Expressive(self.expressive.clone()) } else { self.scene.clone() }
+    }
+
+    /// The values of the implicit surface, where it is what lights the species.
+    pub fn expressive(&self) -> Option<&Expressive> {
+        self.is_expressive.then_some(&self.expressive)
+    }
+
+    /// Whether the light is another one than the scene's.
+    pub fn is_turned(&self) -> bool {
+        self.lighting() != self.scene
+    }
+
+    /// Lines that can be turned now.
+    pub fn lines(&self) -> &'static [Line] {
+        if self.is_expressive { &LINES } else { &LINES[..1] }
+    }
+
+    /// Turns a line up or down, by a small step where `fine`. `used` are the values that the last bake went by. `false`
+    /// where nothing changed: at the end of a range, or a start that is not known yet.
+    pub fn turn(&mut self, line: Line, up: bool, fine: bool, used: Option<&ImplicitParameters>) -> bool {
+        let before = self.clone();
+        match line {
+            Line::Light => self.is_expressive = up || matches!(self.scene, Lighting::Expressive(_)),
+            _ if !self.is_expressive => {}
+            Line::Normals => self.expressive.normals = if up { CrownNormals::Smooth } else { CrownNormals::Nearest },
+            _ => {
+                let (Some((range, step)), Some(field)) = (line.number(), line.field(&mut self.expressive)) else {
+                    return false;
+                };
+                if let Some(value) = field.or(line.automatic(used)) {
+                    *field = Some(turned(value, &range, step, up, fine));
+                }
+            }
+        }
+        *self != before
+    }
+
+    /// Takes a line back: a number to what follows from the plant, normals to the default, the light with all its values to
+    /// the scene's. Whether anything changed.
+    pub fn reset(&mut self, line: Line) -> bool {
+        let before = self.clone();
+        match line {
+            Line::Light => *self = Self::new(self.scene.clone()),
+            Line::Normals => self.expressive.normals = CrownNormals::default(),
+            _ => {
+                if let Some(field) = line.field(&mut self.expressive) {
+                    *field = None;
+                }
+            }
+        }
+        *self != before
+    }
+
+    /// A line's value as the panel shows it.
+    pub fn value(&self, line: Line, used: Option<&ImplicitParameters>) -> String {
+        let mut expressive = self.expressive.clone();
+        match (line, line.field(&mut expressive)) {
+            (Line::Light, _) => {
+                let name = match self.lighting() {
+                    Lighting::Local => "local",
+                    Lighting::Expressive(_) => "expressive",
+                    Lighting::Transfer(_) => "transfer",
+                };
+                let whose = if self.is_turned() { "for this session" } else { "the scene's" };
+                format!("{name} ({whose})")
+            }
+            (_, None) => format!("{:?}", self.expressive.normals).to_lowercase(),
+            (_, Some(Some(value))) => format!("{}{}", three_digits(*value), line.unit()),
+            (_, Some(None)) => line
+                .automatic(used)
+                .map_or("automatic".to_owned(), |value| format!("{}{} (automatic)", three_digits(value), line.unit())),
+        }
+    }
+}
+
+/// `value` one step further, within `range`.
+fn turned(value: f64, range: &RangeInclusive<f64>, step: Step, up: bool, fine: bool) -> f64 {
+    let of = |(coarse, small)| if fine { small } else { coarse };
+    let next = match step {
+        Step::Factor(least) if up => {
+            if value < least {
+                least
+            } else {
+                rounded(value * of(FACTORS))
+            }
+        }
+        Step::Factor(least) => {
+            let next = rounded(value / of(FACTORS));
+            if next < least { *range.start() } else { next }
+        }
+        Step::Hundredths => {
+            // From between two steps to the nearer end of its way; what rounding left beside a step counts as on it.
+            let (step, hundredths) = (of(HUNDREDTHS), value * 100.0);
+            let steps =
+                if up { (hundredths / step + 1e-6).floor() + 1.0 } else { (hundredths / step - 1e-6).ceil() - 1.0 };
+            steps * step / 100.0
+        }
+    };
+    next.clamp(*range.start(), *range.end())
+}
+
+/// Decimals that leave three digits, for a `value` above 0.
+fn decimals(value: f64) -> i32 {
+    if value > 0.0 && value.is_finite() { 2 - value.log10().floor() as i32 } else { 0 }
+}
+
+/// To three digits.
+fn rounded(value: f64) -> f64 {
+    let decimals = decimals(value);
+    let scale = 10f64.powi(decimals.abs());
+    if decimals < 0 { (value / scale).round() * scale } else { (value * scale).round() / scale }
+}
+
+/// A number of three digits, or with as many as a whole one has.
+fn three_digits(value: f64) -> String {
+    format!("{:.*}", decimals(value).clamp(0, 9) as usize, rounded(value))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::scene::{Scene, Transfer};
+
+    const USED: ImplicitParameters =
+        ImplicitParameters { radius: 2.355, threshold: 1.71, least: 0.2, core: 7.392, exponent: 3.0 };
+
+    fn expressive() -> Tuning {
+        Tuning::new(Lighting::Expressive(Expressive::default()))
+    }
+
+    /// The light of a scene with `lighting` written into it.
+    fn parsed(lighting: &str) -> Result<Option<Lighting>, crate::scene::SceneError> {
+        let text = format!(
+            "(terrain: Flat(size: 100), place: (latitude: 47, longitude: 9), species: [(name: \"a\", plant: Grown(), \
+             lighting: {lighting})])"
+        );
+        Scene::parse(&text, "light.ron".as_ref()).map(|scene| scene.species[0].lighting.clone())
+    }
+
+    #[test]
+    fn a_number_starts_from_what_follows_from_the_plant() {
+        let mut tuning = expressive();
+        assert_eq!(tuning.value(Line::Radius, Some(&USED)), "2.36 m (automatic)");
+        assert!(!tuning.turn(Line::Radius, true, false, None));
+        assert!(tuning.turn(Line::Radius, true, false, Some(&USED)));
+        assert_eq!(tuning.value(Line::Radius, Some(&USED)), "2.83 m");
+        assert!(tuning.turn(Line::Least, false, false, Some(&USED)));
+        assert!(tuning.turn(Line::Least, true, true, Some(&USED)));
+        assert_eq!(tuning.value(Line::Least, None), "0.160");
+        assert_eq!(tuning.lighting().to_ron(), "Expressive(radius: 2.83, least: 0.16)");
+        assert!(tuning.reset(Line::Radius) && tuning.reset(Line::Least) && !tuning.reset(Line::Least));
+        assert_eq!(tuning, expressive());
+    }
+
+    #[test]
+    fn another_light_is_for_the_session_and_back() {
+        let scene = Lighting::Transfer(Transfer { bands: 4, ..Transfer::default() });
+        let mut tuning = Tuning::new(scene.clone());
+        assert_eq!((tuning.lines(), tuning.lighting().to_ron()), (&[Line::Light][..], "Transfer(bands: 4)".to_owned()));
+        assert!(!tuning.turn(Line::Radius, true, false, Some(&USED)) && !tuning.turn(Line::Light, false, false, None));
+        assert!(tuning.turn(Line::Light, true, false, None) && tuning.is_turned());
+        assert!(tuning.turn(Line::Normals, true, false, None) && !tuning.turn(Line::Normals, true, false, None));
+        assert_eq!(tuning.lighting().to_ron(), "Expressive(normals: Smooth)");
+        // Off and on again keeps the values, taking the light back does not.
+        assert!(tuning.turn(Line::Light, false, false, None) && !tuning.is_turned());
+        assert!(
+            tuning.turn(Line::Light, true, false, None)
+                && tuning.expressive().is_some_and(|e| *e != Expressive::default())
+        );
+        assert!(tuning.reset(Line::Light));
+        assert_eq!(tuning, Tuning::new(scene));
+        let mut own = expressive();
+        assert!(!own.turn(Line::Light, false, false, None) && own.expressive().is_some());
+    }
+
+    #[test]
+    fn ranges_have_ends_that_can_be_reached_and_left() {
+        for line in LINES {
+            let Some((range, _)) = line.number() else { continue };
+            let mut tuning = expressive();
+            for (up, end) in [(false, *range.start()), (true, *range.end()), (false, *range.start())] {
+                let mut steps = 0;
+                while tuning.turn(line, up, false, Some(&USED)) {
+                    steps += 1;
+                    assert!(steps < 300, "{line:?}");
+                }
+                assert_eq!(line.field(&mut tuning.expressive).and_then(|value| *value), Some(end), "{line:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_have_three_digits() {
+        for (value, text) in
+            [(0.0, "0"), (1e-6, "0.00000100"), (0.0123456, "0.0123"), (1.0, "1.00"), (98765.0, "98800")]
+        {
+            assert_eq!(three_digits(value), text);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn nothing_leaves_its_range_and_what_is_written_is_read(
+            moves in prop::collection::vec((0..LINES.len(), any::<bool>(), any::<bool>(), 0..12u8), 0..60),
+            wild in prop::array::uniform5(prop_oneof![any::<f32>(), 0.0f32..10.0]),
+            known in any::<bool>(),
+        ) {
+            let [radius, threshold, least, core, exponent] = wild;
+            let used = ImplicitParameters { radius, threshold, least, core, exponent };
+            let mut tuning = Tuning::new(Lighting::Local);
+            tuning.turn(Line::Light, true, false, None);
+            for (line, up, fine, kind) in moves {
+                match kind {
+                    0 => tuning.reset(LINES[line]),
+                    _ => tuning.turn(LINES[line], up, fine, known.then_some(&used)),
+                };
+            }
+            let mut values = tuning.expressive.clone();
+            for line in LINES {
+                if let (Some(Some(value)), Some((range, _))) = (line.field(&mut values), line.number()) {
+                    prop_assert!(range.contains(value), "{:?} {}", line, value);
+                }
+                prop_assert!(!tuning.value(line, Some(&used)).contains("NaN"));
+            }
+            prop_assert_eq!(parsed(&tuning.lighting().to_ron()).unwrap(), Some(tuning.lighting()));
+        }
+
+        #[test]
+        fn a_step_moves_and_the_way_back_leads_back(value in 0.01f64..0.9, fine in any::<bool>(), decade in -1..3i32) {
+            for line in [Line::Radius, Line::Threshold, Line::Core, Line::Least] {
+                let Some((range, step)) = line.number() else { continue };
+                let value = if step == Step::Hundredths { (value * 100.0).round() / 100.0 } else { value * 10f64.powi(decade) };
+                let up = turned(value, &range, step, true, fine);
+                let back = turned(up, &range, step, false, fine);
+                prop_assert!(up > value);
+                let near = if step == Step::Hundredths { 0.051 } else { 0.011 * value };
+                prop_assert!((back - value).abs() <= near, "{:?} {} {} {}", line, value, up, back);
+            }
+        }
+    }
+
+    #[test]
+    fn every_light_is_written_as_it_is_read() -> Result<(), Box<dyn std::error::Error>> {
+        for text in ["Local", "Transfer()", "Transfer(bands: 6, color: true, rays: 16, bounces: 0)", "Expressive()"] {
+            let light = parsed(text)?.ok_or("no light")?;
+            assert_eq!(light.to_ron(), text);
+        }
+        Ok(())
+    }
+}
