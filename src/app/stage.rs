@@ -60,14 +60,14 @@ impl Stage {
         let observer = observer(&scene, &terrain, path)?;
 
         let has_trees = !matches!(scene.trees, scene::Trees::None);
-        let species = if has_trees { plants::plan(&scene)? } else { plants::PlantPlan::default() };
+        let mut species = if has_trees { plants::plan(&scene)? } else { plants::PlantPlan::default() };
         let plants = bake(&species, &scene.quality, progress)?;
 
         let started = Instant::now();
         progress.begin("Trees", 0);
         let mut stand = trees::build_stand(&scene, &species, &plants, &terrain, progress)?;
         progress.end();
-        let plants = together::light_together(&scene, &species, plants, &mut stand, progress)?;
+        let plants = together::light_together(&scene, &mut species, plants, &mut stand, progress)?;
         let bounds: Vec<VariantBounds> = plants.iter().map(variant_bounds).collect();
         let packed = PackedStand::new(&stand, DEFAULT_CELL_SIZE, &bounds)?;
         let cover = if stand.trees.is_empty() {

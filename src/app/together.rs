@@ -5,7 +5,7 @@
 //! each) and billboard pictures (11 bytes a texel and plane, mips included) of its own; the meshes on the processor and the
 //! leaves' textures stay shared.
 
-use std::sync::Arc;
+use std::{collections::HashSet, sync::Arc};
 
 use rayon::prelude::*;
 
@@ -17,47 +17,48 @@ use crate::{
         implicit::{StandPlant, bake_implicit_stand},
         lighting::{BakedLighting, ExpressiveLighting, LightingSettings},
     },
-    scatter::{Stand, Tree, packed::MAX_VARIANTS},
-    scene::{Lighting, Progress, Scene},
+    scatter::{Stand, packed::MAX_VARIANTS},
+    scene::{Progress, Scene, Species},
 };
 
-/// Which variants are lit together with their neighbours.
-fn chosen_variants(scene: &Scene, plan: &PlantPlan) -> Vec<bool> {
-    let mut chosen = vec![false; plan.individuals.len()];
-    for (species, variants) in scene.species.iter().zip(&plan.variants) {
-        if matches!(&species.lighting, Some(Lighting::Expressive(expressive)) if expressive.together) {
-            chosen[usize::from(variants.start)..usize::from(variants.end)].fill(true);
-        }
-    }
-    chosen
-}
-
-/// Makes a plant of its own of every tree whose species asks for it, and lights those trees in one field. Returns the plants
-/// by their new variants, to which `stand` is brought. The first such species' settings hold for all of them.
+/// Makes a plant of its own of every tree whose species asks for it, and lights those trees in one field. Brings `stand`,
+/// `plants` and the species' `variants` to the new plants, species by species. The first such species' settings hold for
+/// all of them.
 ///
 /// # Errors
 /// [`AppError::TooManyTogether`] where the trees are more than a forest can tell apart.
 pub fn light_together(
     scene: &Scene,
-    plan: &PlantPlan,
+    plan: &mut PlantPlan,
     plants: Vec<BakedPlant>,
     stand: &mut Stand,
     progress: &mut dyn Progress,
 ) -> Result<Vec<BakedPlant>, AppError> {
-    let chosen = chosen_variants(scene, plan);
-    let is_chosen = |tree: &Tree| chosen.get(usize::from(tree.variant)).copied().unwrap_or(false);
-    let first = plan.individuals.iter().zip(&chosen).find(|(_, chosen)| **chosen);
-    let Some(LightingSettings::Expressive(settings)) = first.map(|(individual, _)| individual.lighting) else {
+    let chosen: Vec<bool> = scene.species.iter().map(Species::is_lit_together).collect();
+    let first = plan.variants.iter().zip(&chosen).find(|(variants, chosen)| **chosen && !variants.is_empty());
+    let lighting = first.and_then(|(variants, _)| plan.individuals.get(usize::from(variants.start)));
+    let Some(LightingSettings::Expressive(settings)) = lighting.map(|individual| individual.lighting) else {
         return Ok(plants);
     };
-    let trees: Vec<usize> = (0..stand.trees.len()).filter(|&tree| is_chosen(&stand.trees[tree])).collect();
-    let others = chosen.iter().filter(|chosen| !**chosen).count();
-    let limit = MAX_VARIANTS - others.min(MAX_VARIANTS);
-    if trees.len() > limit {
-        return Err(AppError::TooManyTogether { count: trees.len(), limit });
+    // The trees of each chosen species.
+    let trees: Vec<Vec<usize>> = plan
+        .variants
+        .iter()
+        .zip(&chosen)
+        .map(|(variants, &chosen)| {
+            let own = |tree: &usize| chosen && variants.contains(&stand.trees[*tree].variant);
+            (0..stand.trees.len()).filter(own).collect()
+        })
+        .collect();
+    let count: usize = trees.iter().map(Vec::len).sum();
+    let others: usize = plan.variants.iter().zip(&chosen).filter(|(_, chosen)| !**chosen).map(|(v, _)| v.len()).sum();
+    let limit = MAX_VARIANTS.saturating_sub(others);
+    if count > limit {
+        return Err(AppError::TooManyTogether { count, limit });
     }
-    progress.begin("Trees lit together", trees.len() as u64);
-    let group: Vec<StandPlant> = trees
+    progress.begin("Trees lit together", count as u64);
+    let order: Vec<usize> = trees.concat();
+    let group: Vec<StandPlant> = order
         .iter()
         .map(|&tree| {
             let tree = &stand.trees[tree];
@@ -70,7 +71,7 @@ pub fn light_together(
         progress.warn(&format!("trees lit together: {reason}"));
     }
     let cross = bake_settings(&scene.quality, LightingSettings::Local).in_range().cross;
-    let lit: Vec<BakedPlant> = trees
+    let lit: Vec<BakedPlant> = order
         .par_iter()
         .zip(bake.plants)
         .map(|(&tree, shading)| {
@@ -81,33 +82,38 @@ pub fn light_together(
                 no_surface: bake.report.no_surface,
             });
             BakedPlant {
-                plant: Arc::clone(&instance.plant),
-                cross: bake_cross(&instance.plant, &lighting, &cross),
-                shadow_proxy: instance.shadow_proxy.clone(),
-                lighting,
+                cross: Arc::new(bake_cross(&instance.plant, &lighting, &cross)),
+                lighting: Arc::new(lighting),
+                ..instance.clone()
             }
         })
         .collect();
+    let vertices: usize = lit.iter().flat_map(|p| &p.plant.parts).map(|part| part.mesh.positions.len()).sum();
+    progress.advance(count as u64);
+    progress.end();
+    progress.note(&format!("{count} trees lit together: {vertices} vertices of their own"));
 
-    // The others first, in their order, then one a tree.
-    let mut renamed = vec![0u16; chosen.len()];
     let mut all: Vec<BakedPlant> = Vec::with_capacity(others + lit.len());
-    for (variant, plant) in plants.into_iter().enumerate() {
-        renamed[variant] = all.len() as u16;
-        if !chosen[variant] {
-            all.push(plant);
+    let mut lit = lit.into_iter();
+    let mut renamed = vec![0u16; plants.len()];
+    for ((variants, own), chosen) in plan.variants.iter_mut().zip(&trees).zip(&chosen) {
+        let first = all.len() as u16;
+        if *chosen {
+            for (&tree, variant) in own.iter().zip(first..) {
+                stand.trees[tree].variant = variant;
+            }
+            all.extend(lit.by_ref().take(own.len()));
+        } else {
+            for (variant, new) in variants.clone().zip(first..) {
+                renamed[usize::from(variant)] = new;
+            }
+            all.extend_from_slice(&plants[usize::from(variants.start)..usize::from(variants.end)]);
         }
+        *variants = first..all.len() as u16;
     }
-    for tree in &mut stand.trees {
+    let own: HashSet<usize> = order.into_iter().collect();
+    for (_, tree) in stand.trees.iter_mut().enumerate().filter(|(place, _)| !own.contains(place)) {
         tree.variant = renamed[usize::from(tree.variant)];
     }
-    for (place, &tree) in trees.iter().enumerate() {
-        stand.trees[tree].variant = (all.len() + place) as u16;
-    }
-    let vertices: usize = lit.iter().flat_map(|p| &p.plant.parts).map(|part| part.mesh.positions.len()).sum();
-    progress.advance(trees.len() as u64);
-    progress.end();
-    progress.note(&format!("{} trees lit together: {vertices} vertices of their own", trees.len()));
-    all.extend(lit);
     Ok(all)
 }

@@ -108,6 +108,9 @@ impl Lighting {
                 if expressive.normals != CrownNormals::default() {
                     fields.push(format!("normals: {:?}", expressive.normals));
                 }
+                if expressive.together {
+                    fields.push("together: true".to_owned());
+                }
                 "Expressive"
             }
             Self::Transfer(transfer) => {

@@ -117,6 +117,11 @@ impl Species {
         self.trunk_radius.unwrap_or(0.015 * self.mean_height())
     }
 
+    /// Whether its trees are lit together with their neighbours.
+    pub fn is_lit_together(&self) -> bool {
+        matches!(&self.lighting, Some(Lighting::Expressive(expressive)) if expressive.together)
+    }
+
     fn check(&self, at: &str, check: &mut Check) {
         check.text(&format!("{at}.name"), &self.name, "give the species a name of its own");
         check.number(&format!("{at}.weight"), self.weight, 1e-6..=1e6, "");

@@ -63,7 +63,9 @@ struct Turned {
 impl LightPanel {
     /// A panel, closed, for the species of `stage`.
     pub fn new(stage: &Stage) -> Self {
-        let species = stage.scene.species.iter().zip(&stage.variants).map(|(species, variants)| {
+        // What is lit together with its neighbours is no plant's own light.
+        let alone = stage.scene.species.iter().zip(&stage.variants).filter(|(species, _)| !species.is_lit_together());
+        let species = alone.map(|(species, variants)| {
             let variants = usize::from(variants.start)..usize::from(variants.end);
             Turned {
                 name: species.name.clone(),
@@ -86,7 +88,7 @@ impl LightPanel {
         }
     }
 
-    /// Opens or closes the panel; `false` where the scene has no species.
+    /// Opens or closes the panel; `false` where the scene has no species that can be turned.
     pub fn toggle(&mut self) -> bool {
         let something = !self.species.is_empty();
         self.open = !self.open && something;
