@@ -45,9 +45,14 @@ pub struct Expressive {
     pub radius: Option<f64>,
     /// Density at the surface, tau, in leaves, 0 to 1000000. Larger: a surface closer to the densest foliage.
     pub threshold: Option<f64>,
+    /// What the ambient light is a function of. Default `Depth`.
+    pub ambient: AmbientTerm,
+    /// First radius of `Depth` in metres, 0 to 1000. Larger: gaps between twigs no longer count.
+    pub ambient_radius: Option<f64>,
     /// Ambient light of the crown's core, k_a_min, 0 to 1.
     pub least: Option<f64>,
-    /// Density from which on the ambient light is that of the core, d_min, in leaves, 0 to 1000000. Larger: brighter.
+    /// Depth or density from which on the ambient light is that of the core, d_min, in leaves, 0 to 1000000. Larger:
+    /// brighter.
     pub core: Option<f64>,
     /// Exponent n, 0.01 to 100: below 1 the crown darkens late on the way inside, above 1 early.
     pub exponent: Option<f64>,
@@ -57,6 +62,16 @@ pub struct Expressive {
     pub normals: CrownNormals,
     /// Share of a leaf's own normal, 0 to 1. Default 0.
     pub own_normal: Option<f64>,
+}
+
+/// What the ambient light of an implicit surface's light is a function of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+pub enum AmbientTerm {
+    /// How many leaves a ray meets on its way out, on average. Near to what the path tracer finds.
+    #[default]
+    Depth,
+    /// The density within rho less tau, as published.
+    Published,
 }
 
 /// Where the normals of an implicit surface's light come from.
@@ -84,6 +99,7 @@ impl Lighting {
         };
         number("radius", expressive.radius, 1e-6..=1e3, "m");
         number("threshold", expressive.threshold, 0.0..=1e6, "leaves");
+        number("ambient_radius", expressive.ambient_radius, 0.0..=1e3, "m");
         number("least", expressive.least, 0.0..=1.0, "");
         number("core", expressive.core, 0.0..=1e6, "leaves");
         number("exponent", expressive.exponent, 0.01..=100.0, "");
