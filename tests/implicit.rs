@@ -222,6 +222,33 @@ fn nothing_few_and_flat() {
 }
 
 #[test]
+fn copies_in_place_and_strays_without_area_change_nothing() {
+    let tree = ball_tree(900);
+    let mut doubled = tree.clone();
+    let mesh = &mut doubled.parts[1].mesh;
+    let back: Vec<[u32; 3]> = mesh.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect();
+    mesh.triangles.extend(back);
+    let mut stray = tree.clone();
+    let mesh = &mut stray.parts[1].mesh;
+    mesh.positions.push(Vec3::splat(1.0e8));
+    mesh.normals.push(Vec3::Z);
+    mesh.uvs.push(Vec2::ZERO);
+    mesh.triangles.push([mesh.positions.len() as u32 - 1; 3]);
+    for settings in BOTH.into_iter().flat_map(|normals| [with(normals), published(normals)]) {
+        let expected = bake(&tree, &settings);
+        for (name, changed) in [("doubled", &doubled), ("stray", &stray)] {
+            let baked = bake(changed, &settings);
+            let (a, b) = (baked.report.parameters, expected.report.parameters);
+            assert!((a.radius / b.radius - 1.0).abs() < 1e-4, "{name}: {a:?} {b:?}");
+            assert!((a.threshold / b.threshold - 1.0).abs() < 0.02, "{name}: {a:?} {b:?}");
+            assert_eq!(baked.report.no_surface, None);
+            let pairs = baked.ambient[1].iter().zip(&expected.ambient[1]);
+            assert!(pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) < 0.01, "{name}");
+        }
+    }
+}
+
+#[test]
 fn any_parameters_give_a_result_that_says_what_it_is() {
     let tree = ball_tree(800);
     let wild = [0.0, 1.0e-30, 1.0e-4, 0.05, 1.0e6, f32::INFINITY, f32::NAN, -1.0];

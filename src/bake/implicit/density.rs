@@ -8,7 +8,7 @@
 //! Generators and points are both sorted into compact groups of eight (`partition.rs`). For a group
 //! of points the tree over the generators is walked once: boxes that are out of reach are skipped, boxes that lie
 //! within reach as a whole give a polynomial (`moments.rs`), and what remains, the rim of the ball, is
-//! summed in pairs (generators that are out of reach of all eight points left out), eight points side by side in vector registers (glam's, as compilers do not find them here). So the time grows with the surface of the ball of
+//! summed in pairs, eight points side by side in vector registers (glam's, as compilers do not find them here). So the time grows with the surface of the ball of
 //! influence, and not with its volume: a large ρ is as cheap as a small one.
 //!
 //! Accuracy: pairs are f32, sums of pairs and polynomials f64. Rounding moves each 1 - (d/ρ)² by at most
@@ -16,7 +16,7 @@
 //! error of F is at most 1e-5 (measured: 1e-6), whatever the plant's size and place. Points are independent of each
 //! other, so the result is the same for any number of threads.
 
-use glam::{DVec3, Vec3, Vec3A, Vec4, Vec4Swizzles};
+use glam::{DVec3, Vec3, Vec3A, Vec4};
 use rayon::prelude::*;
 
 use super::generators::{Generator, Weighting};
@@ -51,26 +51,6 @@ struct Group {
     y: [f32; GROUP],
     z: [f32; GROUP],
     weight: [f32; GROUP],
-}
-
-impl Group {
-    /// Appends those that are within `reach` (a square) of `region` to `near`, as place and weight. The box of a group
-    /// is as large as a small ρ, so that most of a group at the rim is out of reach.
-    fn push_near(&self, region: &Aabb, reach: f32, near: &mut Vec<Vec4>) {
-        for first in (0..GROUP).step_by(4) {
-            let beyond = |axis: &[f32; GROUP], min: f32, max: f32| {
-                let at = Vec4::from_slice(&axis[first..]);
-                (Vec4::splat(min) - at).max(at - Vec4::splat(max)).max(Vec4::ZERO)
-            };
-            let dx = beyond(&self.x, region.min.x, region.max.x);
-            let dy = beyond(&self.y, region.min.y, region.max.y);
-            let dz = beyond(&self.z, region.min.z, region.max.z);
-            let within = (dx * dx + dy * dy + dz * dz).cmplt(Vec4::splat(reach)).bitmask();
-            for k in (0..4).filter(|k| within >> k & 1 == 1).map(|k| first + k) {
-                near.push(Vec4::new(self.x[k], self.y[k], self.z[k], self.weight[k]));
-            }
-        }
-    }
 }
 
 /// Generators with one radius of influence, ready to be summed.
@@ -141,6 +121,11 @@ impl DensityField {
         self.radius
     }
 
+    /// The box around all generators that count.
+    pub(super) fn extent(&self) -> Aabb {
+        self.nodes.first().map_or(Aabb::EMPTY, |root| root.bounds)
+    }
+
     /// Bytes that the field holds.
     pub fn memory(&self) -> usize {
         size_of_val(&*self.groups) + size_of_val(&*self.nodes) + size_of_val(&*self.moments)
@@ -185,11 +170,24 @@ impl DensityField {
         ((least * (1.0 - 1.0e-5)) as f32, (most * (1.0 + 1.0e-5)).min(f64::from(f32::MAX)) as f32)
     }
 
-    fn evaluate<const GRADIENT: bool>(&self, points: &[Vec3], mut put: impl FnMut(usize, FieldSample)) {
-        if self.groups.is_empty() {
-            return;
+    fn evaluate<const GRADIENT: bool>(&self, points: &[Vec3], put: impl FnMut(usize, FieldSample)) {
+        if !self.groups.is_empty() {
+            self.evaluate_in::<GRADIENT>(&Self::order(points), put);
         }
-        let order = partition::compact_order(points, LANES);
+    }
+
+    /// The finite ones of `points` with their places, in the order in which they are evaluated.
+    pub(super) fn order(points: &[Vec3]) -> Vec<(Vec3, u32)> {
+        partition::compact_order(points, LANES)
+    }
+
+    /// Calls `put` with the place and the field of each point of `order`, a result of [`Self::order`]; the gradient
+    /// means nothing where it is not asked for.
+    pub(super) fn evaluate_in<const GRADIENT: bool>(
+        &self,
+        order: &[(Vec3, u32)],
+        mut put: impl FnMut(usize, FieldSample),
+    ) {
         let found: Vec<[FieldSample; LANES]> = order
             .par_chunks(LANES)
             .with_min_len(16)
@@ -203,7 +201,7 @@ impl DensityField {
     }
 
     /// The field at up to eight points that lie together. `rim` is scratch space.
-    fn eight<const GRADIENT: bool>(&self, members: &[(Vec3, u32)], rim: &mut Vec<Vec4>) -> [FieldSample; LANES] {
+    fn eight<const GRADIENT: bool>(&self, members: &[(Vec3, u32)], rim: &mut Vec<u32>) -> [FieldSample; LANES] {
         let lane = |i: usize| members[i.min(members.len() - 1)].0;
         let points: [[Vec4; 3]; HALVES] = std::array::from_fn(|half| {
             std::array::from_fn(|axis| Vec4::from_array(std::array::from_fn(|i| lane(4 * half + i)[axis])))
@@ -211,8 +209,7 @@ impl DensityField {
         let region = Aabb::around(members.iter().map(|(point, _)| *point));
         let center = region.center();
         rim.clear();
-        let reach = self.radius * self.radius * ROOM;
-        let inside = self.walk(&region, |group| self.groups[group as usize].push_near(&region, reach, rim));
+        let inside = self.walk(&region, |group| rim.push(group));
         let sums = self.pairs::<GRADIENT>(rim, &points);
 
         let radius = f64::from(self.radius);
@@ -266,25 +263,27 @@ impl DensityField {
         inside
     }
 
-    /// Sums over the generators in `rim`, each its place and its weight.
-    fn pairs<const GRADIENT: bool>(&self, rim: &[Vec4], points: &[[Vec4; 3]; HALVES]) -> Sums {
-        /// Generators that are summed in f32 before their sum is added in f64.
-        const RUN: usize = 32;
+    /// Sums over the generators of the groups in `rim`.
+    fn pairs<const GRADIENT: bool>(&self, rim: &[u32], points: &[[Vec4; 3]; HALVES]) -> Sums {
+        /// Groups that are summed in f32 before their sum is added in f64.
+        const RUN: usize = 4;
         let scale = Vec4::splat((self.radius * self.radius).recip());
         let mut sums = Sums { value: [0.0; LANES], slope: [0.0; LANES], pull: [[0.0; LANES]; 3] };
         for run in rim.chunks(RUN) {
             for (half, [qx, qy, qz]) in points.iter().enumerate() {
                 let [mut value, mut slope, mut px, mut py, mut pz] = [Vec4::ZERO; 5];
-                for near in run {
-                    let (dx, dy, dz) = (*qx - near.xxxx(), *qy - near.yyyy(), *qz - near.zzzz());
-                    let t = (Vec4::ONE - (dx * dx + dy * dy + dz * dz) * scale).max(Vec4::ZERO);
-                    let wt = t * near.wwww();
-                    slope += wt;
-                    value += wt * t;
-                    if GRADIENT {
-                        px += wt * dx;
-                        py += wt * dy;
-                        pz += wt * dz;
+                for group in run.iter().map(|&group| &self.groups[group as usize]) {
+                    for k in 0..GROUP {
+                        let (dx, dy, dz) = (*qx - group.x[k], *qy - group.y[k], *qz - group.z[k]);
+                        let t = (Vec4::ONE - (dx * dx + dy * dy + dz * dz) * scale).max(Vec4::ZERO);
+                        let wt = t * group.weight[k];
+                        slope += wt;
+                        value += wt * t;
+                        if GRADIENT {
+                            px += wt * dx;
+                            py += wt * dy;
+                            pz += wt * dz;
+                        }
                     }
                 }
                 let gather = |sum: &mut [f64; LANES], part: Vec4| {

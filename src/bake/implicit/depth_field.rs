@@ -20,7 +20,7 @@
 
 use glam::Vec3;
 
-use super::density::DensityField;
+use super::density::{DensityField, FieldSample};
 use super::generators::{BUMP_VOLUME, Generator, Weighting, even_share};
 use super::partition::Aabb;
 
@@ -63,24 +63,27 @@ impl DepthField {
 
     /// Mean optical depth over the sphere at `points` (metres): how many leaves a ray meets, 0 or more and finite.
     pub fn depths(&self, points: &[Vec3]) -> Vec<f32> {
-        let mut depths = vec![0.0f32; points.len()];
-        for level in &self.levels {
-            let values = level.values(points);
-            depths.iter_mut().zip(values).for_each(|(depth, value)| *depth += DEPTH * value);
-        }
-        depths.into_iter().map(|depth| depth.min(f32::MAX)).collect()
+        self.sums::<false>(points, |_, sample, _| sample.value)
     }
 
     /// Mean optical depth over the half of the sphere around each of the `normals` (unit vectors, one a point), 0 or
     /// more and finite: for wood, whose other half is itself.
     pub fn depths_above(&self, points: &[Vec3], normals: &[Vec3]) -> Vec<f32> {
+        self.sums::<true>(points, |index, sample, radius| {
+            let normal = normals.get(index).copied().unwrap_or(Vec3::ZERO);
+            let slope = HEMISPHERE * radius * sample.gradient.dot(normal);
+            sample.value + if slope.is_finite() { slope } else { 0.0 }
+        })
+    }
+
+    /// Sums over all levels of what `of` makes of a point's index, the level's field there and its radius.
+    fn sums<const GRADIENT: bool>(&self, points: &[Vec3], of: impl Fn(usize, FieldSample, f32) -> f32) -> Vec<f32> {
         let mut depths = vec![0.0f32; points.len()];
+        let order = DensityField::order(points);
         for level in &self.levels {
-            let samples = level.samples(points);
-            for ((depth, sample), normal) in depths.iter_mut().zip(samples).zip(normals) {
-                let slope = HEMISPHERE * level.radius() * sample.gradient.dot(*normal);
-                *depth += DEPTH * (sample.value + if slope.is_finite() { slope } else { 0.0 });
-            }
+            level.evaluate_in::<GRADIENT>(&order, |index, sample| {
+                depths[index] += DEPTH * of(index, sample, level.radius());
+            });
         }
         depths.into_iter().map(|depth| depth.clamp(0.0, f32::MAX)).collect()
     }

@@ -3,6 +3,8 @@
 //! The mass of a leaf card is what its alpha leaves of it, a seventh to a half in the models that this was tried on: by
 //! whole cards no two of them would have densities that mean the same.
 
+use std::collections::HashSet;
+
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -50,8 +52,8 @@ impl Weighting {
 
 /// A generator for each valid triangle of `part`: indices in range, corners finite. Foliage has the area that passes
 /// the alpha test, wood the leaf area that casts as much shade: half of its surface, as a round body shows a quarter of
-/// its surface on average and a leaf half of its one side. A triangle without area has a generator as well; by leaf
-/// area it weighs nothing.
+/// its surface on average and a leaf half of its one side. A triangle without area and a copy of one in its place, also
+/// one that faces the other way, have a generator as well; by leaf area they weigh nothing.
 pub fn generators(part: &PlantPart) -> Vec<Generator> {
     generators_of(part, &part.mesh)
 }
@@ -59,9 +61,18 @@ pub fn generators(part: &PlantPart) -> Vec<Generator> {
 /// As [`generators`], with the mesh of `part` moved to where `mesh` has it.
 pub(super) fn generators_of(part: &PlantPart, mesh: &PlantMesh) -> Vec<Generator> {
     let surface = Surface::new(part);
-    let triangles: Vec<[usize; 3]> = geometry::triangles(mesh).map(|(_, corners)| corners).collect();
-    let of_triangle = |corners: &[usize; 3]| {
+    let mut seen = HashSet::new();
+    let mut is_first = |corners: [usize; 3]| {
+        // Adding zero turns -0.0 into 0.0, which is the same place.
+        let mut places = corners.map(|corner| (mesh.positions[corner] + Vec3::ZERO).to_array().map(f32::to_bits));
+        places.sort_unstable();
+        seen.insert(places)
+    };
+    let triangles: Vec<([usize; 3], bool)> =
+        geometry::triangles(mesh).map(|(_, corners)| (corners, is_first(corners))).collect();
+    let of_triangle = |(corners, first): &([usize; 3], bool)| {
         let (share, [a, b, c]) = match part.kind {
+            _ if !first => (0.0, [1.0 / 3.0; 3]),
             PartKind::Wood => (0.5, [1.0 / 3.0; 3]),
             PartKind::Foliage => covered(&surface, corners.map(|corner| mesh.uvs[corner])),
         };

@@ -47,6 +47,7 @@ use std::borrow::Cow;
 
 use glam::Vec3;
 
+use crate::bake::geometry;
 use crate::plant::{PartKind, Plant, PlantMesh, PlantPart};
 use ambient_term::ambient_term;
 use density::{DensityField, FieldSample};
@@ -126,7 +127,7 @@ pub fn bake_implicit(plant: &Plant, settings: &ImplicitSettings) -> ImplicitBake
     let field = DensityField::new(&generators, radius, settings.weighting);
     let parameters = parameters::parameters(&leaves, &field, ambient_radius, &settings);
     let depth = depth_field(&parts, leaves, &parameters, extent, &settings);
-    let mut baked = bake_parts(&parts, &generators, &field, depth.as_ref(), parameters, &settings);
+    let mut baked = bake_parts(&parts, generators.len(), &field, depth.as_ref(), parameters, &settings);
     let places = baked.surface.iter_mut().flat_map(|surface| surface.positions.iter_mut());
     places.for_each(|place| *place += origin);
     baked
@@ -155,19 +156,25 @@ impl Part<'_> {
     }
 }
 
-fn finite_bounds(parts: &[Part]) -> Aabb {
-    Aabb::around(parts.iter().flat_map(|part| &part.mesh.positions).copied().filter(|p| p.is_finite()))
+/// The box around all triangles that have an area: a stray vertex does not make a plant larger.
+fn bounds(parts: &[Part]) -> Aabb {
+    let of_part = |part: &Part| {
+        let mesh = &*part.mesh;
+        let triangles = geometry::triangles(mesh).filter(|(_, corners)| geometry::area(mesh, *corners) > 0.0);
+        Aabb::around(triangles.flat_map(|(_, corners)| corners.map(|corner| mesh.positions[corner])))
+    };
+    parts.iter().map(of_part).fold(Aabb::EMPTY, Aabb::join)
 }
 
 /// Longest extent of all parts, metres; not above 0 where there is nothing.
 fn extent(parts: &[Part]) -> f32 {
-    finite_bounds(parts).size().max_element()
+    bounds(parts).size().max_element()
 }
 
 /// Parts that lie far from the origin are moved there (differences of neighbouring f32 are exact), so that the places
 /// between them that the surface needs can be told apart. With the vector that leads back.
 fn centered(mut parts: Vec<Part>) -> (Vec<Part>, Vec3) {
-    let bounds = finite_bounds(&parts);
+    let bounds = bounds(&parts);
     let center = Vec3::from(bounds.center());
     if !center.is_finite() || center.abs().max_element() <= 4.0 * bounds.size().max_element() {
         return (parts, Vec3::ZERO);
@@ -195,7 +202,6 @@ fn depth_field(
     (settings.ambient == AmbientField::Depth).then(|| {
         let mut occluders = leaves;
         occluders.extend(generators_of(parts, PartKind::Wood));
-        let occluders = generators::even_share(&occluders, settings.generator_share);
         DepthField::new(&occluders, parameters.ambient_radius, extent)
     })
 }
@@ -221,7 +227,7 @@ fn depths(parts: &[Part], field: &DepthField) -> Vec<f32> {
 /// The bake itself, in the frame of the parts.
 fn bake_parts(
     parts: &[Part],
-    generators: &[Generator],
+    generators: usize,
     field: &DensityField,
     depth: Option<&DepthField>,
     parameters: ImplicitParameters,
@@ -242,9 +248,8 @@ fn bake_parts(
     let ambient = split(parts, densities.into_iter().map(|density| ambient_term(density, &parameters)));
 
     let (surface, cell) = if settings.surface || !smooth {
-        let region = Aabb::around(generators.iter().map(|generator| generator.position));
         let cell = parameters.radius / settings.resolution;
-        let found = isosurface::extract(field, &region, parameters.threshold, cell);
+        let found = isosurface::extract(field, &field.extent(), parameters.threshold, cell);
         (with_normals(found.positions, found.triangles, field), found.cell)
     } else {
         (SurfaceMesh::default(), 0.0)
@@ -267,7 +272,7 @@ fn bake_parts(
         Some(share) => simplify_surface(&surface, field, (f64::from(share) * leaves as f64).round() as usize),
         None => surface,
     });
-    let report = ImplicitReport { parameters, generators: generators.len(), cell, no_surface };
+    let report = ImplicitReport { parameters, generators, cell, no_surface };
     ImplicitBake { normals, ambient, surface, report }
 }
 

@@ -84,7 +84,8 @@ pub struct ImplicitSettings {
     pub core: Option<f32>,
     /// n, 0.01..=100: below 1 the crown darkens late on the way inside, above 1 early.
     pub exponent: Option<f32>,
-    /// Share of the primitives that are generators, 0..=1 (at least one is). Smaller: faster, a little off.
+    /// Share of the foliage's primitives that are generators, 0..=1 (at least one is). Smaller: faster, a little off.
+    /// [`AmbientField::Depth`] has all of them: it is from few leaves that it finds gaps, and it thins them out itself.
     pub generator_share: f32,
     /// What a generator counts.
     pub weighting: Weighting,
@@ -170,7 +171,9 @@ pub fn radius(generators: &[Generator], extent: f32, settings: &ImplicitSettings
     if let Some(radius) = settings.radius {
         return radius;
     }
-    let bounds = Aabb::around(generators.iter().map(|generator| generator.position));
+    // One that has no area may lie anywhere.
+    let counted = generators.iter().filter(|generator| generator.area > 0.0);
+    let bounds = Aabb::around(counted.map(|generator| generator.position));
     let size = Vec3::from(bounds.size());
     let longest = size.max_element().max(extent);
     if generators.is_empty() || !longest.is_finite() || longest <= 0.0 {

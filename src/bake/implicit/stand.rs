@@ -74,7 +74,7 @@ pub fn bake_implicit_stand(plants: &[StandPlant], settings: &ImplicitSettings) -
     let parts: Vec<Part> = moved.into_iter().flatten().collect();
     let depth = depth_field(&parts, leaves, &parameters, extent, &settings);
     let ImplicitBake { normals, ambient, surface, report } =
-        bake_parts(&parts, &generators, &field, depth.as_ref(), parameters, &settings);
+        bake_parts(&parts, generators.len(), &field, depth.as_ref(), parameters, &settings);
 
     let (mut normals, mut ambient) = (normals.into_iter(), ambient.into_iter());
     let shadings = plants.iter().map(|plant| {
