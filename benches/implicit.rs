@@ -6,10 +6,12 @@
 //! 3. A share of the generators: angle between normals and difference of k_a to the full result, and time.
 //! 4. k_a against traced visibility (leaves: the share of the whole sphere that a ray out of the vertex reaches; wood: of
 //!    the half above it): rank correlation and RMSE of both ambient fields with their automatic values, plant by plant.
-//! 5. The same over the radius of each field, for leaves, and the RMSE with the best k_a_min, d_min and n of a search.
+//! 5. The same over the radius of each field, for the leaves of the full plants, and the RMSE with the best k_a_min,
+//!    d_min and n of a search.
 //!
 //! The tree is our own broadleaf with 60,000 triangles; where CANOPY_DATA names the data folder also its oak, pine
-//! and aspen; in 4 and 5 also our conifer and fewer triangles of both, and a bush. The contestants of a table take turns in one run; medians are printed, as Markdown.
+//! and aspen; in 4 and 5 also our conifer and fewer triangles of both, and a bush. The contestants of a table take turns
+//! in one run; medians are printed, as Markdown.
 
 use std::hint::black_box;
 use std::path::Path;
@@ -44,6 +46,9 @@ struct Arguments {
     /// Vertices of a plant that look around, about.
     #[arg(long, default_value_t = 10_000)]
     vertices: usize,
+    /// Which tables: density, bake, shares, visibility.
+    #[arg(long, value_delimiter = ',', default_values_t = ["density", "bake", "shares", "visibility"].map(String::from))]
+    only: Vec<String>,
     /// Passed by `cargo bench`.
     #[arg(long, hide = true)]
     bench: bool,
@@ -245,7 +250,7 @@ fn rmse(found: &[f32], wanted: &[f32]) -> f64 {
     (squares / wanted.len() as f64).sqrt()
 }
 
-/// A plant, some of its vertices' places in part and list, and what they see: the share of the directions in which
+/// A plant, some of its vertices as part and index, and what they see: the share of the directions in which
 /// nothing of the plant is met, of all of them for leaves and of those above the surface for wood.
 struct Seen<'a> {
     plant: &'a Plant,
@@ -260,7 +265,10 @@ impl<'a> Seen<'a> {
         let all = plant.parts.iter().enumerate();
         let all = all.flat_map(|(part, source)| (0..source.mesh.positions.len()).map(move |vertex| (part, vertex)));
         let all: Vec<(usize, usize)> = all.collect();
-        let vertices: Vec<(usize, usize)> = all.iter().copied().step_by(all.len().div_ceil(count).max(1)).collect();
+        // Not every n-th: vertices of one kind of corner may follow each other at that distance.
+        let golden = |index: usize| (index as f64 * 0.618_033_988_75).fract();
+        let some = (0..count.min(all.len())).map(|index| all[(golden(index) * all.len() as f64) as usize]);
+        let vertices: Vec<(usize, usize)> = some.collect();
         let seen = |&(part, vertex): &(usize, usize)| {
             let source = &plant.parts[part];
             let (position, normal) = (source.mesh.positions[vertex], source.mesh.normals[vertex]);
@@ -280,6 +288,10 @@ impl<'a> Seen<'a> {
         };
         let visibility = vertices.par_iter().map(seen).collect();
         Self { plant, vertices, visibility }
+    }
+
+    fn triangles(&self) -> usize {
+        self.plant.parts.iter().map(|part| part.mesh.triangles.len()).sum()
     }
 
     /// The values at the vertices that are of one kind, from lists as a bake gives them.
@@ -313,12 +325,7 @@ fn automatic(all: &[Seen]) {
                 format!("{:.3} {:.3} {off:+.3}", rank(&found, &wanted), rmse(&found, &wanted))
             })
         });
-        println!(
-            "| {}, {} triangles | {} |",
-            seen.plant.name,
-            seen.plant.parts.iter().map(|part| part.mesh.triangles.len()).sum::<usize>(),
-            cells.as_flattened().join(" | "),
-        );
+        println!("| {}, {} triangles | {} |", seen.plant.name, seen.triangles(), cells.as_flattened().join(" | "),);
     }
 }
 
@@ -352,8 +359,8 @@ fn over_radius(all: &[Seen]) {
         let (generators, occluders) =
             (foliage_generators(seen.plant), seen.plant.parts.iter().flat_map(generators).collect::<Vec<_>>());
         let fields = [
-            (AmbientField::Published, &[0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1, 0.2][..]),
-            (AmbientField::Depth, &[0.005, 0.01, 0.02, 0.04, 0.08][..]),
+            (AmbientField::Published, &[0.02, 0.04, 0.05, 0.06, 0.08, 0.1, 0.2][..]),
+            (AmbientField::Depth, &[0.005, 0.01, 0.02, 0.04][..]),
         ];
         for (ambient, shares) in fields {
             for share in shares {
@@ -378,8 +385,9 @@ fn over_radius(all: &[Seen]) {
                 let open: Vec<f32> = densities.iter().map(|density| -density).collect();
                 let (error, best) = fitted(&densities, &wanted, &automatic);
                 println!(
-                    "| {} | {ambient:?} | {:.1} % | {:.3} | {:.3} | {error:.3} | {:.2} | {:.2} | {:.1} |",
+                    "| {}, {} triangles | {ambient:?} | {:.1} % | {:.3} | {:.3} | {error:.3} | {:.2} | {:.2} | {:.1} |",
                     seen.plant.name,
+                    seen.triangles(),
                     100.0 * share,
                     rank(&open, &wanted),
                     rmse(&found, &wanted),
@@ -411,14 +419,26 @@ fn main() {
     if let Some(folder) = &folder {
         plants.extend(["oak-medium", "pine-medium", "aspen-medium"].iter().filter_map(|name| plant_of(folder, name)));
     }
-    density(&arguments, &plants[0]);
-    total(&arguments, &plants);
-    shares(&arguments, &plants);
-
-    plants.extend([8_000, 24_000].map(|triangles| grown(&GrowParameters::broadleaf(), triangles)));
-    plants.extend([8_000, 24_000, 60_000].map(|triangles| grown(&GrowParameters::conifer(), triangles)));
+    let wants = |table: &str| arguments.only.iter().any(|only| only == table);
+    if wants("density") {
+        density(&arguments, &plants[0]);
+    }
+    if wants("bake") {
+        total(&arguments, &plants);
+    }
+    if wants("shares") {
+        shares(&arguments, &plants);
+    }
+    if !wants("visibility") {
+        return;
+    }
+    plants.push(grown(&GrowParameters::conifer(), 60_000));
     plants.extend(folder.as_deref().and_then(|folder| plant_of(folder, "bush-1")));
+    let full = plants.len();
+    for form in [GrowParameters::broadleaf(), GrowParameters::conifer()] {
+        plants.extend([8_000, 24_000].map(|triangles| grown(&form, triangles)));
+    }
     let seen: Vec<Seen> = plants.iter().map(|plant| Seen::trace(plant, arguments.vertices)).collect();
     automatic(&seen);
-    over_radius(&seen);
+    over_radius(&seen[..full]);
 }

@@ -103,7 +103,7 @@ fn scattered(k: f32) -> f32 {
 
 // Share of the key light that reaches a leaf of ambient visibility k past the leaves around it, for which the shadow
 // maps are too coarse: what sees little of the sky mostly lies in shade. Where the map is fine, k says nothing that the
-// map does not know, and 0.9 + 0.5 k, at most 1.3, would be a little nearer (benches/expressive.rs).
+// map does not know, and 0.8 + 0.75 k, at most 1.3, would be a little nearer (benches/expressive.rs).
 fn leaf_visibility(k: f32) -> f32 {
     return min(0.35 + 2.0 * k, 1.1);
 }

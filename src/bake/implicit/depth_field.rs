@@ -10,10 +10,12 @@
 //!   sum over ρ of A (1 - x²)² / (b ρ²)  ~  A / (b r² ln 2) ∫ x (1 - x²)² dx  =  A / (6 ln 2 b r²)      b = 32 π / 105
 //! ```
 //!
-//! (Radii that double leave a ripple of 7 %.) The slope gives the depth of a half of the sphere: ρ grad F, added up likewise, is A / r² times the direction to
-//! the occluder, 16/5 as long as the value. To first order a half around n is T + 3/2 V·n deep, V being that vector
-//! in the value's units. The exponential that follows weighs open directions more, so that less of V is right:
-//! [`HEMISPHERE`] was fitted to traced visibility.
+//! Radii that double leave a ripple of 7 %.
+//!
+//! The slope gives the depth of a half of the sphere: ρ grad F, added up likewise, is A / r² times the direction to the
+//! occluder, 16/5 as long as the value. To first order a half around n is T + 3/2 V·n deep, V being that vector in the
+//! value's units. The exponential that follows weighs open directions more: by traced visibility two thirds of that are
+//! right.
 //!
 //! The larger the radius, the fewer generators are needed: each level has an even share of them, a third of its radius
 //! apart. Cost: `benches/README.md`.
@@ -26,7 +28,7 @@ use super::partition::Aabb;
 
 /// From the sum of the bumps to the mean optical depth.
 const DEPTH: f32 = 6.0 * std::f32::consts::LN_2 * BUMP_VOLUME / (8.0 * std::f32::consts::PI);
-/// Share of the slope's sum that is added for the half of the sphere around a normal (first order: 3/2 of 5/16).
+/// Share of the slope's sum that is added for the half of the sphere around a normal: two thirds of 3/2 of 5/16.
 const HEMISPHERE: f32 = 0.3125;
 /// Generators along a radius, at least.
 const SPACINGS: f32 = 3.0;
@@ -63,7 +65,7 @@ impl DepthField {
 
     /// Mean optical depth over the sphere at `points` (metres): how many leaves a ray meets, 0 or more and finite.
     pub fn depths(&self, points: &[Vec3]) -> Vec<f32> {
-        self.sums::<false>(points, |_, sample, _| sample.value)
+        self.sums::<false>(points, |_, sample, _| f64::from(sample.value))
     }
 
     /// Mean optical depth over the half of the sphere around each of the `normals` (unit vectors, one a point), 0 or
@@ -72,20 +74,20 @@ impl DepthField {
         self.sums::<true>(points, |index, sample, radius| {
             let normal = normals.get(index).copied().unwrap_or(Vec3::ZERO);
             let slope = HEMISPHERE * radius * sample.gradient.dot(normal);
-            sample.value + if slope.is_finite() { slope } else { 0.0 }
+            f64::from(sample.value) + if slope.is_finite() { f64::from(slope) } else { 0.0 }
         })
     }
 
     /// Sums over all levels of what `of` makes of a point's index, the level's field there and its radius.
-    fn sums<const GRADIENT: bool>(&self, points: &[Vec3], of: impl Fn(usize, FieldSample, f32) -> f32) -> Vec<f32> {
-        let mut depths = vec![0.0f32; points.len()];
+    fn sums<const GRADIENT: bool>(&self, points: &[Vec3], of: impl Fn(usize, FieldSample, f32) -> f64) -> Vec<f32> {
+        let mut depths = vec![0.0f64; points.len()];
         let order = DensityField::order(points);
         for level in &self.levels {
             level.evaluate_in::<GRADIENT>(&order, |index, sample| {
-                depths[index] += DEPTH * of(index, sample, level.radius());
+                depths[index] += f64::from(DEPTH) * of(index, sample, level.radius());
             });
         }
-        depths.into_iter().map(|depth| depth.clamp(0.0, f32::MAX)).collect()
+        depths.into_iter().map(|depth| depth.clamp(0.0, f64::from(f32::MAX)) as f32).collect()
     }
 }
 
