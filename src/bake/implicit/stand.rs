@@ -2,7 +2,7 @@
 //!
 //! Such a bake belongs to one plant at one place, so the plants cannot be instances of one model. Memory: the result
 //! is 16 bytes a vertex (normal and k_a, 4 bytes once packed) and 24 a vertex and 12 a triangle of the surface; while it
-//! is made there are all meshes once more in the stand's frame (32 bytes a vertex, 12 a triangle),20 bytes a
+//! is made there are all meshes once more in the stand's frame (32 bytes a vertex, 12 a triangle), 20 bytes a
 //! leaf and a triangle of wood, 62 more for each of them in the density field and in each level of the depth field (the
 //! coarse half of the levels has few), and at most 48 bytes a vertex for the evaluation.
 
