@@ -4,11 +4,14 @@
 //!    relative error of each against f64. The loop does every n-th vertex only (`--every`), and its time is multiplied.
 //! 2. Field, surface and realigned normals together, and what follows from the model.
 //! 3. A share of the generators: angle between normals and difference of k_a to the full result, and time.
-//! 4. k_a against traced visibility (the share of the whole sphere that a ray out of the vertex reaches): rank correlation,
-//!    and RMSE with the automatic values and with the best k_a_min, d_min and n of a search.
+//! 4. k_a against traced visibility (leaves: the share of the whole sphere that a ray out of the vertex reaches; wood: of
+//!    the half above it): rank correlation and RMSE of both ambient fields with their automatic values, plant by plant.
+//! 5. The same over the radius of each field, for the leaves of the full plants, and the RMSE with the best k_a_min,
+//!    d_min and n of a search.
 //!
 //! The tree is our own broadleaf with 60,000 triangles; where CANOPY_DATA names the data folder also its oak, pine
-//! and aspen. The contestants of a table take turns in one run; medians are printed, as Markdown.
+//! and aspen; in 4 and 5 also our conifer and fewer triangles of both, and a bush. The contestants of a table take turns
+//! in one run; medians are printed, as Markdown.
 
 use std::hint::black_box;
 use std::path::Path;
@@ -17,14 +20,15 @@ use std::time::Instant;
 
 use canopy::bake::implicit::ambient_term::ambient_term;
 use canopy::bake::implicit::density::DensityField;
+use canopy::bake::implicit::depth_field::DepthField;
 use canopy::bake::implicit::generators::{Generator, generators};
 use canopy::bake::implicit::{
-    ImplicitBake, ImplicitParameters, ImplicitSettings, NormalSource, Weighting, bake_implicit,
+    AmbientField, ImplicitBake, ImplicitParameters, ImplicitSettings, NormalSource, Weighting, bake_implicit,
 };
 use canopy::bake::transfer::direction_set;
 use canopy::plant::gltf::{GltfOptions, load_plant};
 use canopy::plant::grow::{GrowParameters, grow};
-use canopy::plant::{PartKind, Plant, PlantMesh};
+use canopy::plant::{PartKind, Plant};
 use canopy::trace::{PlantTracer, Ray, offset_origin};
 use clap::Parser;
 use glam::{DVec3, Vec3};
@@ -39,6 +43,12 @@ struct Arguments {
     /// The scalar loop does every n-th vertex, and its time is multiplied by n.
     #[arg(long, default_value_t = 16)]
     every: usize,
+    /// Vertices of a plant that look around, about.
+    #[arg(long, default_value_t = 10_000)]
+    vertices: usize,
+    /// Which tables: density, bake, shares, visibility.
+    #[arg(long, value_delimiter = ',', default_values_t = ["density", "bake", "shares", "visibility"].map(String::from))]
+    only: Vec<String>,
     /// Passed by `cargo bench`.
     #[arg(long, hide = true)]
     bench: bool,
@@ -95,7 +105,7 @@ fn worst(values: &[f32], exact: &[f64]) -> f64 {
 
 fn foliage_generators(plant: &Plant) -> Vec<Generator> {
     let foliage = plant.parts.iter().filter(|part| part.kind == PartKind::Foliage);
-    foliage.flat_map(|part| generators(&part.mesh)).collect()
+    foliage.flat_map(generators).collect()
 }
 
 fn density(arguments: &Arguments, plant: &Plant) {
@@ -148,24 +158,28 @@ fn with(normals: NormalSource, generator_share: f32) -> ImplicitSettings {
 
 fn total(arguments: &Arguments, plants: &[Plant]) {
     println!(
-        "\n| field, surface, normals | as published, ms | smooth, ms | smooth without surface, ms | surface, triangles \
-         | ρ, m | τ | d_min |\n|---|---|---|---|---|---|---|---|"
+        "\n| field, surface, normals, k_a | all as published, ms | with k_a by depth, ms | smooth, by depth, ms | without \
+         surface, ms | surface, triangles | ρ, m | τ |\n|---|---|---|---|---|---|---|---|"
     );
     for plant in plants {
-        let published = with(NormalSource::NearestVertex, 1.0);
+        let nearest = with(NormalSource::NearestVertex, 1.0);
+        let published = ImplicitSettings { ambient: AmbientField::Published, ..nearest };
         let smooth = with(NormalSource::Gradient, 1.0);
         let bare = ImplicitSettings { surface: false, ..smooth };
         let run = |settings: ImplicitSettings| move || drop(black_box(bake_implicit(plant, &settings)));
-        let times =
-            medians(arguments.turns, &mut [Box::new(run(published)), Box::new(run(smooth)), Box::new(run(bare))]);
-        let baked = bake_implicit(plant, &published);
-        let ImplicitParameters { radius, threshold, core, .. } = baked.report.parameters;
+        let times = medians(
+            arguments.turns,
+            &mut [Box::new(run(published)), Box::new(run(nearest)), Box::new(run(smooth)), Box::new(run(bare))],
+        );
+        let baked = bake_implicit(plant, &nearest);
+        let ImplicitParameters { radius, threshold, .. } = baked.report.parameters;
         println!(
-            "| {} | {:.0} | {:.0} | {:.0} | {} | {radius:.3} | {threshold:.3} | {core:.3} |",
+            "| {} | {:.0} | {:.0} | {:.0} | {:.0} | {} | {radius:.3} | {threshold:.3} |",
             plant.name,
             times[0],
             times[1],
             times[2],
+            times[3],
             baked.surface.map_or(0, |surface| surface.triangles.len()),
         );
     }
@@ -231,91 +245,200 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
     sum(&|a, b| a * b) / (sum(&|a, _| a * a) * sum(&|_, b| b * b)).sqrt()
 }
 
-fn rmse(densities: &[f32], wanted: &[f32], parameters: &ImplicitParameters) -> f64 {
-    let pairs = densities.iter().zip(wanted);
-    let sum: f64 = pairs.map(|(d, wanted)| f64::from(ambient_term(*d, parameters) - wanted).powi(2)).sum();
-    (sum / wanted.len() as f64).sqrt()
+fn rmse(found: &[f32], wanted: &[f32]) -> f64 {
+    let squares: f64 = found.iter().zip(wanted).map(|(found, wanted)| f64::from(found - wanted).powi(2)).sum();
+    (squares / wanted.len() as f64).sqrt()
 }
 
-/// The share of the sphere's directions in which nothing of the plant is met, vertex by vertex.
-fn traced_visibility(plant: &Plant) -> Vec<Vec<f32>> {
-    const DIRECTIONS: usize = 256;
-    let tracer = PlantTracer::new(&Arc::new(plant.clone()));
-    let directions = direction_set(DIRECTIONS as u32);
-    let seen = |mesh: &PlantMesh, vertex: usize| {
-        let (position, normal) = (mesh.positions[vertex], mesh.normals[vertex]);
-        let open = directions.iter().filter(|direction| {
-            let side = if normal.dot(**direction) < 0.0 { -normal } else { normal };
-            let origin = offset_origin(position, side, **direction);
-            !tracer.occluded(&Ray { origin, direction: **direction, t_max: f32::INFINITY })
-        });
-        open.count() as f32 / DIRECTIONS as f32
-    };
-    let of_part = |mesh: &PlantMesh| (0..mesh.positions.len()).into_par_iter().map(|v| seen(mesh, v)).collect();
-    plant.parts.iter().map(|part| of_part(&part.mesh)).collect()
+/// A plant, some of its vertices as part and index, and what they see: the share of the directions in which
+/// nothing of the plant is met, of all of them for leaves and of those above the surface for wood.
+struct Seen<'a> {
+    plant: &'a Plant,
+    vertices: Vec<(usize, usize)>,
+    visibility: Vec<f32>,
 }
 
-fn against_visibility(plants: &[Plant]) {
-    println!(
-        "\n| k_a against traced visibility | ρ | rank correlation | RMSE, automatic | RMSE, fitted | k_a_min | d_min / automatic \
-         | n |\n|---|---|---|---|---|---|---|---|"
-    );
-    for plant in plants {
-        let visibility = traced_visibility(plant);
-        let automatic = bake_implicit(plant, &with(NormalSource::Gradient, 1.0)).report.parameters;
-        let leaves = || plant.parts.iter().zip(&visibility).filter(|(part, _)| part.kind == PartKind::Foliage);
-        let wanted: Vec<f32> = leaves().flat_map(|(_, values)| values).copied().collect();
-        let points: Vec<Vec3> = leaves().flat_map(|(part, _)| &part.mesh.positions).copied().collect();
-        for factor in [0.5f32, 1.0, 2.0, 4.0] {
-            let radius = factor * automatic.radius;
-            let settings =
-                ImplicitSettings { radius: Some(radius), surface: false, ..with(NormalSource::Gradient, 1.0) };
-            let automatic = bake_implicit(plant, &settings).report.parameters;
-            let field = DensityField::new(&foliage_generators(plant), radius, Weighting::LeafArea);
-            let densities: Vec<f32> =
-                field.values(&points).into_iter().map(|value| value - automatic.threshold).collect();
-            let negative: Vec<f32> = densities.iter().map(|d| -d).collect();
-            let rank = correlation(&ranks(&negative), &ranks(&wanted));
-            let mut best = (f64::INFINITY, automatic);
-            for least in [0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4] {
-                for core in [0.5, 0.7, 1.0, 1.4, 2.0, 3.0] {
-                    for exponent in [0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0] {
-                        let tried = ImplicitParameters { least, core: core * automatic.core, exponent, ..automatic };
-                        let error = rmse(&densities, &wanted, &tried);
-                        if error < best.0 {
-                            best = (error, tried);
-                        }
-                    }
+impl<'a> Seen<'a> {
+    fn trace(plant: &'a Plant, count: usize) -> Self {
+        let tracer = PlantTracer::new(&Arc::new(plant.clone()));
+        let directions = direction_set(256);
+        let all = plant.parts.iter().enumerate();
+        let all = all.flat_map(|(part, source)| (0..source.mesh.positions.len()).map(move |vertex| (part, vertex)));
+        let all: Vec<(usize, usize)> = all.collect();
+        // Not every n-th: vertices of one kind of corner may follow each other at that distance.
+        let golden = |index: usize| (index as f64 * 0.618_033_988_75).fract();
+        let some = (0..count.min(all.len())).map(|index| all[(golden(index) * all.len() as f64) as usize]);
+        let vertices: Vec<(usize, usize)> = some.collect();
+        let seen = |&(part, vertex): &(usize, usize)| {
+            let source = &plant.parts[part];
+            let (position, normal) = (source.mesh.positions[vertex], source.mesh.normals[vertex]);
+            let (mut open, mut of) = (0.0, 0.0);
+            for direction in &directions {
+                let below = normal.dot(*direction) < 0.0;
+                if below && source.kind == PartKind::Wood {
+                    continue;
+                }
+                let origin = offset_origin(position, if below { -normal } else { normal }, *direction);
+                of += 1.0;
+                if !tracer.occluded(&Ray { origin, direction: *direction, t_max: f32::INFINITY }) {
+                    open += 1.0;
                 }
             }
-            println!(
-                "| {} | {:.1} % | {rank:.3} | {:.3} | {:.3} | {:.2} | {:.1} | {:.1} |",
-                plant.name,
-                100.0 * radius / plant.height(),
-                rmse(&densities, &wanted, &automatic),
-                best.0,
-                best.1.least,
-                best.1.core / automatic.core,
-                best.1.exponent,
-            );
+            open / of
+        };
+        let visibility = vertices.par_iter().map(seen).collect();
+        Self { plant, vertices, visibility }
+    }
+
+    fn triangles(&self) -> usize {
+        self.plant.parts.iter().map(|part| part.mesh.triangles.len()).sum()
+    }
+
+    /// The values at the vertices that are of one kind, from lists as a bake gives them.
+    fn of(&self, kind: PartKind, lists: &[Vec<f32>]) -> (Vec<f32>, Vec<f32>) {
+        let pairs = self.vertices.iter().zip(&self.visibility);
+        let pairs = pairs.filter(|((part, _), _)| self.plant.parts[*part].kind == kind);
+        pairs.map(|(&(part, vertex), seen)| (lists[part][vertex], *seen)).unzip()
+    }
+}
+
+fn rank(found: &[f32], wanted: &[f32]) -> f64 {
+    correlation(&ranks(found), &ranks(wanted))
+}
+
+fn automatic(all: &[Seen]) {
+    println!(
+        "\n| k_a against traced visibility | leaves, by depth: rank correlation, RMSE, mean | leaves, as published | wood, by depth \
+         | wood, as published |\n|---|---|---|---|---|"
+    );
+    for seen in all {
+        let bakes = [AmbientField::Depth, AmbientField::Published].map(|ambient| {
+            bake_implicit(
+                seen.plant,
+                &ImplicitSettings { ambient, surface: false, ..with(NormalSource::Gradient, 1.0) },
+            )
+        });
+        let cells = [PartKind::Foliage, PartKind::Wood].map(|kind| {
+            bakes.each_ref().map(|bake| {
+                let (found, wanted) = seen.of(kind, &bake.ambient);
+                let off = found.iter().zip(&wanted).map(|(a, b)| f64::from(a - b)).sum::<f64>() / found.len() as f64;
+                format!("{:.3} {:.3} {off:+.3}", rank(&found, &wanted), rmse(&found, &wanted))
+            })
+        });
+        println!("| {}, {} triangles | {} |", seen.plant.name, seen.triangles(), cells.as_flattened().join(" | "),);
+    }
+}
+
+/// The least RMSE over k_a_min, d_min and n, with them.
+fn fitted(densities: &[f32], wanted: &[f32], automatic: &ImplicitParameters) -> (f64, ImplicitParameters) {
+    let mut tried = Vec::new();
+    for least in [0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45] {
+        for core in [0.15, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0] {
+            for exponent in [0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0] {
+                tried.push(ImplicitParameters { least, core: core * automatic.core, exponent, ..*automatic });
+            }
+        }
+    }
+    let error = |tried: &ImplicitParameters| {
+        let found: Vec<f32> = densities.iter().map(|density| ambient_term(*density, tried)).collect();
+        rmse(&found, wanted)
+    };
+    let errors: Vec<f64> = tried.par_iter().map(error).collect();
+    errors.into_iter().zip(tried).min_by(|a, b| a.0.total_cmp(&b.0)).expect("something was tried")
+}
+
+fn over_radius(all: &[Seen]) {
+    println!(
+        "\n| leaves | field | radius, share of the extent | rank correlation | RMSE, automatic | RMSE, fitted | k_a_min | d_min | n \
+         |\n|---|---|---|---|---|---|---|---|---|"
+    );
+    for seen in all {
+        let extent = seen.plant.bounds().expect("a plant").size().max_element();
+        let leaves = seen.vertices.iter().filter(|(part, _)| seen.plant.parts[*part].kind == PartKind::Foliage);
+        let points: Vec<Vec3> = leaves.map(|&(part, v)| seen.plant.parts[part].mesh.positions[v]).collect();
+        let (generators, occluders) =
+            (foliage_generators(seen.plant), seen.plant.parts.iter().flat_map(generators).collect::<Vec<_>>());
+        let fields = [
+            (AmbientField::Published, &[0.02, 0.04, 0.05, 0.06, 0.08, 0.1, 0.2][..]),
+            (AmbientField::Depth, &[0.005, 0.01, 0.02, 0.04][..]),
+        ];
+        for (ambient, shares) in fields {
+            for share in shares {
+                let radius = Some(share * extent);
+                let settings = ImplicitSettings { ambient, surface: false, ..with(NormalSource::Gradient, 1.0) };
+                let settings = match ambient {
+                    AmbientField::Published => ImplicitSettings { radius, ..settings },
+                    AmbientField::Depth => ImplicitSettings { ambient_radius: radius, ..settings },
+                };
+                let baked = bake_implicit(seen.plant, &settings);
+                let automatic = baked.report.parameters;
+                let densities: Vec<f32> = match ambient {
+                    AmbientField::Published => {
+                        let field = DensityField::new(&generators, automatic.radius, Weighting::LeafArea);
+                        field.values(&points).into_iter().map(|value| value - automatic.threshold).collect()
+                    }
+                    AmbientField::Depth => {
+                        DepthField::new(&occluders, automatic.ambient_radius, extent).depths(&points)
+                    }
+                };
+                let (found, wanted) = seen.of(PartKind::Foliage, &baked.ambient);
+                let open: Vec<f32> = densities.iter().map(|density| -density).collect();
+                let (error, best) = fitted(&densities, &wanted, &automatic);
+                println!(
+                    "| {}, {} triangles | {ambient:?} | {:.1} % | {:.3} | {:.3} | {error:.3} | {:.2} | {:.2} | {:.1} |",
+                    seen.plant.name,
+                    seen.triangles(),
+                    100.0 * share,
+                    rank(&open, &wanted),
+                    rmse(&found, &wanted),
+                    best.least,
+                    best.core,
+                    best.exponent,
+                );
+            }
+        }
+    }
+}
+
+fn plant_of(folder: &std::ffi::OsStr, name: &str) -> Option<Plant> {
+    let path = Path::new(folder).join("trees").join(name).with_extension("glb");
+    match load_plant(&path, &GltfOptions::default()) {
+        Ok((plant, _)) => Some(plant),
+        Err(error) => {
+            eprintln!("{name} is left out: {error}");
+            None
         }
     }
 }
 
 fn main() {
     let arguments = Arguments::parse();
-    let mut plants = vec![grow(&GrowParameters::broadleaf(), 1, 60_000).expect("a broadleaf can be grown")];
-    if let Some(folder) = std::env::var_os("CANOPY_DATA") {
-        for name in ["oak-medium", "pine-medium", "aspen-medium"] {
-            let path = Path::new(&folder).join("trees").join(name).with_extension("glb");
-            match load_plant(&path, &GltfOptions::default()) {
-                Ok((plant, _)) => plants.push(plant),
-                Err(error) => eprintln!("{name} is left out: {error}"),
-            }
-        }
+    let grown = |form: &GrowParameters, triangles: usize| grow(form, 1, triangles).expect("a plant can be grown");
+    let mut plants = vec![grown(&GrowParameters::broadleaf(), 60_000)];
+    let folder = std::env::var_os("CANOPY_DATA");
+    if let Some(folder) = &folder {
+        plants.extend(["oak-medium", "pine-medium", "aspen-medium"].iter().filter_map(|name| plant_of(folder, name)));
     }
-    density(&arguments, &plants[0]);
-    total(&arguments, &plants);
-    shares(&arguments, &plants);
-    against_visibility(&plants);
+    let wants = |table: &str| arguments.only.iter().any(|only| only == table);
+    if wants("density") {
+        density(&arguments, &plants[0]);
+    }
+    if wants("bake") {
+        total(&arguments, &plants);
+    }
+    if wants("shares") {
+        shares(&arguments, &plants);
+    }
+    if !wants("visibility") {
+        return;
+    }
+    plants.push(grown(&GrowParameters::conifer(), 60_000));
+    plants.extend(folder.as_deref().and_then(|folder| plant_of(folder, "bush-1")));
+    let full = plants.len();
+    for form in [GrowParameters::broadleaf(), GrowParameters::conifer()] {
+        plants.extend([8_000, 24_000].map(|triangles| grown(&form, triangles)));
+    }
+    let seen: Vec<Seen> = plants.iter().map(|plant| Seen::trace(plant, arguments.vertices)).collect();
+    automatic(&seen);
+    over_radius(&seen[..full]);
 }

@@ -7,7 +7,7 @@ use crate::{
     bake::{
         BakeSettings,
         billboard::CrossSettings,
-        implicit::{ImplicitSettings, NormalSource},
+        implicit::{AmbientField, ImplicitSettings, NormalSource},
         lighting::LightingSettings,
         transfer::{Channels, Interior, TransferSettings},
     },
@@ -17,7 +17,7 @@ use crate::{
         grow::{GrowParameters, grow},
     },
     scatter::packed::MAX_VARIANTS,
-    scene::{CrownNormals, GrownForm, Lighting, PlantSource, Quality, Scene, Species},
+    scene::{AmbientTerm, CrownNormals, GrownForm, Lighting, PlantSource, Quality, Scene, Species},
 };
 
 /// How one individual is made.
@@ -161,6 +161,11 @@ pub fn lighting_settings(lighting: Option<&Lighting>) -> LightingSettings {
             LightingSettings::Expressive(ImplicitSettings {
                 radius: number(expressive.radius),
                 threshold: number(expressive.threshold),
+                ambient: match expressive.ambient {
+                    AmbientTerm::Depth => AmbientField::Depth,
+                    AmbientTerm::Published => AmbientField::Published,
+                },
+                ambient_radius: number(expressive.ambient_radius),
                 least: number(expressive.least),
                 core: number(expressive.core),
                 exponent: number(expressive.exponent),

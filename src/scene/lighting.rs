@@ -45,9 +45,14 @@ pub struct Expressive {
     pub radius: Option<f64>,
     /// Density at the surface, tau, in leaves, 0 to 1000000. Larger: a surface closer to the densest foliage.
     pub threshold: Option<f64>,
+    /// What the ambient light is a function of. Default `Depth`.
+    pub ambient: AmbientTerm,
+    /// First radius of `Depth` in metres, 0 to 1000. Larger: gaps between twigs no longer count.
+    pub ambient_radius: Option<f64>,
     /// Ambient light of the crown's core, k_a_min, 0 to 1.
     pub least: Option<f64>,
-    /// Density from which on the ambient light is that of the core, d_min, in leaves, 0 to 1000000. Larger: brighter.
+    /// Depth or density from which on the ambient light is that of the core, d_min, in leaves, 0 to 1000000. Larger:
+    /// brighter.
     pub core: Option<f64>,
     /// Exponent n, 0.01 to 100: below 1 the crown darkens late on the way inside, above 1 early.
     pub exponent: Option<f64>,
@@ -61,6 +66,16 @@ pub struct Expressive {
     /// 2007, 5]. Each tree then is a model of its own, of which a scene has at most 64. The first such species' values
     /// count for all. Default false.
     pub together: bool,
+}
+
+/// What the ambient light of an implicit surface's light is a function of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+pub enum AmbientTerm {
+    /// How many leaves a ray meets on its way out, on average. Near to what the path tracer finds.
+    #[default]
+    Depth,
+    /// The density within rho less tau, as published.
+    Published,
 }
 
 /// Where the normals of an implicit surface's light come from.
@@ -78,6 +93,8 @@ impl Expressive {
     pub const RADIUS: RangeInclusive<f64> = 1e-6..=1e3;
     /// Range of [`threshold`](Self::threshold) and [`core`](Self::core), leaves.
     pub const DENSITY: RangeInclusive<f64> = 0.0..=1e6;
+    /// Range of [`ambient_radius`](Self::ambient_radius), metres.
+    pub const AMBIENT_RADIUS: RangeInclusive<f64> = 0.0..=1e3;
     /// Range of [`exponent`](Self::exponent).
     pub const EXPONENT: RangeInclusive<f64> = 0.01..=100.0;
     /// Range of [`share`](Self::share).
@@ -97,6 +114,7 @@ impl Lighting {
                 for (name, value) in [
                     ("radius", expressive.radius),
                     ("threshold", expressive.threshold),
+                    ("ambient_radius", expressive.ambient_radius),
                     ("least", expressive.least),
                     ("core", expressive.core),
                     ("exponent", expressive.exponent),
@@ -104,6 +122,9 @@ impl Lighting {
                     ("own_normal", expressive.own_normal),
                 ] {
                     fields.extend(value.map(|value| format!("{name}: {value}")));
+                }
+                if expressive.ambient != AmbientTerm::default() {
+                    fields.push(format!("ambient: {:?}", expressive.ambient));
                 }
                 if expressive.normals != CrownNormals::default() {
                     fields.push(format!("normals: {:?}", expressive.normals));
@@ -140,6 +161,7 @@ impl Lighting {
         };
         number("radius", expressive.radius, Expressive::RADIUS, "m");
         number("threshold", expressive.threshold, Expressive::DENSITY, "leaves");
+        number("ambient_radius", expressive.ambient_radius, Expressive::AMBIENT_RADIUS, "m");
         number("least", expressive.least, Expressive::UNIT, "");
         number("core", expressive.core, Expressive::DENSITY, "leaves");
         number("exponent", expressive.exponent, Expressive::EXPONENT, "");

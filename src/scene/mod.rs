@@ -44,7 +44,7 @@ mod trees;
 pub use camera::{Camera, PathKey, Pose, Viewpoint};
 pub use error::{Problem, SceneError};
 pub use ground::{Coordinates, Crop, Ground, GroundFile, GroundFlat, GroundImage, GroundNoise, Surroundings};
-pub use lighting::{CrownNormals, Expressive, Lighting, Transfer};
+pub use lighting::{AmbientTerm, CrownNormals, Expressive, Lighting, Transfer};
 pub use locate::Position;
 pub use overrides::Overrides;
 pub use parse::{ArgumentError, parse_lighting, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size};

@@ -2,8 +2,8 @@
 
 use super::parameters::ImplicitParameters;
 
-/// Eq. 4: k_a of a point with the density `d` = F - τ: 1 outside the surface, falling to k_a_min at d_min and
-/// staying there. In `least..=1` for any input; 1 where the density is not a number.
+/// Eq. 4: k_a of a point with the density `d` (F - τ as published, else the depth): 1 where it is not above 0, falling to
+/// k_a_min at d_min and staying there. In `least..=1` for any input; 1 where the density is not a number.
 pub fn ambient_term(d: f32, parameters: &ImplicitParameters) -> f32 {
     let ImplicitParameters { least, core, exponent, .. } = *parameters;
     if d.is_nan() || d <= 0.0 {
@@ -21,7 +21,7 @@ mod tests {
     use super::*;
 
     fn parameters(least: f32, core: f32, exponent: f32) -> ImplicitParameters {
-        ImplicitParameters { radius: 1.0, threshold: 0.0, least, core, exponent }
+        ImplicitParameters { radius: 1.0, threshold: 0.0, ambient_radius: 1.0, least, core, exponent }
     }
 
     #[test]

@@ -29,6 +29,9 @@ const LANES: usize = 8;
 const HALVES: usize = LANES / 4;
 /// Generators of a group.
 const GROUP: usize = 8;
+/// Room for rounding when squared distances are compared with the reach: what is left out must be 0, as a sum that is
+/// nothing but a few generators at the very rim is to be right as well.
+const ROOM: f32 = 1.0 + 1.0e-6;
 /// Radii and coordinates beyond this many metres (and radii below its inverse) overflow f32 somewhere.
 const FARTHEST: f32 = 1.0e15;
 
@@ -118,6 +121,11 @@ impl DensityField {
         self.radius
     }
 
+    /// The box around all generators that count.
+    pub(super) fn extent(&self) -> Aabb {
+        self.nodes.first().map_or(Aabb::EMPTY, |root| root.bounds)
+    }
+
     /// Bytes that the field holds.
     pub fn memory(&self) -> usize {
         size_of_val(&*self.groups) + size_of_val(&*self.nodes) + size_of_val(&*self.moments)
@@ -162,11 +170,24 @@ impl DensityField {
         ((least * (1.0 - 1.0e-5)) as f32, (most * (1.0 + 1.0e-5)).min(f64::from(f32::MAX)) as f32)
     }
 
-    fn evaluate<const GRADIENT: bool>(&self, points: &[Vec3], mut put: impl FnMut(usize, FieldSample)) {
-        if self.groups.is_empty() {
-            return;
+    fn evaluate<const GRADIENT: bool>(&self, points: &[Vec3], put: impl FnMut(usize, FieldSample)) {
+        if !self.groups.is_empty() {
+            self.evaluate_in::<GRADIENT>(&Self::order(points), put);
         }
-        let order = partition::compact_order(points, LANES);
+    }
+
+    /// The finite ones of `points` with their places, in the order in which they are evaluated.
+    pub(super) fn order(points: &[Vec3]) -> Vec<(Vec3, u32)> {
+        partition::compact_order(points, LANES)
+    }
+
+    /// Calls `put` with the place and the field of each point of `order`, a result of [`Self::order`]; the gradient
+    /// means nothing where it is not asked for.
+    pub(super) fn evaluate_in<const GRADIENT: bool>(
+        &self,
+        order: &[(Vec3, u32)],
+        mut put: impl FnMut(usize, FieldSample),
+    ) {
         let found: Vec<[FieldSample; LANES]> = order
             .par_chunks(LANES)
             .with_min_len(16)
@@ -220,12 +241,13 @@ impl DensityField {
     /// centre, of all generators that reach all of it.
     fn walk(&self, region: &Aabb, mut at_rim: impl FnMut(u32)) -> Option<Moments> {
         let reach = self.radius * self.radius;
+        let beyond = reach * ROOM;
         let center = region.center().as_dvec3();
         let mut inside: Option<Moments> = None;
         let mut at = 0;
         while let Some(node) = self.nodes.get(at) {
             let (near, far) = node.bounds.distances_squared(region);
-            if near >= reach {
+            if near >= beyond {
                 at = node.next as usize;
             } else if far < reach {
                 let shift = node.bounds.center().as_dvec3() - center;

@@ -2,10 +2,11 @@
 //! Surfaces"]: normals that follow the shape of the crown, and an ambient term that follows its density.
 //!
 //! ```text
-//! plant ─ generators ─ parameters ─ density field ─┬─ ambient term, all parts
-//!                                                  ├─ isosurface ─┬─ normals of the foliage (as published)
-//!                                                  │              └─ simplified, for other styles
-//!                                                  └─ gradient ──── normals of the foliage (smooth)
+//! plant ─ generators ─ parameters ─┬─ density field ─┬─ isosurface ─┬─ normals of the foliage (as published)
+//!                                  │                 │              └─ simplified, for other styles
+//!                                  │                 ├─ gradient ──── normals of the foliage (smooth)
+//!                                  │                 └─ ambient term, all parts (as published)
+//!                                  └─ depth field ───── ambient term, all parts
 //! ```
 //!
 //! | module | section |
@@ -14,6 +15,7 @@
 //! | [`density`] | density field and gradient (2.3, eq. 2 and 3) |
 //! | [`isosurface`], [`simplify_surface`] | the surface as a closed mesh (2.3, 3.1) |
 //! | [`ambient_term`](mod@ambient_term) | k_a from the density (3.2, eq. 4) |
+//! | [`depth_field`] | the density over all radii, for k_a: not in the publication |
 //! | [`foliage_normals`] | realigned normals (3.3) |
 //! | [`packing`] | k_a as the length of the normal (3.2) |
 //! | [`parameters`] | settings, and values that follow from the model (3.1) |
@@ -22,13 +24,15 @@
 //! Realigned normals point out of the crown: they must not be flipped by the side of a leaf that faces the camera.
 //!
 //! Departures from the paper: generators count their leaf area (the paper's count is [`Weighting::Primitives`]);
-//! automatic parameters; the smooth variant. Limits: a card counts its whole area, also where its alpha is 0.
+//! automatic parameters; the smooth variant; [`AmbientField::Depth`]. The published density is blind beyond ρ, so one ρ
+//! cannot both smooth the crown's shape and tell how much light comes in, and a value of d_min suits one plant only.
 //!
 //! Pure functions: the same plant and settings give the same bytes, with any number of threads. Cost: `benches/README.md`.
 
 pub mod ambient_term;
 mod cube_table;
 pub mod density;
+pub mod depth_field;
 pub mod foliage_normals;
 pub mod generators;
 pub mod isosurface;
@@ -43,19 +47,21 @@ use std::borrow::Cow;
 
 use glam::Vec3;
 
-use crate::plant::{PartKind, Plant, PlantMesh};
+use crate::bake::geometry;
+use crate::plant::{PartKind, Plant, PlantMesh, PlantPart};
 use ambient_term::ambient_term;
 use density::{DensityField, FieldSample};
+use depth_field::DepthField;
 use generators::Generator;
 use partition::Aabb;
 
 pub use generators::Weighting;
 pub use isosurface::SurfaceMesh;
-pub use parameters::{ImplicitParameters, ImplicitSettings, NormalSource};
+pub use parameters::{AmbientField, ImplicitParameters, ImplicitSettings, NormalSource};
 pub use simplify::{COARSE_SHARE, FINE_SHARE};
 pub use stand::{StandBake, StandPlant, bake_implicit_stand};
 
-/// Why the foliage keeps its own normals. Its ambient term is 1 throughout in the first two cases.
+/// Why the foliage keeps its own normals. As published its ambient term is 1 throughout in the first two cases.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NoSurface {
     /// There is no leaf that counts, or ρ is 0.
@@ -112,8 +118,9 @@ pub struct ImplicitBake {
 pub fn bake_implicit(plant: &Plant, settings: &ImplicitSettings) -> ImplicitBake {
     let settings = settings.in_range();
     let (parts, origin) = centered(parts_of(plant));
-    let Basis { generators, field, parameters } = basis(&parts, &settings);
-    let mut baked = bake_parts(&parts, &generators, &field, parameters, &settings);
+    let Basis { leaves, generators, field, parameters, extent } = basis(&parts, &settings);
+    let depth = depth_field(&parts, leaves, &parameters, extent, &settings);
+    let mut baked = bake_parts(&parts, generators, &field, depth.as_ref(), parameters, &settings);
     let places = baked.surface.iter_mut().flat_map(|surface| surface.positions.iter_mut());
     places.for_each(|place| *place += origin);
     baked
@@ -125,24 +132,30 @@ pub fn implicit_parameters(plant: &Plant, settings: &ImplicitSettings) -> Implic
 }
 
 fn parts_of(plant: &Plant) -> Vec<Part<'_>> {
-    plant.parts.iter().map(|part| Part { kind: part.kind, mesh: Cow::Borrowed(&part.mesh) }).collect()
+    plant.parts.iter().map(|source| Part { source, mesh: Cow::Borrowed(&source.mesh) }).collect()
 }
 
 /// What a bake stands on.
 struct Basis {
-    generators: Vec<Generator>,
+    /// One for each primitive of the foliage.
+    leaves: Vec<Generator>,
+    /// How many of them make the field.
+    generators: usize,
     field: DensityField,
     parameters: ImplicitParameters,
+    extent: f32,
 }
 
 /// Generators, field and values of a lone plant, by `settings` that are in range.
 fn basis(parts: &[Part], settings: &ImplicitSettings) -> Basis {
-    let all = foliage_generators(parts);
-    let radius = parameters::radius(&all, extent(parts), settings);
-    let generators = generators::even_share(&all, settings.generator_share);
+    let extent = extent(parts);
+    let leaves = generators_of(parts, PartKind::Foliage);
+    let radius = parameters::radius(&leaves, extent, settings);
+    let ambient_radius = parameters::ambient_radius(radius, extent, settings);
+    let generators = generators::even_share(&leaves, settings.generator_share);
     let field = DensityField::new(&generators, radius, settings.weighting);
-    let parameters = parameters::parameters(&all, &field, settings);
-    Basis { generators, field, parameters }
+    let parameters = parameters::parameters(&leaves, &field, ambient_radius, settings);
+    Basis { generators: generators.len(), leaves, field, parameters, extent }
 }
 
 /// The surface with at most `target` triangles, or as near to it as its separate lobes allow, and with normals of
@@ -154,23 +167,39 @@ pub fn simplify_surface(surface: &SurfaceMesh, field: &DensityField, target: usi
 
 /// A part of a plant, in the frame of the bake.
 struct Part<'a> {
-    kind: PartKind,
+    /// Kind and material.
+    source: &'a PlantPart,
+    /// Its mesh where the bake has it.
     mesh: Cow<'a, PlantMesh>,
 }
 
-fn finite_bounds(parts: &[Part]) -> Aabb {
-    Aabb::around(parts.iter().flat_map(|part| &part.mesh.positions).copied().filter(|p| p.is_finite()))
+impl Part<'_> {
+    /// Its normals as unit vectors, one a vertex; up where it has none.
+    fn own_normals(&self) -> impl Iterator<Item = Vec3> + '_ {
+        let normals = self.mesh.normals.iter().map(|normal| normal.try_normalize().unwrap_or(Vec3::Y));
+        normals.chain(std::iter::repeat(Vec3::Y)).take(self.mesh.positions.len())
+    }
+}
+
+/// The box around all triangles that have an area: a stray vertex does not make a plant larger.
+fn bounds(parts: &[Part]) -> Aabb {
+    let of_part = |part: &Part| {
+        let mesh = &*part.mesh;
+        let triangles = geometry::triangles(mesh).filter(|(_, corners)| geometry::area(mesh, *corners) > 0.0);
+        Aabb::around(triangles.flat_map(|(_, corners)| corners.map(|corner| mesh.positions[corner])))
+    };
+    parts.iter().map(of_part).fold(Aabb::EMPTY, Aabb::join)
 }
 
 /// Longest extent of all parts, metres; not above 0 where there is nothing.
 fn extent(parts: &[Part]) -> f32 {
-    finite_bounds(parts).size().max_element()
+    bounds(parts).size().max_element()
 }
 
 /// Parts that lie far from the origin are moved there (differences of neighbouring f32 are exact), so that the places
 /// between them that the surface needs can be told apart. With the vector that leads back.
 fn centered(mut parts: Vec<Part>) -> (Vec<Part>, Vec3) {
-    let bounds = finite_bounds(&parts);
+    let bounds = bounds(&parts);
     let center = Vec3::from(bounds.center());
     if !center.is_finite() || center.abs().max_element() <= 4.0 * bounds.size().max_element() {
         return (parts, Vec3::ZERO);
@@ -181,40 +210,76 @@ fn centered(mut parts: Vec<Part>) -> (Vec<Part>, Vec3) {
     (parts, center)
 }
 
-/// A generator for each primitive of the foliage.
-fn foliage_generators(parts: &[Part]) -> Vec<Generator> {
-    let foliage = parts.iter().filter(|part| part.kind == PartKind::Foliage);
-    foliage.flat_map(|part| generators::generators(&part.mesh)).collect()
+/// A generator for each primitive of the parts of one kind.
+fn generators_of(parts: &[Part], kind: PartKind) -> Vec<Generator> {
+    let parts = parts.iter().filter(|part| part.source.kind == kind);
+    parts.flat_map(|part| generators::generators_of(part.source, &part.mesh)).collect()
+}
+
+/// The field of the ambient term for parts with the generators `leaves` of their foliage; `None` where it is the density.
+fn depth_field(
+    parts: &[Part],
+    leaves: Vec<Generator>,
+    parameters: &ImplicitParameters,
+    extent: f32,
+    settings: &ImplicitSettings,
+) -> Option<DepthField> {
+    (settings.ambient == AmbientField::Depth).then(|| {
+        let mut occluders = leaves;
+        occluders.extend(generators_of(parts, PartKind::Wood));
+        DepthField::new(&occluders, parameters.ambient_radius, extent)
+    })
+}
+
+/// The depth at each vertex of all parts in one list: around a leaf, above the surface of wood.
+fn depths(parts: &[Part], field: &DepthField) -> Vec<f32> {
+    let of = |kind: PartKind| parts.iter().filter(move |part| part.source.kind == kind);
+    let places = |kind: PartKind| of(kind).flat_map(|part| &part.mesh.positions).copied().collect::<Vec<Vec3>>();
+    let normals: Vec<Vec3> = of(PartKind::Wood).flat_map(|part| part.own_normals()).collect();
+    let mut leaves = field.depths(&places(PartKind::Foliage)).into_iter();
+    let mut wood = field.depths_above(&places(PartKind::Wood), &normals).into_iter();
+    let mut all = Vec::new();
+    for part in parts {
+        let count = part.mesh.positions.len();
+        match part.source.kind {
+            PartKind::Foliage => all.extend(leaves.by_ref().take(count)),
+            PartKind::Wood => all.extend(wood.by_ref().take(count)),
+        }
+    }
+    all
 }
 
 /// The bake itself, in the frame of the parts.
 fn bake_parts(
     parts: &[Part],
-    generators: &[Generator],
+    generators: usize,
     field: &DensityField,
+    depth: Option<&DepthField>,
     parameters: ImplicitParameters,
     settings: &ImplicitSettings,
 ) -> ImplicitBake {
     // All parts at once: one list keeps all threads busy to its end.
     let points: Vec<Vec3> = parts.iter().flat_map(|part| &part.mesh.positions).copied().collect();
     let smooth = settings.normals == NormalSource::Gradient;
-    let samples = if smooth {
-        field.samples(&points)
-    } else {
-        field.values(&points).into_iter().map(|value| FieldSample { value, gradient: Vec3::ZERO }).collect()
+    let samples = if smooth { field.samples(&points) } else { Vec::new() };
+    let values = || {
+        let of_samples = || samples.iter().map(|sample| sample.value).collect();
+        if smooth { of_samples() } else { field.values(&points) }
     };
-    let ambient = samples.iter().map(|sample| ambient_term(sample.value - parameters.threshold, &parameters));
-    let ambient = split(parts, ambient);
+    let densities = match depth {
+        Some(depth) => depths(parts, depth),
+        None => values().into_iter().map(|value| value - parameters.threshold).collect(),
+    };
+    let ambient = split(parts, densities.into_iter().map(|density| ambient_term(density, &parameters)));
 
     let (surface, cell) = if settings.surface || !smooth {
-        let region = Aabb::around(generators.iter().map(|generator| generator.position));
         let cell = parameters.radius / settings.resolution;
-        let found = isosurface::extract(field, &region, parameters.threshold, cell);
+        let found = isosurface::extract(field, &field.extent(), parameters.threshold, cell);
         (with_normals(found.positions, found.triangles, field), found.cell)
     } else {
         (SurfaceMesh::default(), 0.0)
     };
-    let no_surface = no_surface(field, &samples, &surface, smooth, parameters.threshold, cell);
+    let no_surface = no_surface(field, values, &surface, smooth, parameters.threshold, cell);
 
     let realigned = match (no_surface, settings.normals) {
         (Some(_), _) => vec![None; points.len()],
@@ -227,25 +292,29 @@ fn bake_parts(
     let normals = parts.iter().map(|part| own_or_realigned(part, &mut realigned, settings.own_normal)).collect();
 
     let leaves: usize =
-        parts.iter().filter(|part| part.kind == PartKind::Foliage).map(|part| part.mesh.triangles.len()).sum();
+        parts.iter().filter(|part| part.source.kind == PartKind::Foliage).map(|part| part.mesh.triangles.len()).sum();
     let surface = (!surface.triangles.is_empty()).then_some(surface).map(|surface| match settings.surface_share {
         Some(share) => simplify_surface(&surface, field, (f64::from(share) * leaves as f64).round() as usize),
         None => surface,
     });
-    let report = ImplicitReport { parameters, generators: generators.len(), cell, no_surface };
+    let report = ImplicitReport { parameters, generators, cell, no_surface };
     ImplicitBake { normals, ambient, surface, report }
 }
 
+/// Why there is no surface; `values` gives the density at all vertices, which is only asked for where it matters.
 fn no_surface(
     field: &DensityField,
-    samples: &[FieldSample],
+    values: impl FnOnce() -> Vec<f32>,
     surface: &SurfaceMesh,
     smooth: bool,
     threshold: f32,
     cell: f32,
 ) -> Option<NoSurface> {
-    let greatest = samples.iter().map(|sample| sample.value).fold(0.0f32, f32::max);
-    if !surface.triangles.is_empty() || smooth && greatest > threshold {
+    if !surface.triangles.is_empty() {
+        return None;
+    }
+    let greatest = values().into_iter().fold(0.0f32, f32::max);
+    if smooth && greatest > threshold {
         None
     } else if field.memory() == 0 {
         Some(NoSurface::NoField)
@@ -260,7 +329,7 @@ fn no_surface(
 fn of_foliage(parts: &[Part], find: impl Fn(&[Vec3]) -> Vec<Option<Vec3>>) -> Vec<Option<Vec3>> {
     let mut found = Vec::new();
     for part in parts {
-        match part.kind {
+        match part.source.kind {
             PartKind::Foliage => found.extend(find(&part.mesh.positions)),
             PartKind::Wood => found.resize(found.len() + part.mesh.positions.len(), None),
         }
@@ -270,15 +339,12 @@ fn of_foliage(parts: &[Part], find: impl Fn(&[Vec3]) -> Vec<Option<Vec3>>) -> Ve
 
 /// The normals of a part, which takes its share of the list `realigned`.
 fn own_or_realigned(part: &Part, realigned: &mut impl Iterator<Item = Option<Vec3>>, own_share: f32) -> Vec<Vec3> {
-    let count = part.mesh.positions.len();
-    let own = part.mesh.normals.iter().copied().chain(std::iter::repeat(Vec3::Y)).take(count);
-    own.zip(realigned.take(count))
-        .map(|(own, realigned)| {
-            let own = own.try_normalize().unwrap_or(Vec3::Y);
-            match part.kind {
-                PartKind::Foliage => foliage_normals::blend(own, realigned, own_share),
-                PartKind::Wood => own,
-            }
+    let realigned = realigned.take(part.mesh.positions.len());
+    part.own_normals()
+        .zip(realigned)
+        .map(|(own, realigned)| match part.source.kind {
+            PartKind::Foliage => foliage_normals::blend(own, realigned, own_share),
+            PartKind::Wood => own,
         })
         .collect()
 }

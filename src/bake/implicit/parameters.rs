@@ -5,10 +5,9 @@
 //! - ρ: a tenth of the plant's longest extent, but at least three times the mean distance of its leaves, so that a
 //!   sparse plant does not fall into single leaves;
 //! - τ: a share of the median of F at the leaves, so that the surface keeps close to the crown whatever its density;
-//! - d_min: where the densest quarter of the leaves begins;
-//! - k_a_min and n: constants, chosen on our own broadleaf, an oak, a pine and an aspen. `benches/implicit.rs` prints how
-//!   well they do against traced visibility: a sparse crown as the aspen's comes out too dark, and wants k_a_min and
-//!   d_min of its own.
+//! - the ambient field's first radius: a hundredth of the longest extent;
+//! - k_a_min, d_min and n: constants of each [`AmbientField`], as both are in units that mean the same for any plant. They
+//!   were fitted to the traced visibility of ten plants, which `benches/implicit.rs` prints beside what they give.
 
 use glam::Vec3;
 
@@ -20,16 +19,43 @@ use super::partition::Aabb;
 const RADIUS_SHARE: f32 = 0.1;
 /// ρ in mean distances between leaves, at least.
 const RADIUS_SPACINGS: f32 = 3.0;
+/// First radius of the ambient field as a share of the plant's longest extent.
+const AMBIENT_SHARE: f32 = 0.01;
 /// τ as a share of the median of F at the leaves.
 const THRESHOLD_SHARE: f32 = 0.25;
-/// The share of the leaves at which F - τ is below d_min.
-const CORE_QUANTILE: f64 = 0.75;
-/// k_a_min.
-const LEAST: f32 = 0.2;
-/// n.
-const EXPONENT: f32 = 3.0;
 /// Leaves that are asked for the density.
 const SAMPLES: usize = 4096;
+
+/// What the ambient term is a function of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum AmbientField {
+    /// F - τ of the field with the radius ρ, as published: the surface of the normals is where the crown begins to
+    /// darken. What lies beyond ρ casts no shade.
+    Published,
+    /// The mean number of leaves along a ray ([`DepthField`](super::depth_field::DepthField)): the same bumps, for radii that
+    /// double from the ambient radius to the plant's extent, wood counted as well. Nearer to what is seen from a leaf,
+    /// whatever the plant, and independent of ρ and τ, which belong to the normals then: those want a smooth crown, and
+    /// light wants every gap.
+    #[default]
+    Depth,
+}
+
+/// k_a_min, d_min and n of eq. 4 where nothing is set.
+struct Curve {
+    least: f32,
+    core: f32,
+    exponent: f32,
+}
+
+impl AmbientField {
+    /// Foliage is clumped, so more light comes through than exp(-depth): at first k_a falls by n / d_min a leaf.
+    fn curve(self) -> Curve {
+        match self {
+            Self::Published => Curve { least: 0.2, core: 5.0, exponent: 6.0 },
+            Self::Depth => Curve { least: 0.0, core: 8.0, exponent: 4.0 },
+        }
+    }
+}
 
 /// Where the normals of the foliage come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -48,13 +74,18 @@ pub struct ImplicitSettings {
     pub radius: Option<f32>,
     /// τ in units of the field (see [`Weighting`]), 0..=1e6. Larger: a surface closer to the densest foliage.
     pub threshold: Option<f32>,
+    /// What the ambient term is a function of.
+    pub ambient: AmbientField,
+    /// First radius of [`AmbientField::Depth`], metres, 0..=1e6. Larger: gaps between twigs no longer count. 0: k_a is 1.
+    pub ambient_radius: Option<f32>,
     /// k_a_min, 0..=1: what is left of the ambient light in the core.
     pub least: Option<f32>,
-    /// d_min in units of the field, 0..=1e6: density from which on k_a is k_a_min. Larger: brighter.
+    /// d_min in units of the ambient field, 0..=1e6: from which on k_a is k_a_min. Larger: brighter.
     pub core: Option<f32>,
     /// n, 0.01..=100: below 1 the crown darkens late on the way inside, above 1 early.
     pub exponent: Option<f32>,
     /// Share of the foliage's primitives that are generators, 0..=1 (at least one is). Smaller: faster, a little off.
+    /// [`AmbientField::Depth`] has all of them: it is from few leaves that it finds gaps, and it thins them out itself.
     pub generator_share: f32,
     /// What a generator counts.
     pub weighting: Weighting,
@@ -77,6 +108,8 @@ impl Default for ImplicitSettings {
         Self {
             radius: None,
             threshold: None,
+            ambient: AmbientField::Depth,
+            ambient_radius: None,
             least: None,
             core: None,
             exponent: None,
@@ -102,6 +135,7 @@ impl ImplicitSettings {
         Self {
             radius: within(self.radius, 0.0, 1.0e6),
             threshold: within(self.threshold, 0.0, 1.0e6),
+            ambient_radius: within(self.ambient_radius, 0.0, 1.0e6),
             least: within(self.least, 0.0, 1.0),
             core: within(self.core, 0.0, 1.0e6),
             exponent: within(self.exponent, 0.01, 100.0),
@@ -121,9 +155,11 @@ pub struct ImplicitParameters {
     pub radius: f32,
     /// τ, units of the field.
     pub threshold: f32,
+    /// First radius of the ambient field, metres; ρ where the ambient term is as published.
+    pub ambient_radius: f32,
     /// k_a_min, 0..=1.
     pub least: f32,
-    /// d_min, units of the field.
+    /// d_min, units of the ambient field.
     pub core: f32,
     /// n.
     pub exponent: f32,
@@ -135,7 +171,9 @@ pub fn radius(generators: &[Generator], extent: f32, settings: &ImplicitSettings
     if let Some(radius) = settings.radius {
         return radius;
     }
-    let bounds = Aabb::around(generators.iter().map(|generator| generator.position));
+    // One that has no area may lie anywhere.
+    let counted = generators.iter().filter(|generator| generator.area > 0.0);
+    let bounds = Aabb::around(counted.map(|generator| generator.position));
     let size = Vec3::from(bounds.size());
     let longest = size.max_element().max(extent);
     if generators.is_empty() || !longest.is_finite() || longest <= 0.0 {
@@ -151,25 +189,50 @@ pub fn radius(generators: &[Generator], extent: f32, settings: &ImplicitSettings
     (RADIUS_SHARE.max(RADIUS_SPACINGS * spacing).min(1.0)) * longest
 }
 
+/// The ambient field's first radius in metres for a plant whose longest extent is `extent` metres and whose field has the
+/// radius `radius`: as the settings say or as follows from the model, 0 where there is no extent.
+pub fn ambient_radius(radius: f32, extent: f32, settings: &ImplicitSettings) -> f32 {
+    match settings.ambient {
+        AmbientField::Published => radius,
+        AmbientField::Depth => {
+            settings.ambient_radius.unwrap_or(AMBIENT_SHARE * if extent > 0.0 { extent } else { 0.0 })
+        }
+    }
+}
+
 /// All values for a model with `generators`, one a primitive, and the `field` of them or of a share of them, whose radius
-/// is kept: as the settings say or as follows from the density at the leaves.
-pub fn parameters(generators: &[Generator], field: &DensityField, settings: &ImplicitSettings) -> ImplicitParameters {
+/// is kept, as is the ambient field's `ambient_radius`: as the settings say or as follows from the density at the leaves.
+pub fn parameters(
+    generators: &[Generator],
+    field: &DensityField,
+    ambient_radius: f32,
+    settings: &ImplicitSettings,
+) -> ImplicitParameters {
     let share = SAMPLES as f32 / generators.len().max(1) as f32;
     let places: Vec<Vec3> = even_share(generators, share).iter().map(|generator| generator.position).collect();
     let mut densities = field.values(&places);
     densities.sort_by(f32::total_cmp);
-    let quantile = |share: f64| {
-        let at = (share * densities.len() as f64) as usize;
-        densities.get(at.min(densities.len().saturating_sub(1))).copied().unwrap_or(0.0)
+    let median = densities.get(densities.len() / 2).copied().unwrap_or(0.0);
+    let curve = settings.ambient.curve();
+    let units = match settings.ambient {
+        AmbientField::Published => per_leaf_area(generators, field.radius(), settings.weighting),
+        AmbientField::Depth => 1.0,
     };
-    let threshold = settings.threshold.unwrap_or(THRESHOLD_SHARE * quantile(0.5));
     ImplicitParameters {
         radius: field.radius(),
-        threshold,
-        least: settings.least.unwrap_or(LEAST),
-        core: settings.core.unwrap_or((quantile(CORE_QUANTILE) - threshold).max(0.0)),
-        exponent: settings.exponent.unwrap_or(EXPONENT),
+        threshold: settings.threshold.unwrap_or(THRESHOLD_SHARE * median),
+        ambient_radius,
+        least: settings.least.unwrap_or(curve.least),
+        core: settings.core.unwrap_or(curve.core * units),
+        exponent: settings.exponent.unwrap_or(curve.exponent),
     }
+}
+
+/// What the field of `generators` is with `weighting`, as a multiple of what it is by leaf area; 1 where there is none.
+fn per_leaf_area(generators: &[Generator], radius: f32, weighting: Weighting) -> f32 {
+    let sum = |weighting: Weighting| generators.iter().map(|g| f64::from(weighting.weight(g, radius))).sum::<f64>();
+    let units = (sum(weighting) / sum(Weighting::LeafArea)) as f32;
+    if units.is_finite() { units } else { 1.0 }
 }
 
 #[cfg(test)]
@@ -182,6 +245,7 @@ mod tests {
             radius: Some(-1.0),
             threshold: Some(f32::NAN),
             least: Some(2.0),
+            ambient_radius: Some(-0.5),
             core: Some(f32::INFINITY),
             exponent: Some(0.0),
             generator_share: f32::NAN,
@@ -192,6 +256,7 @@ mod tests {
         }
         .in_range();
         assert_eq!((wild.radius, wild.threshold, wild.least, wild.core), (Some(0.0), None, Some(1.0), None));
+        assert_eq!(wild.ambient_radius, Some(0.0));
         assert_eq!((wild.exponent, wild.generator_share, wild.own_normal), (Some(0.01), 1.0, 0.0));
         assert_eq!((wild.resolution, wild.surface_share), (16.0, Some(1.0)));
         assert_eq!(ImplicitSettings::default().in_range(), ImplicitSettings::default());
@@ -209,14 +274,27 @@ mod tests {
                 .collect();
             let settings = ImplicitSettings::default();
             let field = DensityField::new(&leaves, radius(&leaves, 20.0 * scale, &settings), settings.weighting);
-            parameters(&leaves, &field, &settings)
+            parameters(&leaves, &field, ambient_radius(field.radius(), 20.0 * scale, &settings), &settings)
         };
         let (small, large) = (of(1.0e-4), of(1.0e3));
         assert!((small.radius / 1.0e-4 / (large.radius / 1.0e3) - 1.0).abs() < 1e-4);
         assert!((small.threshold / large.threshold - 1.0).abs() < 1e-3);
-        assert!((small.core / large.core - 1.0).abs() < 1e-2);
+        assert!((small.ambient_radius / 1.0e-4 / (large.ambient_radius / 1.0e3) - 1.0).abs() < 1e-4);
+        assert_eq!((small.core, small.least, small.exponent), (large.core, large.least, large.exponent));
         // Three times the distance of the leaves, as a tenth of 20 would be too little.
         assert!((2.3..3.5).contains(&(large.radius / 1.0e3)), "{}", large.radius);
         assert_eq!(radius(&[], 10.0, &ImplicitSettings::default()), 0.0);
+    }
+    #[test]
+    fn the_published_core_is_in_leaves_where_leaves_are_counted() {
+        // 500 leaves of 2 dm²: by area over ρ² and a constant of 0.957 each counts 0.02 / 4 / 0.957.
+        let leaves: Vec<Generator> =
+            (0..500u32).map(|i| Generator { position: Vec3::splat(i as f32), area: 0.02, primitives: 1.0 }).collect();
+        let of = |weighting: Weighting| {
+            let settings = ImplicitSettings { weighting, ambient: AmbientField::Published, ..Default::default() };
+            parameters(&leaves, &DensityField::new(&leaves, 2.0, weighting), 2.0, &settings).core
+        };
+        let leaf = Weighting::LeafArea.weight(&leaves[0], 2.0);
+        assert!((of(Weighting::Primitives) * leaf / of(Weighting::LeafArea) - 1.0).abs() < 1e-5);
     }
 }

@@ -1,9 +1,10 @@
 //! Several plants in one field [Luft 2007, 5]: a small tree is darkened by the tall one beside it.
 //!
 //! Such a bake belongs to one plant at one place, so the plants cannot be instances of one model. Memory: the result
-//! is 16 bytes a vertex (normal and k_a, 4 bytes once packed) and 36 a vertex and 12 a triangle of the surface; while it
-//! is made there are all meshes once more in the stand's frame (32 bytes a vertex, 12 a triangle), about 70 bytes a
-//! generator, and at most 48 bytes a vertex for the evaluation.
+//! is 16 bytes a vertex (normal and k_a, 4 bytes once packed) and 24 a vertex and 12 a triangle of the surface; while it
+//! is made there are all meshes once more in the stand's frame (32 bytes a vertex, 12 a triangle), 20 bytes a
+//! leaf and a triangle of wood, 62 more for each of them in the density field and in each level of the depth field (the
+//! coarse half of the levels has few), and at most 48 bytes a vertex for the evaluation.
 
 use std::borrow::Cow;
 
@@ -12,10 +13,10 @@ use glam::{DVec3, Quat, Vec3};
 use super::density::DensityField;
 use super::generators::{Generator, even_share};
 use super::{
-    ImplicitBake, ImplicitParameters, ImplicitReport, ImplicitSettings, Part, SurfaceMesh, bake_parts, extent,
-    foliage_generators, parameters,
+    ImplicitBake, ImplicitParameters, ImplicitReport, ImplicitSettings, Part, SurfaceMesh, bake_parts, depth_field,
+    extent, generators_of, parameters,
 };
-use crate::plant::{Plant, PlantMesh};
+use crate::plant::{PartKind, Plant, PlantMesh};
 
 /// A plant of a stand.
 #[derive(Clone, Copy, Debug)]
@@ -53,8 +54,8 @@ pub struct StandBake {
 }
 
 /// Bakes all `plants` in one field. Values that the settings leave open are the means of what each plant would have
-/// alone, weighted by leaf area: that a stand is dense must darken it, and not raise τ and d_min. A plant whose place,
-/// yaw or scale is not usable is lit alone, as it is modelled.
+/// alone, weighted by leaf area: that a stand is dense must darken it, and not raise τ. The depth field reaches as far as
+/// in a plant of the mean extent. A plant whose place, yaw or scale is not usable is lit alone, as it is modelled.
 pub fn bake_implicit_stand(plants: &[StandPlant], settings: &ImplicitSettings) -> StandBake {
     let settings = settings.in_range();
     let usable = |plant: &&StandPlant| {
@@ -65,13 +66,15 @@ pub fn bake_implicit_stand(plants: &[StandPlant], settings: &ImplicitSettings) -
     let origin = if origin.is_finite() { origin } else { DVec3::ZERO };
 
     let moved: Vec<Vec<Part>> = plants.iter().filter(usable).map(|plant| in_stand(plant, origin)).collect();
-    let generators: Vec<Vec<Generator>> = moved.iter().map(|parts| foliage_generators(parts)).collect();
-    let parameters = common_parameters(&moved, &generators, &settings);
-    let generators = even_share(&generators.concat(), settings.generator_share);
+    let leaves: Vec<Vec<Generator>> = moved.iter().map(|parts| generators_of(parts, PartKind::Foliage)).collect();
+    let (parameters, extent) = common_parameters(&moved, &leaves, &settings);
+    let leaves = leaves.concat();
+    let generators = even_share(&leaves, settings.generator_share);
     let field = DensityField::new(&generators, parameters.radius, settings.weighting);
     let parts: Vec<Part> = moved.into_iter().flatten().collect();
+    let depth = depth_field(&parts, leaves, &parameters, extent, &settings);
     let ImplicitBake { normals, ambient, surface, report } =
-        bake_parts(&parts, &generators, &field, parameters, &settings);
+        bake_parts(&parts, generators.len(), &field, depth.as_ref(), parameters, &settings);
 
     let (mut normals, mut ambient) = (normals.into_iter(), ambient.into_iter());
     let shadings = plants.iter().map(|plant| {
@@ -100,37 +103,42 @@ fn in_stand<'a>(plant: &StandPlant<'a>, origin: DVec3) -> Vec<Part<'a>> {
         uvs: mesh.uvs.clone(),
         triangles: mesh.triangles.clone(),
     };
-    plant.plant.parts.iter().map(|part| Part { kind: part.kind, mesh: Cow::Owned(moved(&part.mesh)) }).collect()
+    plant.plant.parts.iter().map(|part| Part { source: part, mesh: Cow::Owned(moved(&part.mesh)) }).collect()
 }
 
-/// Means, weighted by leaf area, of what each plant would have alone.
+/// Means, weighted by leaf area, of what each plant would have alone, and of the plants' longest extents in metres.
 fn common_parameters(
     plants: &[Vec<Part>],
-    generators: &[Vec<Generator>],
+    leaves: &[Vec<Generator>],
     settings: &ImplicitSettings,
-) -> ImplicitParameters {
+) -> (ImplicitParameters, f32) {
     let areas: Vec<f64> =
-        generators.iter().map(|of_plant| of_plant.iter().map(|g| f64::from(g.area)).sum::<f64>()).collect();
+        leaves.iter().map(|of_plant| of_plant.iter().map(|g| f64::from(g.area)).sum::<f64>()).collect();
     let total: f64 = areas.iter().sum();
     let mean = |values: &[f32]| {
         let sum: f64 = values.iter().zip(&areas).map(|(value, area)| f64::from(*value) * area).sum();
         if total > 0.0 { (sum / total) as f32 } else { 0.0 }
     };
+    let extents: Vec<f32> = plants.iter().map(|parts| extent(parts)).collect();
     let radii: Vec<f32> =
-        plants.iter().zip(generators).map(|(parts, own)| parameters::radius(own, extent(parts), settings)).collect();
+        extents.iter().zip(leaves).map(|(&extent, own)| parameters::radius(own, extent, settings)).collect();
     let radius = settings.radius.unwrap_or_else(|| mean(&radii));
+    let extent = if total > 0.0 { mean(&extents) } else { extents.iter().copied().fold(0.0, f32::max) };
+    let ambient_radius = parameters::ambient_radius(radius, extent, settings);
     let alone = |own: &Vec<Generator>| {
         let chosen = even_share(own, settings.generator_share);
-        parameters::parameters(own, &DensityField::new(&chosen, radius, settings.weighting), settings)
+        let field = DensityField::new(&chosen, radius, settings.weighting);
+        parameters::parameters(own, &field, ambient_radius, settings)
     };
-    let alone: Vec<ImplicitParameters> = generators.iter().map(alone).collect();
+    let alone: Vec<ImplicitParameters> = leaves.iter().map(alone).collect();
     let of = |value: fn(&ImplicitParameters) -> f32| mean(&alone.iter().map(value).collect::<Vec<_>>());
     // What does not depend on a plant is the same for all, also where there is no plant.
-    let none = parameters::parameters(&[], &DensityField::default(), settings);
-    ImplicitParameters {
+    let none = parameters::parameters(&[], &DensityField::default(), ambient_radius, settings);
+    let common = ImplicitParameters {
         radius,
         threshold: settings.threshold.unwrap_or_else(|| of(|p| p.threshold)),
         core: settings.core.unwrap_or_else(|| of(|p| p.core)),
         ..none
-    }
+    };
+    (common, extent)
 }

@@ -7,7 +7,7 @@ use std::ops::RangeInclusive;
 
 use crate::{
     bake::implicit::ImplicitParameters,
-    scene::{CrownNormals, Expressive, Lighting},
+    scene::{AmbientTerm, CrownNormals, Expressive, Lighting},
 };
 
 /// Something that can be turned.
@@ -19,6 +19,10 @@ pub enum Line {
     Radius,
     /// τ.
     Threshold,
+    /// What the ambient term is a function of.
+    Ambient,
+    /// First radius of the depth field.
+    AmbientRadius,
     /// d_min.
     Core,
     /// n.
@@ -34,10 +38,12 @@ pub enum Line {
 }
 
 /// All lines from top to bottom.
-pub const LINES: [Line; 9] = [
+pub const LINES: [Line; 11] = [
     Line::Light,
     Line::Radius,
     Line::Threshold,
+    Line::Ambient,
+    Line::AmbientRadius,
     Line::Core,
     Line::Exponent,
     Line::Least,
@@ -67,6 +73,8 @@ impl Line {
             Self::Light => "light",
             Self::Radius => "radius \u{3c1}",
             Self::Threshold => "threshold \u{3c4}",
+            Self::Ambient => "ambient term",
+            Self::AmbientRadius => "ambient radius",
             Self::Core => "core d_min",
             Self::Exponent => "exponent n",
             Self::Least => "least k_a_min",
@@ -82,7 +90,9 @@ impl Line {
             Self::Light => "How this species is lit in this session: as its scene says, or by an implicit surface.",
             Self::Radius => "How far a leaf's influence reaches. Larger: a smoother crown.",
             Self::Threshold => "Density at the surface. Larger: a surface closer to the densest foliage.",
-            Self::Core => "Density from which on the ambient light is that of the core. Larger: brighter.",
+            Self::Ambient => "Depth: leaves on the way out, by all radii. Published: density within rho less tau.",
+            Self::AmbientRadius => "First radius of the depth. Larger: gaps between twigs no longer count.",
+            Self::Core => "Depth or density from which on the ambient light is that of the core. Larger: brighter.",
             Self::Exponent => "Below 1 the crown darkens late on the way inside, above 1 early.",
             Self::Least => "Ambient light of the crown's core.",
             Self::Normals => {
@@ -94,12 +104,13 @@ impl Line {
     }
 
     fn unit(self) -> &'static str {
-        if self == Self::Radius { " m" } else { "" }
+        if matches!(self, Self::Radius | Self::AmbientRadius) { " m" } else { "" }
     }
 
     fn number(self) -> Option<(RangeInclusive<f64>, Step)> {
         Some(match self {
-            Self::Light | Self::Normals => return None,
+            Self::Light | Self::Normals | Self::Ambient => return None,
+            Self::AmbientRadius => (Expressive::AMBIENT_RADIUS, Step::Factor(1e-3)),
             Self::Radius => (Expressive::RADIUS, Step::Factor(*Expressive::RADIUS.start())),
             Self::Threshold | Self::Core => (Expressive::DENSITY, Step::Factor(1e-3)),
             Self::Exponent => (Expressive::EXPONENT, Step::Factor(*Expressive::EXPONENT.start())),
@@ -110,7 +121,8 @@ impl Line {
 
     fn field(self, expressive: &mut Expressive) -> Option<&mut Option<f64>> {
         match self {
-            Self::Light | Self::Normals => None,
+            Self::Light | Self::Normals | Self::Ambient => None,
+            Self::AmbientRadius => Some(&mut expressive.ambient_radius),
             Self::Radius => Some(&mut expressive.radius),
             Self::Threshold => Some(&mut expressive.threshold),
             Self::Core => Some(&mut expressive.core),
@@ -124,7 +136,8 @@ impl Line {
     /// What the number is where it is not set; `None` as long as nobody knows what follows from the plant.
     fn automatic(self, used: Option<&ImplicitParameters>) -> Option<f64> {
         let value = match self {
-            Self::Light | Self::Normals => return None,
+            Self::Light | Self::Normals | Self::Ambient => return None,
+            Self::AmbientRadius => used?.ambient_radius.into(),
             Self::OwnNormal => 0.0,
             Self::Share => 1.0,
             Self::Radius => used?.radius.into(),
@@ -182,6 +195,7 @@ impl Tuning {
         match line {
             Line::Light => self.is_expressive = up || matches!(self.scene, Lighting::Expressive(_)),
             _ if !self.is_expressive => {}
+            Line::Ambient => self.expressive.ambient = if up { AmbientTerm::Depth } else { AmbientTerm::Published },
             Line::Normals => self.expressive.normals = if up { CrownNormals::Smooth } else { CrownNormals::Nearest },
             _ => {
                 let (Some((range, step)), Some(field)) = (line.number(), line.field(&mut self.expressive)) else {
@@ -201,6 +215,7 @@ impl Tuning {
         let before = self.clone();
         match line {
             Line::Light => *self = Self::new(self.scene.clone()),
+            Line::Ambient => self.expressive.ambient = AmbientTerm::default(),
             Line::Normals => self.expressive.normals = CrownNormals::default(),
             _ => {
                 if let Some(field) = line.field(&mut self.expressive) {
@@ -224,6 +239,7 @@ impl Tuning {
                 let whose = if self.is_turned() { "for this session" } else { "the scene's" };
                 format!("{name} ({whose})")
             }
+            (Line::Ambient, _) => format!("{:?}", self.expressive.ambient).to_lowercase(),
             (_, None) => format!("{:?}", self.expressive.normals).to_lowercase(),
             (_, Some(Some(value))) => format!("{}{}", three_digits(*value), line.unit()),
             (_, Some(None)) => line
@@ -283,8 +299,14 @@ mod tests {
     use super::*;
     use crate::scene::{Scene, Transfer};
 
-    const USED: ImplicitParameters =
-        ImplicitParameters { radius: 2.355, threshold: 1.71, least: 0.2, core: 7.392, exponent: 3.0 };
+    const USED: ImplicitParameters = ImplicitParameters {
+        radius: 2.355,
+        threshold: 1.71,
+        ambient_radius: 0.23,
+        least: 0.2,
+        core: 7.392,
+        exponent: 3.0,
+    };
 
     fn expressive() -> Tuning {
         Tuning::new(Lighting::Expressive(Expressive::default()))
@@ -364,11 +386,11 @@ mod tests {
         #[test]
         fn nothing_leaves_its_range_and_what_is_written_is_read(
             moves in prop::collection::vec((0..LINES.len(), any::<bool>(), any::<bool>(), 0..12u8), 0..60),
-            wild in prop::array::uniform5(prop_oneof![any::<f32>(), 0.0f32..10.0]),
+            wild in prop::array::uniform6(prop_oneof![any::<f32>(), 0.0f32..10.0]),
             known in any::<bool>(),
         ) {
-            let [radius, threshold, least, core, exponent] = wild;
-            let used = ImplicitParameters { radius, threshold, least, core, exponent };
+            let [radius, threshold, ambient_radius, least, core, exponent] = wild;
+            let used = ImplicitParameters { radius, threshold, ambient_radius, least, core, exponent };
             let mut tuning = Tuning::new(Lighting::Local);
             tuning.turn(Line::Light, true, false, None);
             for (line, up, fine, kind) in moves {
