@@ -21,11 +21,13 @@
 
 mod intersect;
 mod offset;
+mod parallel;
 mod tracer;
 
 use glam::{Vec2, Vec3};
 
 pub use offset::offset_origin;
+pub use parallel::{LineCrossing, ParallelTracer};
 pub use tracer::PlantTracer;
 
 use crate::plant::PartKind;

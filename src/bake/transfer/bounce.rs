@@ -4,6 +4,7 @@
 //! like its incoming light, so a bounce is a weighted sum of vectors. They are interpolated over the triangle that was
 //! met; the colours are those of the texture where it was met.
 
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::TransferSettings;
@@ -19,8 +20,8 @@ pub(super) struct Scene<'a> {
     pub settings: TransferSettings,
 }
 
-/// A ray that met a surface which can send light back along it.
-#[derive(Clone, Copy, Debug)]
+/// A ray that met a surface, which may send light back along it.
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Link {
     part: u32,
     triangle: u32,
@@ -28,29 +29,30 @@ pub(super) struct Link {
     u: u16,
     v: u16,
     front: bool,
-    /// What the side that was met passes on, by channel: cosine, solid angle over pi, base colour.
+    /// What the link counts: the cosine at its point.
+    weight: f32,
+    /// What the side that was met passes on, by channel; zero for the inside of wood, which is dark.
     near: [f32; 3],
     /// What the other side passes through, by channel; zero for wood.
     far: [f32; 3],
 }
 
 impl Link {
-    /// `None` for the inside of wood, which is dark.
-    pub fn new(scene: &Scene, hit: &Hit, weight: f32) -> Option<Self> {
+    /// The link along a ray that met `hit`.
+    pub fn new(scene: &Scene, hit: &Hit, weight: f32) -> Self {
         let surface = scene.tracer.point(hit);
-        if surface.kind == PartKind::Wood && !hit.front {
-            return None;
-        }
+        let near = if surface.kind == PartKind::Wood && !hit.front { Vec3::ZERO } else { surface.base_color };
         let code = |weight: f32| (weight.clamp(0.0, 1.0) * 65_535.0 + 0.5) as u16;
-        Some(Self {
+        Self {
             part: hit.part,
             triangle: hit.triangle,
             u: code(hit.u),
             v: code(hit.v),
             front: hit.front,
-            near: scene.in_channels(surface.base_color).map(|c| c * weight),
-            far: scene.in_channels(surface.transmission).map(|c| c * weight),
-        })
+            weight,
+            near: scene.in_channels(near),
+            far: scene.in_channels(surface.transmission),
+        }
     }
 }
 
@@ -62,22 +64,29 @@ pub(super) struct Links {
 }
 
 impl Links {
-    /// From batches of `batch` slots, each sorted by `2 * place in the batch + side`.
-    pub fn new(slots: usize, batch: usize, batches: Vec<Vec<(u16, Link)>>) -> Self {
-        let mut list = Vec::with_capacity(batches.iter().map(Vec::len).sum());
-        let mut starts = Vec::with_capacity(2 * slots + 1);
-        for (index, links) in batches.iter().enumerate() {
-            let keys = 2 * batch.min(slots - index * batch);
-            let mut next = 0;
-            for key in 0..keys {
-                starts.push(list.len() as u32);
-                while let Some((_, link)) = links.get(next).filter(|(of, _)| usize::from(*of) == key) {
-                    list.push(*link);
-                    next += 1;
-                }
-            }
+    /// From the links of each line, each with `2 * slot + side`; those of one side stay in the order of the lines. Their
+    /// weights are scaled to the share of even surroundings that is `hidden` from each side.
+    pub fn new(by_line: Vec<Vec<(u32, Link)>>, hidden: &[Vec<f32>; 2]) -> Self {
+        let keys = 2 * hidden[0].len();
+        let mut starts = vec![0u32; keys + 1];
+        for (of, _) in by_line.iter().flatten() {
+            starts[*of as usize + 1] += 1;
         }
-        starts.push(list.len() as u32);
+        for of in 0..keys {
+            starts[of + 1] += starts[of];
+        }
+        let mut next = starts.clone();
+        let mut list = vec![Link::default(); starts[keys] as usize];
+        for (of, link) in by_line.into_iter().flatten() {
+            list[next[of as usize] as usize] = link;
+            next[of as usize] += 1;
+        }
+        for of in 0..keys {
+            let links = &mut list[starts[of] as usize..starts[of + 1] as usize];
+            let total: f32 = links.iter().map(|link| link.weight).sum();
+            let scale = if total > 0.0 { hidden[of % 2][of / 2] / total } else { 0.0 };
+            links.iter_mut().for_each(|link| link.weight *= scale);
+        }
         Self { list, starts }
     }
 }
@@ -95,7 +104,7 @@ pub(super) fn bounce(scene: &Scene, direct: Sides, links: &Links, bounces: u8) -
                 let (from, to) = (links.starts[2 * slot + side], links.starts[2 * slot + side + 1]);
                 for link in &links.list[from as usize..to as usize] {
                     let (u, v) = (f32::from(link.u) / 65_535.0, f32::from(link.v) / 65_535.0);
-                    let shares = [(1.0 - u - v).max(0.0), u, v];
+                    let shares = [(1.0 - u - v).max(0.0), u, v].map(|share| share * link.weight);
                     for ((slot, flipped), share) in
                         corners[link.part as usize][link.triangle as usize].into_iter().zip(shares)
                     {

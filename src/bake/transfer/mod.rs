@@ -107,7 +107,8 @@ pub struct TransferSettings {
     pub bands: u8,
     /// One channel or three.
     pub channels: Channels,
-    /// Directions over the whole sphere, 16..=16384. More: less noise, proportionally more time.
+    /// Directions over the whole sphere, an even number of 16..=16384: each with its opposite. More: less noise,
+    /// proportionally more time.
     pub rays: u32,
     /// How the coefficients follow from the rays.
     pub projection: Projection,
@@ -138,7 +139,7 @@ impl TransferSettings {
     pub fn in_range(self) -> Self {
         Self {
             bands: self.bands.clamp(2, MAX_BANDS as u8),
-            rays: self.rays.clamp(16, 16_384),
+            rays: self.rays.clamp(16, 16_384).next_multiple_of(2),
             interior: match self.interior {
                 Interior::Straight(leaves) => Interior::Straight(leaves.min(8)),
                 Interior::Diffuse(bounces) => Interior::Diffuse(bounces.clamp(1, 8)),
@@ -198,10 +199,11 @@ pub fn bake_transfer(plant: &Arc<Plant>, settings: &TransferSettings) -> Transfe
     let directions = Directions::new(&settings);
     let scene = Scene { tracer: &tracer, points: &points, settings };
     let sides = match settings.interior {
-        Interior::Straight(leaves) => gather::straight(&scene, &directions, leaves),
+        Interior::Straight(leaves) => gather::straight(&scene, &directions, leaves).sides,
         Interior::Diffuse(bounces) => {
-            let (direct, links) = gather::diffuse(&scene, &directions);
-            bounce::bounce(&scene, direct, &links, bounces)
+            let direct = gather::straight(&scene, &directions, 0);
+            let links = gather::links(&scene, &directions, &direct.hidden);
+            bounce::bounce(&scene, direct.sides, &links, bounces)
         }
     };
     let count = settings.coefficients();
