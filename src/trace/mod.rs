@@ -16,6 +16,8 @@
 //!   triangle in its place. Rays that are not
 //!   finite, or without direction, meet nothing.
 //!
+//! Where tens of thousands of points ask in the same direction, [`ParallelTracer`] answers all of them at once.
+//!
 //! Starting points on a surface come from [`SurfacePoint::leave`], or from [`offset_origin`] where only a position is
 //! known.
 

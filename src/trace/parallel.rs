@@ -11,6 +11,8 @@
 //! around the middle of the plant in double precision and scaled by a power of two, so neither a plant's size nor its
 //! place matters; they are rounded to some 5e-8 of its extent, which is the error of `t` too.
 
+use std::ops::ControlFlow;
+
 use glam::{DVec3, Vec3};
 
 use super::{Hit, PlantTracer};
@@ -106,6 +108,20 @@ impl Grid {
         // Casts of negative numbers give zero.
         (((value - self.low[axis]) * self.cells_per_unit) as usize).min(self.side - 1)
     }
+
+    /// Which of the `LANES` points from `start` on lie inside a triangle, edges included; one bit each.
+    #[inline(always)]
+    fn inside(&self, start: usize, a: Vec3, b: Vec3, c: Vec3) -> u32 {
+        let (x, y) = (&self.x[start..start + LANES], &self.y[start..start + LANES]);
+        let mut inside = [0u32; LANES];
+        for lane in 0..LANES {
+            let [wa, wb, wc] = weights(a, b, c, x[lane], y[lane]);
+            let front = (wa >= 0.0) & (wb >= 0.0) & (wc >= 0.0);
+            let back = (wa <= 0.0) & (wb <= 0.0) & (wc <= 0.0);
+            inside[lane] = u32::from(front | back) << lane;
+        }
+        inside.iter().fold(0, |all, lane| all | lane)
+    }
 }
 
 impl PlantTracer {
@@ -121,16 +137,17 @@ impl PlantTracer {
 }
 
 impl ParallelTracer<'_> {
-    /// Tells `visit` every crossing of the lines through the points in the unit vector `direction`, in both senses,
-    /// before the alpha test ([`ParallelTracer::covers`]). In the same order whatever the thread; no order of depth. A
-    /// triangle of a point's own is crossed at `t` near 0.
-    pub fn crossings(&self, direction: Vec3, mut visit: impl FnMut(LineCrossing)) {
+    /// Tells `visit` the crossings of the lines through the points in the unit vector `direction`, in both senses,
+    /// before the alpha test ([`ParallelTracer::covers`]): of each point all, or as many until `visit` answers that it
+    /// needs no more of that point. In the same order whatever the thread; no order of depth. A triangle of a point's own
+    /// is crossed at `t` near 0.
+    pub fn crossings(&self, direction: Vec3, mut visit: impl FnMut(LineCrossing) -> ControlFlow<()>) {
         let Some(along) = direction.try_normalize() else { return };
         let right = along.any_orthonormal_vector();
         let up = along.cross(right);
         let project = |p: Vec3| Vec3::new(p.dot(right), p.dot(up), p.dot(along));
         let projected: Vec<Vec3> = self.points.iter().map(|p| project(*p)).collect();
-        let grid = Grid::new(&projected);
+        let mut grid = Grid::new(&projected);
         if grid.starts[grid.side * grid.side] == 0 {
             return;
         }
@@ -143,17 +160,10 @@ impl ParallelTracer<'_> {
                 let first = grid.starts[row * grid.side + left] as usize;
                 let end = grid.starts[row * grid.side + right + 1] as usize;
                 for start in (first..end).step_by(LANES) {
-                    let (x, y) = (&grid.x[start..start + LANES], &grid.y[start..start + LANES]);
-                    let mut inside = [false; LANES];
-                    for lane in 0..LANES {
-                        let [wa, wb, wc] = weights(a, b, c, x[lane], y[lane]);
-                        inside[lane] =
-                            ((wa >= 0.0) & (wb >= 0.0) & (wc >= 0.0)) | ((wa <= 0.0) & (wb <= 0.0) & (wc <= 0.0));
-                    }
-                    if inside == [false; LANES] {
-                        continue;
-                    }
-                    for place in (start..end.min(start + LANES)).filter(|place| inside[place - start]) {
+                    let mut inside = grid.inside(start, a, b, c) & lanes_below(end - start);
+                    while inside != 0 {
+                        let place = start + inside.trailing_zeros() as usize;
+                        inside &= inside - 1;
                         let [wa, wb, wc] = weights(a, b, c, grid.x[place], grid.y[place]);
                         let sum = wa + wb + wc;
                         if sum == 0.0 {
@@ -161,14 +171,18 @@ impl ParallelTracer<'_> {
                         }
                         let inverse = 1.0 / sum;
                         let depth = (wa * a.z + wb * b.z + wc * c.z) * inverse;
-                        visit(LineCrossing {
+                        let crossing = LineCrossing {
                             point: grid.of[place],
                             t: (depth - grid.depth[place]) * metres,
                             u: wb * inverse,
                             v: wc * inverse,
                             triangle: triangle as u32,
                             facing: sum < 0.0,
-                        });
+                        };
+                        if visit(crossing).is_break() {
+                            // Inside no triangle any more.
+                            grid.x[place] = f32::NAN;
+                        }
                     }
                 }
             }
@@ -186,6 +200,11 @@ impl ParallelTracer<'_> {
         let &LineCrossing { t, u, v, facing, .. } = crossing;
         Hit { t: t.abs(), part, triangle, u, v, front: facing != against }
     }
+}
+
+/// Bits of the lanes below `count`.
+fn lanes_below(count: usize) -> u32 {
+    if count >= LANES { u32::MAX } else { (1 << count) - 1 }
 }
 
 /// The corners' barycentric weights at a point of the plane, times twice the area, signed.

@@ -2,6 +2,8 @@
 //!
 //! All rays of one direction are answered at once, with those of the opposite one ([`crate::trace::ParallelTracer`]).
 
+use std::ops::ControlFlow;
+
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -101,29 +103,37 @@ struct Sums {
     arrived: [f32; 2],
 }
 
-/// The share of the light from far away that arrives at each point along a line and against it, by channel.
+/// The share of the light from far away that arrives at each point along a line and against it, by channel; nothing at
+/// the back of wood.
 fn throughput(scene: &Scene, lines: &ParallelTracer, line: Vec3, leaves: u8) -> Vec<f32> {
     let channels = scene.settings.channels.count();
-    let start = scene.points.start;
-    let mut through = vec![1.0; scene.points.list.len() * 2 * channels];
-    let mut met = if leaves > 0 { vec![0u8; scene.points.list.len() * 2] } else { Vec::new() };
+    let points = &scene.points.list;
+    let mut through = vec![1.0; points.len() * 2 * channels];
+    for (point, through) in points.iter().zip(through.chunks_exact_mut(2 * channels)) {
+        if let (false, Some(([_, back], _))) = (point.two_sided, sides(point, line)) {
+            through[back * channels..(back + 1) * channels].fill(0.0);
+        }
+    }
+    let mut met = if leaves > 0 { vec![0u8; points.len() * 2] } else { Vec::new() };
     lines.crossings(line, |crossing| {
-        let Some(ray) = ray_of(&crossing, start) else { return };
-        let place = 2 * crossing.point as usize + ray;
-        let through = &mut through[place * channels..(place + 1) * channels];
-        if through.iter().all(|share| *share == 0.0) || !lines.covers(&crossing) {
-            return;
+        let Some(ray) = ray_of(&crossing, scene.points.start) else { return ControlFlow::Continue(()) };
+        let point = crossing.point as usize;
+        let both = &mut through[2 * point * channels..2 * (point + 1) * channels];
+        let shares = &mut both[ray * channels..(ray + 1) * channels];
+        if shares.iter().all(|share| *share == 0.0) || !lines.covers(&crossing) {
+            return ControlFlow::Continue(());
         }
         let surface = (leaves > 0).then(|| scene.tracer.point(&lines.hit(&crossing, ray == 1)));
-        match surface.filter(|surface| surface.kind == PartKind::Foliage && met[place] < leaves) {
+        match surface.filter(|surface| surface.kind == PartKind::Foliage && met[2 * point + ray] < leaves) {
             Some(surface) => {
-                met[place] += 1;
-                for (share, passed) in through.iter_mut().zip(scene.in_channels(surface.transmission)) {
+                met[2 * point + ray] += 1;
+                for (share, passed) in shares.iter_mut().zip(scene.in_channels(surface.transmission)) {
                     *share *= passed.clamp(0.0, 1.0);
                 }
             }
-            None => through.fill(0.0),
+            None => shares.fill(0.0),
         }
+        if both.iter().all(|share| *share == 0.0) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     through
 }
@@ -142,11 +152,12 @@ pub(super) fn links(scene: &Scene, directions: &Directions, hidden: &Sides) -> L
     let of_line = |&line: &Vec3| -> Vec<(u32, Link)> {
         let mut nearest: Vec<Option<LineCrossing>> = vec![None; 2 * points.len()];
         lines.crossings(line, |crossing| {
-            let Some(ray) = ray_of(&crossing, start) else { return };
+            let Some(ray) = ray_of(&crossing, start) else { return ControlFlow::Continue(()) };
             let nearest = &mut nearest[2 * crossing.point as usize + ray];
             if nearest.is_none_or(|other| crossing.t.abs() < other.t.abs()) && lines.covers(&crossing) {
                 *nearest = Some(crossing);
             }
+            ControlFlow::Continue(())
         });
         let mut links = Vec::new();
         for (slot, point) in points.iter().enumerate() {

@@ -35,9 +35,11 @@
 //! Light reaches a vertex from its own plant and from infinitely far away, not from its neighbours (4.3.3). The sun's
 //! disc is not meant to be put into the light: a few bands hold it badly, and a shadow map would count the plant's own
 //! shadow twice. The side and the cosine are the *vertex normal's*, whatever a leaf's true plane. A vertex that other
-//! geometry swallows is dark, and darkens its triangles. Light that bounces is interpolated over a triangle's corners.
+//! geometry swallows is dark, and darkens its triangles. Light that bounces is
+//! even over a triangle.
 //! The bright surroundings of a low sun are narrow, and few bands hold them as badly as they hold the disc: most of
-//! the error that remains is theirs (`benches/transfer.rs`, table of the hours).
+//! the error that remains is theirs (`benches/transfer.rs`, table of the hours). It cannot be had back by counting them
+//! to the sun: a shadow map knows whether the sun's centre is seen, not how much of what surrounds it.
 
 mod bounce;
 mod evaluate;
@@ -119,9 +121,9 @@ pub struct TransferSettings {
 impl Default for TransferSettings {
     fn default() -> Self {
         Self {
-            bands: 3,
+            bands: 4,
             channels: Channels::One,
-            rays: 256,
+            rays: 1024,
             projection: Projection::Fit,
             interior: Interior::Diffuse(3),
         }

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::{DVec3, Vec3};
 
-use super::fit::fit_rows;
+use super::fit::Fit;
 use super::{Projection, TransferSettings};
 use crate::light::sh;
 use crate::scatter::sequence::hammersley;
@@ -46,10 +46,10 @@ impl Directions {
         // The first half of the set is the upper hemisphere.
         let lines = direction_set(settings.rays)[..settings.rays as usize / 2].to_vec();
         let rays: Vec<Vec3> = lines.iter().flat_map(|line| [*line, -*line]).collect();
-        let rows = match settings.projection {
-            Projection::Quadrature => projection_rows(&rays, bands),
-            Projection::Fit => fit_rows(&rays, bands).unwrap_or_else(|| projection_rows(&rays, bands)),
-        };
+        let mut rows = vec![0.0; rays.len() * bands * bands];
+        for (row, ray) in rows.chunks_exact_mut(bands * bands).zip(&rays) {
+            settings.projection.row_over(*ray, 1.0 / settings.rays as f32, row);
+        }
         // Odd, so that the base-2 radical inverses of those that remain are still spread evenly.
         let every = ((lines.len() / FOLLOWED).saturating_sub(1) | 1).max(1);
         let followed: Vec<Vec3> = lines.iter().skip(every / 2).step_by(every).copied().collect();
@@ -62,14 +62,20 @@ impl Directions {
     }
 }
 
-/// The basis at each direction.
-pub(super) fn projection_rows(set: &[Vec3], bands: usize) -> Vec<f32> {
-    let count = bands * bands;
-    let mut rows = vec![0.0; set.len() * count];
-    for (row, direction) in rows.chunks_exact_mut(count).zip(set) {
-        sh::basis_into(*direction, row);
+impl Projection {
+    /// What light from the unit vector `direction` adds to the coefficients, for each unit of radiance, solid angle and
+    /// cosine: the basis, or the functions of the fit. `out` takes whole bands.
+    pub fn row(self, direction: Vec3, out: &mut [f32]) {
+        self.row_over(direction, 0.0, out);
     }
-    rows
+
+    /// The mean of [`Projection::row`] over heights up to `half` below and above `direction`, where it may jump.
+    fn row_over(self, direction: Vec3, half: f32, out: &mut [f32]) {
+        match (self, Fit::of(sh::bands_in(out.len()))) {
+            (Self::Fit, Some(fit)) => fit.row(direction, half, out),
+            _ => sh::basis_into(direction, out),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -79,9 +85,9 @@ mod tests {
     #[test]
     fn the_set_integrates_low_bands() {
         for n in [64, 256, 1024] {
-            let rows = projection_rows(&direction_set(n), 3);
+            let rows: Vec<[f32; 9]> = direction_set(n).into_iter().map(sh::basis).collect();
             for i in 0..9 {
-                let mean: f32 = rows.iter().skip(i).step_by(9).sum::<f32>() / n as f32;
+                let mean = rows.iter().map(|row| row[i]).sum::<f32>() / n as f32;
                 let want = if i == 0 { 0.282_094_8 } else { 0.0 };
                 assert!((mean - want).abs() < 1.5 / n as f32, "{n} rays, coefficient {i}: {mean}");
             }
