@@ -1,9 +1,9 @@
 //! Question: what does a transfer bake cost, and how wrong is the light that comes out of it?
 //!
-//! 1. `rays`: the bake's rays against the crate `obvhs` alone: the same rays, the same tree settings, the same alpha
-//!    test, and nothing done with the answers. Then the whole bake, so that one sees what is not rays.
+//! 1. `contest`: the bake's rays against the crate `obvhs` alone: the same rays, the same tree settings, the same alpha
+//!    test, and nothing done with the answers.
 //! 2. `cold`: cold bakes, setting by setting. `cache`: from the cache's file to arrays.
-//! 3. `error`: exitant radiance of vertices (both sides, white base colour, the material's transmission) under sky light
+//! 3. `bands`, `rays`, `interior`: exitant radiance of vertices (both sides, white base colour, the material's transmission) under sky light
 //!    over a day, against 16,384 paths a vertex with the same number of bounces; skies, azimuths and hours that the fit
 //!    has not seen. "Over the day": root of the sum of squared errors of the luminance over vertices, sides and hours,
 //!    over the root of the sum of squared truths. "Hours alike": each hour's RMS error over its mean, then the root mean
@@ -51,14 +51,17 @@ pub struct Arguments {
     /// Vertices whose light is compared.
     #[arg(long, default_value_t = 150)]
     vertices: usize,
-    /// Most rays of the table over rays.
-    #[arg(long, default_value_t = 4096)]
+    /// Most rays of the table over rays, which goes from 16 to 4,096.
+    #[arg(long, default_value_t = 1024)]
     most_rays: u32,
+    /// Numbers of bands of the table over rays.
+    #[arg(long, value_delimiter = ',', default_value = "3,4")]
+    bands: Vec<usize>,
     /// Turns of each contestant of the first table.
     #[arg(long, default_value_t = 3)]
     turns: usize,
-    /// Which tables: rays, cold, cache, error, sun.
-    #[arg(long, value_delimiter = ',', default_value = "rays,cold,cache,error,sun")]
+    /// Which tables: contest, cold, cache, bands, rays, interior, sun.
+    #[arg(long, value_delimiter = ',', default_value = "contest,cold,cache,bands,rays,sun")]
     only: Vec<String>,
     /// Given by cargo.
     #[arg(long, hide = true)]
@@ -75,8 +78,8 @@ fn main() {
     let plant = Arc::new(grow(&GrowParameters::broadleaf(), 1, arguments.triangles).expect("a tree"));
     let all = vertices_of(&plant);
     println!("{} triangles, {} vertices, {} threads\n", arguments.triangles, all.len(), rayon::current_num_threads());
-    if wants("rays") {
-        rays::rays(&plant, arguments.turns);
+    if wants("contest") {
+        rays::contest(&plant, arguments.turns);
     }
     if wants("cold") {
         rays::cold(&plant);
@@ -84,7 +87,7 @@ fn main() {
     if wants("cache") {
         cache::cache(&plant, arguments.turns);
     }
-    if !wants("error") && !wants("sun") {
+    if !["bands", "rays", "interior", "sun"].into_iter().any(wants) {
         return;
     }
     let atmosphere = Atmosphere::new(AtmosphereParams::default()).expect("an atmosphere");
@@ -105,8 +108,15 @@ fn main() {
         .collect();
     println!("{} vertices, truth in {:.1} s\n", vertices.len(), start.elapsed().as_secs_f64());
     let judge = Judge { vertices: &vertices, truths: &truths, lights: &lights };
-    if wants("error") {
-        error::error(&plant, &judge, arguments.most_rays);
+    if wants("bands") {
+        error::bands(&plant, &judge);
+    }
+    if wants("rays") {
+        let bands: Vec<usize> = arguments.bands.iter().map(|bands| *bands.clamp(&2, &6)).collect();
+        error::rays(&plant, &judge, &bands, arguments.most_rays);
+    }
+    if wants("interior") {
+        error::interior(&plant, &judge);
     }
     if wants("sun") {
         sun::sun(&judge);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use canopy::bake::transfer::{
-    Channels, Interior, Projection, TransferBake, TransferFormat, TransferSettings, bake_transfer, share,
+    Channels, Interior, TransferBake, TransferFormat, TransferSettings, bake_transfer, share,
 };
 use canopy::light::atmosphere::luminance;
 use canopy::plant::Plant;
@@ -13,57 +13,50 @@ use crate::DAY;
 use crate::judge::{Judge, Verdict};
 use crate::truth::BANDS;
 
-/// All tables.
-pub fn error(plant: &Arc<Plant>, judge: &Judge, most_rays: u32) {
-    println!("## Error");
-    bands(plant, judge);
-    rays(plant, judge, most_rays);
-    hours(plant, judge);
-    interior(plant, judge);
+/// Bands, storage and hours, from one bake for each number of bands.
+pub fn bands(plant: &Arc<Plant>, judge: &Judge) {
+    let bakes = BANDS.map(|bands| bake_transfer(plant, &settings_of(bands)));
+    truncation(judge, &bakes);
+    storage(judge, &bakes);
+    hours(judge, &bakes);
     bounces(judge);
-    storage(plant, judge);
 }
 
 fn settings_of(bands: usize) -> TransferSettings {
     TransferSettings { bands: bands as u8, ..TransferSettings::default() }
 }
 
-fn bands(plant: &Arc<Plant>, judge: &Judge) {
+fn truncation(judge: &Judge, bakes: &[TransferBake; 5]) {
     println!(
-        "\n### Bands, {} rays: over the day (hours alike), %\n\n\
-         | bands | projection, truncation | fit, truncation | projection, baked | fit, baked | clamped light of the fit |\n\
+        "## Bands, {} rays: over the day (hours alike), %\n\n\
+         | bands | projection, truncation | fit, truncation | fit, baked | of that, rays | clamped light |\n\
          |--:|--:|--:|--:|--:|--:|",
         TransferSettings::default().rays
     );
     let cell = |verdict: &Verdict| format!("{:.2} ({:.2})", verdict.day, verdict.hours);
-    for (place, &bands) in BANDS.iter().enumerate() {
+    for (place, bake) in bakes.iter().enumerate() {
         let [projection, fit] = [0, 1].map(|projection| cell(&judge.judge_truncation(projection, place)));
-        let baked = |projection| {
-            judge.judge_bake(&bake_transfer(plant, &TransferSettings { projection, ..settings_of(bands) }))
-        };
-        let (published, fitted) = (baked(Projection::Quadrature), baked(Projection::Fit));
-        let [published_cell, fitted_cell] = [cell(&published), cell(&fitted)];
-        println!("| {bands} | {projection} | {fit} | {published_cell} | {fitted_cell} | {:.3} |", fitted.clamped);
+        let baked = judge.judge_bake(bake);
+        let noise = noise(judge, bake, place);
+        println!("| {} | {projection} | {fit} | {} | {noise:.2} | {:.3} |", BANDS[place], cell(&baked), baked.clamped);
     }
 }
 
-fn rays(plant: &Arc<Plant>, judge: &Judge, most_rays: u32) {
-    println!("\n### Rays, fit: over the day, %, and what rays add to truncation\n");
-    println!("| rays |{} s with 3 bands |", BANDS.map(|n| format!(" {n} bands | rays |")).concat());
-    println!("|--:|{}--:|", "--:|--:|".repeat(BANDS.len()));
+/// The table over rays, for each of `bands`: error over the day, and what rays add to truncation.
+pub fn rays(plant: &Arc<Plant>, judge: &Judge, bands: &[usize], most_rays: u32) {
+    println!("\n## Rays, fit: over the day, and of that by rays, %\n");
+    println!("| rays |{}", bands.iter().map(|n| format!(" {n} bands | by rays | s |")).collect::<String>());
+    println!("|--:|{}", "--:|--:|--:|".repeat(bands.len()));
     for rays in [16, 32, 64, 128, 256, 512, 1024, 2048, 4096].into_iter().filter(|rays| *rays <= most_rays) {
-        let mut time = 0.0;
         print!("| {rays} |");
-        for (place, &bands) in BANDS.iter().enumerate() {
+        for &bands in bands {
             let start = Instant::now();
             let bake = bake_transfer(plant, &TransferSettings { rays, ..settings_of(bands) });
-            if bands == 3 {
-                time = start.elapsed().as_secs_f64();
-            }
-            let noise = noise(judge, &bake, place);
-            print!(" {:.2} | {noise:.2} |", judge.judge_bake(&bake).day);
+            let time = start.elapsed().as_secs_f64();
+            let place = BANDS.iter().position(|n| *n == bands).unwrap_or(0);
+            print!(" {:.2} | {:.2} | {time:.1} |", judge.judge_bake(&bake).day, noise(judge, &bake, place));
         }
-        println!(" {time:.2} |");
+        println!();
     }
 }
 
@@ -90,20 +83,26 @@ fn noise(judge: &Judge, bake: &TransferBake, place: usize) -> f64 {
     100.0 * (differences / squares).sqrt()
 }
 
-fn hours(plant: &Arc<Plant>, judge: &Judge) {
+fn hours(judge: &Judge, bakes: &[TransferBake; 5]) {
     println!(
-        "\n### Hours, fit: RMS error over the hour's mean, %\n\n\
-         | sun, degrees high | 2 bands | 3 bands | 6 bands | default, baked |\n|--:|--:|--:|--:|--:|"
+        "\n## Hours, fit: RMS error over the hour's mean, truncation / baked, %\n\n\
+         | sun, degrees high |{}\n|--:|{}",
+        BANDS.map(|n| format!(" {n} bands |")).concat(),
+        "--:|".repeat(BANDS.len())
     );
-    let [two, three, six] = [0, 1, 4].map(|place| judge.judge_truncation(1, place).by_hour);
-    let baked = judge.judge_bake(&bake_transfer(plant, &TransferSettings::default())).by_hour;
+    let cells: Vec<_> = (0..BANDS.len())
+        .map(|place| (judge.judge_truncation(1, place).by_hour, judge.judge_bake(&bakes[place]).by_hour))
+        .collect();
     for (hour, (_, elevation)) in DAY.iter().enumerate() {
-        println!("| {elevation} | {:.1} | {:.1} | {:.1} | {:.1} |", two[hour], three[hour], six[hour], baked[hour]);
+        print!("| {elevation} |");
+        cells.iter().for_each(|(free, baked)| print!(" {:.1} / {:.1} |", free[hour], baked[hour]));
+        println!();
     }
 }
 
-fn interior(plant: &Arc<Plant>, judge: &Judge) {
-    println!("\n### Colour and interior: over the day, %\n\n| | luminance | RGB |\n|---|--:|--:|");
+/// The table of channels and of what leaves do to light.
+pub fn interior(plant: &Arc<Plant>, judge: &Judge) {
+    println!("\n## Colour and interior: over the day, %\n\n| | luminance | RGB |\n|---|--:|--:|");
     let default = TransferSettings::default();
     let rows = [
         ("default", default),
@@ -130,21 +129,20 @@ fn bounces(judge: &Judge) {
     println!();
 }
 
-fn storage(plant: &Arc<Plant>, judge: &Judge) {
+fn storage(judge: &Judge, bakes: &[TransferBake; 5]) {
     println!(
-        "\n### Storage\n\n| bands | bytes a leaf's vertex, 4 / 2 / 1 a coefficient | RMS change by 2, % | by 1, % | error with 1, % |\n\
+        "\n## Storage\n\n| bands | bytes a leaf's vertex, 4 / 2 / 1 a coefficient | RMS change by 2, % | by 1, % | error with 1, % |\n\
          |--:|--:|--:|--:|--:|"
     );
     let formats = [TransferFormat::Float32, TransferFormat::Float16, TransferFormat::Snorm8];
-    for bands in BANDS {
+    for (bands, bake) in BANDS.into_iter().zip(bakes) {
         let settings = settings_of(bands);
-        let bake = bake_transfer(plant, &settings);
         let [four, two, one] = formats.map(|format| format.vertex_bytes(&settings, 2));
         let [_, half, byte] = formats.map(|format| bake.pack(format).unpack());
         println!(
             "| {bands} | {four} / {two} / {one} | {:.3} | {:.3} | {:.2} |",
-            change(judge, &bake, &half),
-            change(judge, &bake, &byte),
+            change(judge, bake, &half),
+            change(judge, bake, &byte),
             judge.judge_bake(&byte).day
         );
     }

@@ -235,7 +235,8 @@ impl PlantTracer {
             }
         }
         let t_max = (ray.t_max - start) * self.scale;
-        let (origin, direction) = ((origin * self.scale).to_array(), ray.direction.to_array());
+        // Adding zero turns -0.0 into 0.0: the tree takes its inverse for negative and its sign for positive.
+        let (origin, direction) = ((origin * self.scale).to_array(), (ray.direction + Vec3::ZERO).to_array());
         if !origin.iter().all(|c| c.is_finite()) {
             return None;
         }
