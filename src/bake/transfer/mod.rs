@@ -29,7 +29,7 @@
 //! The coefficients that reproduce the transfer function best are its projection; those that reproduce the light of
 //! the *skies that occur* best are a fit to them ([`Projection::Fit`]). Both are a fixed matrix applied to the sampled
 //! directions, so they cost the same. `benches/transfer.rs` has both, band by band; the fit is the default. What it
-//! pays: with 2 bands a free level leaf gets 11 % too little of an even sky, with 3 or more less than 3 %.
+//! pays: with 2 bands a free level leaf gets 12 % too little of an even sky, with 3 or more less than 3 %.
 //!
 //! # Limits
 //! Light reaches a vertex from its own plant and from infinitely far away, not from its neighbours (4.3.3). The sun's
