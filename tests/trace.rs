@@ -1,11 +1,12 @@
 //! Rays against a plant: brute force, alpha holes, sides, sizes, and what is not a plant at all.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use canopy::plant::grow::{GrowParameters, grow};
 use canopy::plant::{PartKind, Plant, PlantMaterial, PlantMesh, PlantPart};
 use canopy::scatter::radical_inverse::{radical_inverse_2, radical_inverse_3};
-use canopy::trace::{PlantTracer, Ray, offset_origin};
+use canopy::trace::{LineCrossing, PlantTracer, Ray, offset_origin};
 use glam::{DVec3, Vec2, Vec3};
 use image::{Rgba, RgbaImage};
 
@@ -226,4 +227,99 @@ fn duplicates_by_the_thousand_and_extreme_coordinates_do_no_harm() {
     let tracer = PlantTracer::new(&plant(vec![part(PartKind::Foliage, moved, one.mesh.triangles.clone())]));
     assert!(tracer.occluded(&ray(far + Vec3::new(1.6, 1.0, 2.0), Vec3::NEG_Y)));
     assert!(!tracer.occluded(&ray(far + Vec3::new(-1.6, 1.0, 2.0), Vec3::NEG_Y)));
+}
+
+#[test]
+fn lines_meet_what_rays_meet() {
+    let tree = Arc::new(grow(&GrowParameters::broadleaf(), 7, 5_000).unwrap());
+    let tracer = PlantTracer::new(&tree);
+    let points: Vec<Vec3> = tree.parts.iter().flat_map(|part| part.mesh.positions.iter().copied()).collect();
+    let start = tracer.bounds().unwrap().size().max_element() / 65_536.0;
+    let lines = tracer.parallel(points.iter().copied());
+    let (mut met, mut differ, mut elsewhere, mut asked) = (0, 0, 0, 0);
+    for i in 0..12 {
+        let (direction, _) = spread(i);
+        let mut nearest: Vec<[Option<LineCrossing>; 2]> = vec![[None; 2]; points.len()];
+        lines.crossings(direction, |crossing| {
+            let nearest = &mut nearest[crossing.point as usize][usize::from(crossing.t < 0.0)];
+            let nearer = nearest.is_none_or(|other| crossing.t.abs() < other.t.abs());
+            if crossing.t.abs() > start && nearer && lines.covers(&crossing) {
+                *nearest = Some(crossing);
+            }
+            ControlFlow::Continue(())
+        });
+        for (point, nearest) in points.iter().zip(&nearest) {
+            for (against, (toward, crossing)) in [direction, -direction].into_iter().zip(nearest).enumerate() {
+                let hit = tracer.closest(&ray(*point + toward * start, toward));
+                let line = crossing.map(|crossing| lines.hit(&crossing, against == 1));
+                asked += 1;
+                met += usize::from(hit.is_some());
+                let (found, other) = (hit.map(|hit| hit.t + start), line.map(|hit| hit.t));
+                let same = match (found, other) {
+                    (Some(t), Some(other)) => (t - other).abs() < 10.0 * start,
+                    (None, None) => true,
+                    _ => false,
+                };
+                // Where two triangles meet, either may be named.
+                elsewhere += usize::from(same && hit.map(|h| (h.part, h.front)) != line.map(|h| (h.part, h.front)));
+                differ += usize::from(!same);
+            }
+        }
+    }
+    // Rays through edges and outlines of leaves may differ.
+    assert!(met > asked / 4, "{met} met");
+    assert!(differ * 500 < asked && elsewhere * 100 < asked, "{differ} and {elsewhere} of {asked} differ");
+}
+
+#[test]
+fn lines_know_distance_side_and_place_at_any_size() {
+    for (size, moved) in [(1e-3f32, 0.0f32), (1.0, 0.0), (1e4, 0.0), (64.0, 1e6)] {
+        let mut part = leaf();
+        part.mesh.positions.iter_mut().for_each(|p| *p = *p * size + Vec3::splat(moved));
+        let tracer = PlantTracer::new(&plant(vec![part]));
+        let at = |x: f32, y: f32, z: f32| Vec3::new(x, y, z) * size + Vec3::splat(moved);
+        let points = [at(0.25, 0.5, 0.5), at(0.5, -0.25, 0.25), at(2.0, 1.0, 0.5), Vec3::NAN];
+        let lines = tracer.parallel(points.into_iter());
+        for direction in [Vec3::Y, Vec3::NEG_Y] {
+            let mut found = Vec::new();
+            lines.crossings(direction, |crossing| {
+                let hit = lines.hit(&crossing, crossing.t < 0.0);
+                found.push((crossing.point, crossing.t * direction.y / size, hit.front));
+                ControlFlow::Continue(())
+            });
+            found.sort_by_key(|(point, ..)| *point);
+            assert_eq!(found.iter().map(|(point, ..)| *point).collect::<Vec<_>>(), [0, 1], "{size}, {direction}");
+            for ((_, t, front), (want, above)) in found.iter().zip([(-0.5, true), (0.25, false)]) {
+                assert!((t - want).abs() < 1e-2 && *front == above, "{size}: {t} instead of {want}, {front}");
+            }
+        }
+        let mut visits = 0;
+        for direction in [Vec3::ZERO, Vec3::NAN] {
+            lines.crossings(direction, |_| {
+                visits += 1;
+                ControlFlow::Continue(())
+            });
+        }
+        assert_eq!(visits, 0);
+    }
+    let nothing = PlantTracer::new(&Arc::new(Plant::default()));
+    nothing.parallel([Vec3::ZERO].into_iter()).crossings(Vec3::Y, |_| panic!("nothing is there"));
+    let tracer = PlantTracer::new(&plant(vec![leaf()]));
+    tracer.parallel(std::iter::empty()).crossings(Vec3::Y, |_| panic!("no line is there"));
+}
+
+#[test]
+fn a_line_that_needs_no_more_gets_no_more() {
+    let stack = plant((0..5).map(|_| leaf()).collect());
+    let tracer = PlantTracer::new(&stack);
+    let lines = tracer.parallel([Vec3::new(0.5, -1.0, 0.25)].into_iter());
+    let count = |flow: ControlFlow<()>| {
+        let mut count = 0;
+        lines.crossings(Vec3::Y, |_| {
+            count += 1;
+            flow
+        });
+        count
+    };
+    assert_eq!((count(ControlFlow::Continue(())), count(ControlFlow::Break(()))), (5, 1));
 }

@@ -4,7 +4,7 @@
 //! |---|---|--:|
 //! | [`LightingSettings::Local`] | nothing | 0 |
 //! | [`LightingSettings::Expressive`] | realigned normals, k_a ([`super::implicit`]) | 0: k_a is the normal's length |
-//! | [`LightingSettings::Transfer`] | how the sky reaches each side of each vertex ([`super::transfer`]) | see there; 20 for foliage with 3 bands |
+//! | [`LightingSettings::Transfer`] | how the sky reaches each side of each vertex ([`super::transfer`]) | see there; 36 for foliage with 4 bands |
 //!
 //! The models are alternatives: what a plant does not use is neither baked, nor kept, nor uploaded.
 

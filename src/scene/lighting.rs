@@ -21,11 +21,11 @@ pub enum Lighting {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Transfer {
-    /// Bands of spherical harmonics, 2 to 6. More: truer, and memory grows with the square. Default 3.
+    /// Bands of spherical harmonics, 2 to 6. More: truer, and memory grows with the square. Default 4.
     pub bands: u32,
     /// Whether light takes on colour on its way through the crown; three times the memory. Default false.
     pub color: bool,
-    /// Rays of a vertex, 16 to 16384. More: a slower bake with less noise. Default 256.
+    /// Rays of a vertex, 16 to 16384. More: a slower bake with less noise. Default 1024.
     pub rays: u32,
     /// How often light is followed from leaf to leaf, 0 to 8; 0: straight through leaves only. Default 3.
     pub bounces: u32,
@@ -33,7 +33,7 @@ pub struct Transfer {
 
 impl Default for Transfer {
     fn default() -> Self {
-        Self { bands: 3, color: false, rays: 256, bounces: 3 }
+        Self { bands: 4, color: false, rays: 1024, bounces: 3 }
     }
 }
 

@@ -16,16 +16,20 @@
 //!   triangle in its place. Rays that are not
 //!   finite, or without direction, meet nothing.
 //!
+//! Where tens of thousands of points ask in the same direction, [`ParallelTracer`] answers all of them at once.
+//!
 //! Starting points on a surface come from [`SurfacePoint::leave`], or from [`offset_origin`] where only a position is
 //! known.
 
 mod intersect;
 mod offset;
+mod parallel;
 mod tracer;
 
 use glam::{Vec2, Vec3};
 
 pub use offset::offset_origin;
+pub use parallel::{LineCrossing, ParallelTracer};
 pub use tracer::PlantTracer;
 
 use crate::plant::PartKind;

@@ -33,13 +33,13 @@ pub struct PlantTracer {
     surfaces: Vec<Surface>,
     tree: CwBvh,
     /// In the tree's order and scale.
-    corners: Vec<[[f32; 3]; 3]>,
+    pub(super) corners: Vec<[[f32; 3]; 3]>,
     /// In the tree's order.
     sources: Vec<Source>,
     /// Of the triangles in the tree, metres; `None` without triangles.
-    bounds: Option<Bounds>,
+    pub(super) bounds: Option<Bounds>,
     /// From metres to the tree's scale; a power of two.
-    scale: f32,
+    pub(super) scale: f32,
 }
 
 /// Where a triangle of the tree comes from.
@@ -200,8 +200,14 @@ impl PlantTracer {
         &self.plant
     }
 
+    /// The part and the triangle in it that the triangle of the tree is.
+    pub(super) fn source(&self, index: usize) -> (u32, u32) {
+        (self.sources[index].part, self.sources[index].triangle)
+    }
+
+    /// Whether the triangle of the tree passes its alpha test at these barycentric weights.
     #[inline(always)]
-    fn passes(&self, index: usize, u: f32, v: f32) -> bool {
+    pub(super) fn passes(&self, index: usize, u: f32, v: f32) -> bool {
         let source = &self.sources[index];
         !source.tested || {
             let [uv, along_u, along_v] = source.uv;
@@ -229,7 +235,8 @@ impl PlantTracer {
             }
         }
         let t_max = (ray.t_max - start) * self.scale;
-        let (origin, direction) = ((origin * self.scale).to_array(), ray.direction.to_array());
+        // Adding zero turns -0.0 into 0.0: the tree takes its inverse for negative and its sign for positive.
+        let (origin, direction) = ((origin * self.scale).to_array(), (ray.direction + Vec3::ZERO).to_array());
         if !origin.iter().all(|c| c.is_finite()) {
             return None;
         }

@@ -1,4 +1,8 @@
 //! The rays: from every point in every direction, what reaches it directly, and what it sees instead of the sky.
+//!
+//! All rays of one direction are answered at once, with those of the opposite one ([`crate::trace::ParallelTracer`]).
+
+use std::ops::ControlFlow;
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -7,131 +11,165 @@ use super::bounce::{Link, Links, Scene};
 use super::points::Point;
 use super::rays::Directions;
 use crate::light::atmosphere::luminance;
-use crate::trace::Ray;
+use crate::plant::PartKind;
+use crate::trace::{LineCrossing, ParallelTracer};
 
-/// Points whose rays are traced together: for each direction in turn, so that rays that run beside each other follow
-/// one another and find the tree's nodes in the cache.
-const BATCH: usize = 64;
-
-/// Light fainter than this is not followed through further leaves.
-const FAINTEST: f32 = 1e-4;
+/// Lines whose answers are kept until they are summed up: 36 MB for 70,000 points in one channel.
+const BLOCK: usize = 64;
 
 /// Front and back, slot by slot.
 pub(super) type Sides = [Vec<f32>; 2];
 
 impl Scene<'_> {
-    fn ray(&self, point: &Point, direction: Vec3) -> Ray {
-        Ray { origin: point.position + direction * self.points.start, direction, t_max: f32::INFINITY }
-    }
-
     /// A colour in as many channels as are baked.
     pub fn in_channels(&self, color: Vec3) -> [f32; 3] {
         if self.settings.channels.count() == 1 { [luminance(color), 0.0, 0.0] } else { color.to_array() }
     }
-}
 
-/// The side of `point` on which light from `direction` arrives, with the cosine; `None` where it does not count.
-fn side(point: &Point, direction: Vec3) -> Option<(usize, f32)> {
-    let cosine = point.normal.dot(direction);
-    if cosine > 0.0 {
-        Some((0, cosine))
-    } else if cosine < 0.0 && point.two_sided {
-        Some((1, -cosine))
-    } else {
-        None
+    fn lines(&self) -> ParallelTracer<'_> {
+        self.tracer.parallel(self.points.list.iter().map(|point| point.position))
     }
 }
 
-/// Light that goes straight on through up to `leaves` leaves.
-pub(super) fn straight(scene: &Scene, directions: &Directions, leaves: u8) -> Sides {
+/// Which of a line's two rays, 0 along it or 1 against it, reaches each side of `point`, front first, and at which
+/// cosine; `None` where none counts.
+fn sides(point: &Point, line: Vec3) -> Option<([usize; 2], f32)> {
+    let cosine = point.normal.dot(line);
+    (cosine != 0.0).then_some((if cosine > 0.0 { [0, 1] } else { [1, 0] }, cosine.abs()))
+}
+
+/// What reaches every point, slot by slot.
+pub(super) struct Gathered {
+    /// Coefficients of front and back.
+    pub sides: Sides,
+    /// The share of even surroundings that is hidden from front and back, 0..=1.
+    pub hidden: Sides,
+}
+
+/// Light that goes straight on through up to `leaves` leaves; with none, direct light.
+///
+/// Scaled so that even surroundings bring a free point exactly their radiance.
+pub(super) fn straight(scene: &Scene, directions: &Directions, leaves: u8) -> Gathered {
     let count = scene.settings.coefficients();
     let channels = scene.settings.channels.count();
-    let batch = |points: &[Point]| {
-        let mut sides = [vec![0.0; points.len() * count], vec![0.0; points.len() * count]];
-        for (index, direction) in directions.list.iter().enumerate() {
-            let row = directions.row(index);
-            for (local, point) in points.iter().enumerate() {
-                let Some((side, cosine)) = side(point, direction.toward) else { continue };
-                let through = throughput(scene, scene.ray(point, direction.toward), leaves);
-                let sums = &mut sides[side][local * count..(local + 1) * count];
-                for (sum, value) in sums.chunks_exact_mut(channels).zip(row) {
-                    for (sum, through) in sum.iter_mut().zip(through) {
-                        *sum += value * cosine * through;
+    let points = &scene.points.list;
+    let lines = scene.lines();
+    let mut sums: Vec<Sums> = vec![Sums::default(); points.len()];
+    let mut coefficients = [vec![0.0; points.len() * count], vec![0.0; points.len() * count]];
+    let order: Vec<usize> = (0..directions.lines.len()).collect();
+    for block in order.chunks(BLOCK) {
+        let through: Vec<Vec<f32>> =
+            block.par_iter().map(|&line| throughput(scene, &lines, directions.lines[line], leaves)).collect();
+        let [front, back] = &mut coefficients;
+        let add = |(slot, ((front, back), sums)): (usize, ((&mut [f32], &mut [f32]), &mut Sums))| {
+            for (&line, through) in block.iter().zip(&through) {
+                let Some((rays, cosine)) = sides(&points[slot], directions.lines[line]) else { continue };
+                sums.total += cosine;
+                for (side, (ray, sides)) in rays.into_iter().zip([&mut *front, &mut *back]).enumerate() {
+                    let at = (2 * slot + ray) * channels;
+                    let through = &through[at..at + channels];
+                    if through.iter().all(|share| *share == 0.0) {
+                        continue;
+                    }
+                    sums.arrived[side] += cosine * through.iter().sum::<f32>() / channels as f32;
+                    for (sides, value) in sides.chunks_exact_mut(channels).zip(directions.row(line, ray)) {
+                        for (sum, through) in sides.iter_mut().zip(through) {
+                            *sum += value * cosine * through;
+                        }
                     }
                 }
             }
-        }
-        sides
-    };
-    join(scene.points.list.par_chunks(BATCH).map(batch).collect())
-}
-
-/// The share of the light from the ray's far end that arrives at its origin.
-fn throughput(scene: &Scene, mut ray: Ray, leaves: u8) -> [f32; 3] {
-    let mut through = [1.0; 3];
-    for met in 0..=leaves {
-        let Some(hit) = scene.tracer.closest(&ray) else { return through };
-        if met == leaves {
-            break;
-        }
-        let surface = scene.tracer.point(&hit);
-        let transmission = scene.in_channels(surface.transmission);
-        through = std::array::from_fn(|channel| through[channel] * transmission[channel].clamp(0.0, 1.0));
-        if through.iter().all(|t| *t < FAINTEST) {
-            break;
-        }
-        ray.origin = surface.leave(ray.direction);
+        };
+        let sides = front.par_chunks_mut(count).zip(back.par_chunks_mut(count));
+        sides.zip(&mut sums).enumerate().for_each(add);
     }
-    [0.0; 3]
+    for (values, total) in coefficients.iter_mut().flat_map(|side| side.chunks_exact_mut(count).zip(&sums)) {
+        let scale = if total.total > 0.0 { 1.0 / total.total } else { 0.0 };
+        values.iter_mut().for_each(|value| *value *= scale);
+    }
+    let hidden = |side: usize| -> Vec<f32> {
+        let share = |sums: &Sums| if sums.total > 0.0 { 1.0 - sums.arrived[side] / sums.total } else { 0.0 };
+        sums.iter().map(|sums| share(sums).clamp(0.0, 1.0)).collect()
+    };
+    Gathered { sides: coefficients, hidden: [hidden(0), hidden(1)] }
 }
 
-/// Direct light, and the links along which reflected and transmitted light comes.
-pub(super) fn diffuse(scene: &Scene, directions: &Directions) -> (Sides, Links) {
-    let count = scene.settings.coefficients();
+/// Cosines of one point.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    /// Of all rays to a side: as many, at the same cosines, go to front and back.
+    total: f32,
+    /// Of those that were not hidden, by side.
+    arrived: [f32; 2],
+}
+
+/// The share of the light from far away that arrives at each point along a line and against it, by channel; nothing at
+/// the back of wood.
+fn throughput(scene: &Scene, lines: &ParallelTracer, line: Vec3, leaves: u8) -> Vec<f32> {
     let channels = scene.settings.channels.count();
-    let batch = |points: &[Point]| {
-        let mut sides = [vec![0.0; points.len() * count], vec![0.0; points.len() * count]];
-        let mut links: Vec<(u16, Link)> = Vec::new();
-        for (index, direction) in directions.list.iter().enumerate() {
-            let row = directions.row(index);
-            for (local, point) in points.iter().enumerate() {
-                let Some((side, cosine)) = side(point, direction.toward) else { continue };
-                let ray = scene.ray(point, direction.toward);
-                let hidden = if direction.linked {
-                    let hit = scene.tracer.closest(&ray);
-                    if let Some(hit) = &hit {
-                        let link = Link::new(scene, hit, cosine * directions.link_weight);
-                        links.extend(link.map(|link| ((2 * local + side) as u16, link)));
-                    }
-                    hit.is_some()
-                } else {
-                    scene.tracer.occluded(&ray)
-                };
-                if hidden {
-                    continue;
-                }
-                let sums = &mut sides[side][local * count..(local + 1) * count];
-                for (sum, value) in sums.chunks_exact_mut(channels).zip(row) {
-                    sum.iter_mut().for_each(|sum| *sum += value * cosine);
+    let points = &scene.points.list;
+    let mut through = vec![1.0; points.len() * 2 * channels];
+    for (point, through) in points.iter().zip(through.chunks_exact_mut(2 * channels)) {
+        if let (false, Some(([_, back], _))) = (point.two_sided, sides(point, line)) {
+            through[back * channels..(back + 1) * channels].fill(0.0);
+        }
+    }
+    let mut met = if leaves > 0 { vec![0u8; points.len() * 2] } else { Vec::new() };
+    lines.crossings(line, |crossing| {
+        let Some(ray) = ray_of(&crossing, scene.points.start) else { return ControlFlow::Continue(()) };
+        let point = crossing.point as usize;
+        let both = &mut through[2 * point * channels..2 * (point + 1) * channels];
+        let shares = &mut both[ray * channels..(ray + 1) * channels];
+        if shares.iter().all(|share| *share == 0.0) || !lines.covers(&crossing) {
+            return ControlFlow::Continue(());
+        }
+        let surface = (leaves > 0).then(|| scene.tracer.point(&lines.hit(&crossing, ray == 1)));
+        match surface.filter(|surface| surface.kind == PartKind::Foliage && met[2 * point + ray] < leaves) {
+            Some(surface) => {
+                met[2 * point + ray] += 1;
+                for (share, passed) in shares.iter_mut().zip(scene.in_channels(surface.transmission)) {
+                    *share *= passed.clamp(0.0, 1.0);
                 }
             }
+            None => shares.fill(0.0),
         }
-        // Stable: within a point and side the links stay in the directions' order.
-        links.sort_by_key(|(key, _)| *key);
-        (sides, links)
-    };
-    let batches: Vec<(Sides, Vec<(u16, Link)>)> = scene.points.list.par_chunks(BATCH).map(batch).collect();
-    let (sides, links): (Vec<Sides>, Vec<Vec<(u16, Link)>>) = batches.into_iter().unzip();
-    (join(sides), Links::new(scene.points.list.len(), BATCH, links))
+        if both.iter().all(|share| *share == 0.0) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    through
 }
 
-/// The batches' sums, one after the other.
-fn join(batches: Vec<Sides>) -> Sides {
-    let mut joined = [Vec::new(), Vec::new()];
-    for batch in batches {
-        for (all, part) in joined.iter_mut().zip(batch) {
-            all.extend(part);
+/// Whether a crossing is met by the ray along the line (0) or against it (1); `None` at the point itself.
+fn ray_of(crossing: &LineCrossing, start: f32) -> Option<usize> {
+    (crossing.t.abs() > start).then_some(usize::from(crossing.t < 0.0))
+}
+
+/// The links along which reflected and transmitted light comes. The lines that are followed are few; where they show
+/// another share of the plant than all lines do, that of all lines counts: `hidden`, of [`Gathered`].
+pub(super) fn links(scene: &Scene, directions: &Directions, hidden: &Sides) -> Links {
+    let lines = scene.lines();
+    let points = &scene.points.list;
+    let start = scene.points.start;
+    let of_line = |&line: &Vec3| -> Vec<(u32, Link)> {
+        let mut nearest: Vec<Option<LineCrossing>> = vec![None; 2 * points.len()];
+        lines.crossings(line, |crossing| {
+            let Some(ray) = ray_of(&crossing, start) else { return ControlFlow::Continue(()) };
+            let nearest = &mut nearest[2 * crossing.point as usize + ray];
+            if nearest.is_none_or(|other| crossing.t.abs() < other.t.abs()) && lines.covers(&crossing) {
+                *nearest = Some(crossing);
+            }
+            ControlFlow::Continue(())
+        });
+        let mut links = Vec::new();
+        for (slot, point) in points.iter().enumerate() {
+            let Some((rays, cosine)) = sides(point, line) else { continue };
+            for (side, ray) in rays.into_iter().enumerate().take(1 + usize::from(point.two_sided)) {
+                let Some(crossing) = nearest[2 * slot + ray] else { continue };
+                let link = Link::new(scene, &lines.hit(&crossing, ray == 1), cosine);
+                links.push(((2 * slot + side) as u32, link));
+            }
         }
-    }
-    joined
+        links
+    };
+    let by_line: Vec<Vec<(u32, Link)>> = directions.followed.par_iter().map(of_line).collect();
+    Links::new(by_line, hidden)
 }

@@ -29,15 +29,17 @@
 //! The coefficients that reproduce the transfer function best are its projection; those that reproduce the light of
 //! the *skies that occur* best are a fit to them ([`Projection::Fit`]). Both are a fixed matrix applied to the sampled
 //! directions, so they cost the same. `benches/transfer.rs` has both, band by band; the fit is the default. What it
-//! pays: with 2 bands a free level leaf gets 11 % too little of an even sky, with 3 or more less than 3 %.
+//! pays: with 2 bands a free level leaf gets 12 % too little of an even sky, with 3 or more less than 3 %.
 //!
 //! # Limits
 //! Light reaches a vertex from its own plant and from infinitely far away, not from its neighbours (4.3.3). The sun's
 //! disc is not meant to be put into the light: a few bands hold it badly, and a shadow map would count the plant's own
 //! shadow twice. The side and the cosine are the *vertex normal's*, whatever a leaf's true plane. A vertex that other
-//! geometry swallows is dark, and darkens its triangles. Light that bounces is interpolated over a triangle's corners.
+//! geometry swallows is dark, and darkens its triangles. Light that bounces is
+//! even over a triangle.
 //! The bright surroundings of a low sun are narrow, and few bands hold them as badly as they hold the disc: most of
-//! the error that remains is theirs (`benches/transfer.rs`, table of the hours).
+//! the error that remains is theirs (`benches/transfer.rs`, table of the hours). It cannot be had back by counting them
+//! to the sun: a shadow map knows whether the sun's centre is seen, not how much of what surrounds it.
 
 mod bounce;
 mod evaluate;
@@ -107,7 +109,8 @@ pub struct TransferSettings {
     pub bands: u8,
     /// One channel or three.
     pub channels: Channels,
-    /// Directions over the whole sphere, 16..=16384. More: less noise, proportionally more time.
+    /// Directions over the whole sphere, an even number of 16..=16384: each with its opposite. More: less noise,
+    /// proportionally more time.
     pub rays: u32,
     /// How the coefficients follow from the rays.
     pub projection: Projection,
@@ -118,9 +121,9 @@ pub struct TransferSettings {
 impl Default for TransferSettings {
     fn default() -> Self {
         Self {
-            bands: 3,
+            bands: 4,
             channels: Channels::One,
-            rays: 256,
+            rays: 1024,
             projection: Projection::Fit,
             interior: Interior::Diffuse(3),
         }
@@ -138,7 +141,7 @@ impl TransferSettings {
     pub fn in_range(self) -> Self {
         Self {
             bands: self.bands.clamp(2, MAX_BANDS as u8),
-            rays: self.rays.clamp(16, 16_384),
+            rays: self.rays.clamp(16, 16_384).next_multiple_of(2),
             interior: match self.interior {
                 Interior::Straight(leaves) => Interior::Straight(leaves.min(8)),
                 Interior::Diffuse(bounces) => Interior::Diffuse(bounces.clamp(1, 8)),
@@ -198,10 +201,11 @@ pub fn bake_transfer(plant: &Arc<Plant>, settings: &TransferSettings) -> Transfe
     let directions = Directions::new(&settings);
     let scene = Scene { tracer: &tracer, points: &points, settings };
     let sides = match settings.interior {
-        Interior::Straight(leaves) => gather::straight(&scene, &directions, leaves),
+        Interior::Straight(leaves) => gather::straight(&scene, &directions, leaves).sides,
         Interior::Diffuse(bounces) => {
-            let (direct, links) = gather::diffuse(&scene, &directions);
-            bounce::bounce(&scene, direct, &links, bounces)
+            let direct = gather::straight(&scene, &directions, 0);
+            let links = gather::links(&scene, &directions, &direct.hidden);
+            bounce::bounce(&scene, direct.sides, &links, bounces)
         }
     };
     let count = settings.coefficients();

@@ -1,21 +1,17 @@
 //! The directions of the rays, and what each adds to the coefficients.
 
-use std::f32::consts::PI;
 use std::f64::consts::TAU;
 
 use glam::{DVec3, Vec3};
 
-use super::fit::fit_rows;
+use super::fit::Fit;
 use super::{Projection, TransferSettings};
 use crate::light::sh;
 use crate::scatter::sequence::hammersley;
 
-/// One ray in so many is followed to what it meets, for light that bounces: such light varies less from direction to
-/// direction than what hides it. Odd, so that the base-2 radical inverses of those that remain are still spread evenly.
-const LINK_EVERY: usize = 3;
-
-/// From so many rays on.
-const LINK_ALL_BELOW: usize = 96;
+/// Lines that are followed to what they meet, at least, for light that bounces, where there are as many: such light
+/// varies less from direction to direction than what hides it.
+const FOLLOWED: usize = 48;
 
 /// `n` unit vectors, evenly spread over the whole sphere: Hammersley's set, `y` from the regular coordinate, the
 /// azimuth from the radical inverse (area-preserving, Archimedes).
@@ -31,78 +27,67 @@ pub fn direction_set(n: u32) -> Vec<Vec3> {
         .collect()
 }
 
-/// One direction of the set.
-pub(super) struct Direction {
-    /// Unit vector.
-    pub toward: Vec3,
-    /// Whether a ray in this direction is followed to what it meets.
-    pub linked: bool,
-}
-
-/// The directions in the order in which they are traced, neighbours beside each other.
+/// The rays in opposite pairs: of each pair, a line, the ray along it is number 0 and the one against it number 1.
 pub(super) struct Directions {
-    /// The directions.
-    pub list: Vec<Direction>,
-    /// For each direction, bands² values: what an unhidden ray at normal incidence adds to the coefficients.
+    /// Unit vectors along the lines, in the upper hemisphere.
+    pub lines: Vec<Vec3>,
+    /// For each line and ray, bands² values: what an unhidden ray adds to the coefficients, times its cosine over the sum
+    /// of all cosines to its side.
     rows: Vec<f32>,
     coefficients: usize,
-    /// What a followed ray at normal incidence adds for each unit of radiance: solid angle over pi.
-    pub link_weight: f32,
+    /// The lines that are followed to what they meet.
+    pub followed: Vec<Vec3>,
 }
 
 impl Directions {
     /// For `settings` in range.
     pub fn new(settings: &TransferSettings) -> Self {
-        let set = direction_set(settings.rays);
         let bands = usize::from(settings.bands);
-        let coefficients = bands * bands;
-        let values = match settings.projection {
-            Projection::Quadrature => projection_rows(&set, bands),
-            Projection::Fit => fit_rows(&set, bands).unwrap_or_else(|| projection_rows(&set, bands)),
-        };
-        let every = if set.len() < LINK_ALL_BELOW { 1 } else { LINK_EVERY };
-        let mut order: Vec<usize> = (0..set.len()).collect();
-        // Rays of one octant visit the tree's nodes in one order.
-        let octant = |d: Vec3| u8::from(d.x < 0.0) | u8::from(d.y < 0.0) << 1 | u8::from(d.z < 0.0) << 2;
-        order.sort_by_key(|&i| (octant(set[i]), i));
-        let weight = 4.0 / set.len() as f32;
-        let rows = order
-            .iter()
-            .flat_map(|&i| values[i * coefficients..(i + 1) * coefficients].iter().map(|value| value * weight))
-            .collect();
-        let linked = |i: usize| i % every == every / 2;
-        let link_count = (0..set.len()).filter(|&i| linked(i)).count().max(1);
-        let list = order.iter().map(|&i| Direction { toward: set[i], linked: linked(i) }).collect();
-        Self { list, rows, coefficients, link_weight: 4.0 * PI / (PI * link_count as f32) }
+        // The first half of the set is the upper hemisphere.
+        let lines = direction_set(settings.rays)[..settings.rays as usize / 2].to_vec();
+        let rays: Vec<Vec3> = lines.iter().flat_map(|line| [*line, -*line]).collect();
+        let mut rows = vec![0.0; rays.len() * bands * bands];
+        for (row, ray) in rows.chunks_exact_mut(bands * bands).zip(&rays) {
+            settings.projection.row_over(*ray, 1.0 / settings.rays as f32, row);
+        }
+        // Odd, so that the base-2 radical inverses of those that remain are still spread evenly.
+        let every = ((lines.len() / FOLLOWED).saturating_sub(1) | 1).max(1);
+        let followed: Vec<Vec3> = lines.iter().skip(every / 2).step_by(every).copied().collect();
+        Self { lines, rows, coefficients: bands * bands, followed }
     }
 
-    /// What an unhidden ray in this direction at normal incidence adds.
-    pub fn row(&self, direction: usize) -> &[f32] {
-        &self.rows[direction * self.coefficients..(direction + 1) * self.coefficients]
+    /// What an unhidden ray adds, times its share.
+    pub fn row(&self, line: usize, ray: usize) -> &[f32] {
+        &self.rows[(2 * line + ray) * self.coefficients..(2 * line + ray + 1) * self.coefficients]
     }
 }
 
-/// The basis at each direction.
-pub(super) fn projection_rows(set: &[Vec3], bands: usize) -> Vec<f32> {
-    let count = bands * bands;
-    let mut rows = vec![0.0; set.len() * count];
-    for (row, direction) in rows.chunks_exact_mut(count).zip(set) {
-        sh::basis_into(*direction, row);
+impl Projection {
+    /// What light from the unit vector `direction` adds to the coefficients, for each unit of radiance, solid angle and
+    /// cosine: the basis, or the functions of the fit. `out` takes whole bands.
+    pub fn row(self, direction: Vec3, out: &mut [f32]) {
+        self.row_over(direction, 0.0, out);
     }
-    rows
+
+    /// The mean of [`Projection::row`] over heights up to `half` below and above `direction`, where it may jump.
+    fn row_over(self, direction: Vec3, half: f32, out: &mut [f32]) {
+        match (self, Fit::of(sh::bands_in(out.len()))) {
+            (Self::Fit, Some(fit)) => fit.row(direction, half, out),
+            _ => sh::basis_into(direction, out),
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::Interior;
     use super::*;
 
     #[test]
     fn the_set_integrates_low_bands() {
         for n in [64, 256, 1024] {
-            let rows = projection_rows(&direction_set(n), 3);
+            let rows: Vec<[f32; 9]> = direction_set(n).into_iter().map(sh::basis).collect();
             for i in 0..9 {
-                let mean: f32 = rows.iter().skip(i).step_by(9).sum::<f32>() / n as f32;
+                let mean = rows.iter().map(|row| row[i]).sum::<f32>() / n as f32;
                 let want = if i == 0 { 0.282_094_8 } else { 0.0 };
                 assert!((mean - want).abs() < 1.5 / n as f32, "{n} rays, coefficient {i}: {mean}");
             }
@@ -111,13 +96,13 @@ mod tests {
 
     #[test]
     fn followed_rays_stand_for_all() {
-        for rays in [16, 95, 96, 256, 1000] {
+        for rays in [16, 96, 256, 1000, 4096] {
             let settings = TransferSettings { rays, projection: Projection::Quadrature, ..Default::default() };
-            let directions = Directions::new(&TransferSettings { interior: Interior::Diffuse(1), ..settings });
-            let total: f32 = directions.list.iter().filter(|d| d.linked).map(|_| directions.link_weight).sum();
-            assert!((total - 4.0).abs() < 1e-4);
-            let mean = directions.list.iter().filter(|d| d.linked).map(|d| d.toward).sum::<Vec3>();
-            assert!(mean.length() * directions.link_weight < 0.2, "{rays}: {mean}");
+            let directions = Directions::new(&settings);
+            assert!(directions.followed.len() >= FOLLOWED.min(rays as usize / 2));
+            // Of the upper hemisphere, the mean height is 1/2 and the mean of the rest nothing.
+            let mean = directions.followed.iter().sum::<Vec3>() / directions.followed.len() as f32;
+            assert!((mean - 0.5 * Vec3::Y).length() < 0.06, "{rays}: {mean}");
         }
     }
 }
