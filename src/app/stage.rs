@@ -11,7 +11,7 @@ use crate::{
     light::{MoonSetting, sun::Observer},
     lod::FadeBand,
     render::{
-        components::{Forest, Ground, SunShadowSettings},
+        components::{Forest, Ground, SunLight, SunShadowSettings},
         daylight::SkySettings,
     },
     scatter::{CoverMap, PackedStand, VariantBounds, cover_map, packed::DEFAULT_CELL_SIZE},
@@ -34,6 +34,8 @@ pub struct Stage {
     pub stand: Arc<PackedStand>,
     /// Their plants, by variant.
     pub plants: Arc<Vec<BakedPlant>>,
+    /// How the sun lights each.
+    pub suns: Arc<[SunLight]>,
     /// Share of ground under crowns; `None` without trees.
     pub cover: Option<Arc<CoverMap>>,
     /// Place on earth.
@@ -78,7 +80,8 @@ impl Stage {
         if has_trees && stand.trees.is_empty() {
             progress.warn("the scene's rules leave no place for any tree: only the ground is drawn");
         }
-        Ok(Self { terrain, stand: Arc::new(packed), plants: Arc::new(plants), cover, observer, scene })
+        let suns = species.individuals.iter().map(|individual| individual.sun).collect();
+        Ok(Self { terrain, stand: Arc::new(packed), plants: Arc::new(plants), suns, cover, observer, scene })
     }
 
     /// The forest of the scene, or `None` without trees.
@@ -87,6 +90,7 @@ impl Stage {
         (!self.stand.trees.is_empty()).then(|| Forest {
             stand: self.stand.clone(),
             plants: self.plants.clone(),
+            suns: self.suns.clone(),
             origin: DVec3::ZERO,
             fade: FadeBand::new(quality.near_distance as f32, quality.fade_band as f32),
             view_distance: quality.view_distance as f32,
@@ -175,7 +179,7 @@ fn bake(
         let results: Vec<_> = group
             .par_iter()
             .map(|individual| {
-                let (plant, mut warnings) = individual.source.build()?;
+                let (plant, mut warnings) = individual.build()?;
                 let settings = plants::bake_settings(quality, individual.lighting);
                 let baked = bake_plant(Arc::new(plant), &settings, cache.as_ref());
                 warnings.extend(baked.0.lighting.warning().map(|what| format!("{}: {what}", baked.0.plant.name)));

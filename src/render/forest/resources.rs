@@ -35,7 +35,12 @@ use crate::{
         PartKind, PlantMaterial, PlantMesh,
         texture::{MipChain, color_mips, leaf_mips, normal_mips},
     },
-    render::{components::Forest, cull::VariantSize, extract::ExtractedScene, gpu},
+    render::{
+        components::{Forest, SunLight},
+        cull::VariantSize,
+        extract::ExtractedScene,
+        gpu,
+    },
     scatter::{PackedStand, PackedTree},
 };
 
@@ -86,6 +91,8 @@ pub struct VariantUniform {
     pub transmission: [f32; 4],
     /// How far the leaves of a texel face everywhere, mip by mip.
     pub spread: [[f32; 4]; SPREAD_LEVELS / 4],
+    /// Gloss of its leaves: reflectance, roughness, 1 where normals point out of the crown; unused.
+    pub gloss: [f32; 4],
 }
 
 /// `Part` of `shaders/forest/model.wgsl`.
@@ -96,6 +103,8 @@ pub struct PartUniform {
     pub base_color: [f32; 4],
     /// Transmission factor; w: 1 where the normals point out of the crown, whichever side of a leaf is seen.
     pub transmission: [f32; 4],
+    /// Gloss: reflectance, roughness; unused, unused.
+    pub gloss: [f32; 4],
 }
 
 /// Bind group layouts of everything that draws trees.
@@ -197,8 +206,26 @@ pub struct GpuPart {
     pub proxy: GpuMesh,
     /// Group 2.
     pub bind_group: BindGroup,
+    /// Which pipeline draws it.
+    pub light: PartLight,
     /// Group 3 of plants that are lit by radiance transfer.
     pub transfer: Option<BindGroup>,
+}
+
+/// What light reaches a part's full model, and how.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PartLight {
+    /// Sky by normal and k_a, sun by the leaf shader.
+    Plain,
+    /// Sky by transfer, sun by the leaf shader.
+    Transfer,
+    /// Sky and sun by transfer.
+    Harmonics,
+}
+
+impl PartLight {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Plain, Self::Transfer, Self::Harmonics];
 }
 
 /// A forest's GPU side.
@@ -262,6 +289,7 @@ pub fn prepare_forests(
         if let Some(known) = forests.forests.get_mut(entity)
             && Arc::ptr_eq(&known.stand, &forest.stand)
             && Arc::ptr_eq(&known.plants, &forest.plants)
+            && known.forest.suns == forest.suns
         {
             if known.forest.origin != forest.origin {
                 forests.generations += 1;
@@ -290,7 +318,11 @@ fn upload(
     let parts = forest
         .plants
         .iter()
-        .map(|plant| upload_parts(plant, layouts, &mut textures, transfer, device, queue, pipelines))
+        .enumerate()
+        .map(|(index, plant)| {
+            let sun = forest.suns.get(index).copied().unwrap_or_default();
+            upload_parts(plant, sun, layouts, &mut textures, transfer, device, queue, pipelines)
+        })
         .collect();
     let sizes: Vec<VariantSize> = forest.plants.iter().map(variant_size).collect();
     let variants: Vec<VariantUniform> =
@@ -324,12 +356,19 @@ fn variant(index: usize, plant: &BakedPlant, size: &VariantSize) -> VariantUnifo
         };
     }
     let traced = f32::from(u8::from(matches!(plant.lighting, BakedLighting::Transfer(_))));
+    let gloss = plant.plant.leaf_gloss();
     VariantUniform {
         planes,
         size: [size.height, size.radius, (index * PLANES) as f32, 1.0],
         transmission: plant.cross.transmission.extend(traced).to_array(),
         spread: bytemuck::cast(plant.cross.spread),
+        gloss: [gloss.reflectance, gloss.roughness, realigned(plant), 0.0],
     }
+}
+
+/// 1 where the foliage's normals point out of the crown.
+fn realigned(plant: &BakedPlant) -> f32 {
+    f32::from(u8::from(plant.lighting.is_realigned()))
 }
 
 /// What an image is used for: each use filters it otherwise.
@@ -387,8 +426,10 @@ fn plain(texel: [u8; 4]) -> MipChain {
     MipChain { width: 1, height: 1, levels: vec![texel.to_vec()] }
 }
 
+#[expect(clippy::too_many_arguments, reason = "what an upload needs")]
 fn upload_parts(
     plant: &BakedPlant,
+    sun: SunLight,
     layouts: &ForestLayouts,
     textures: &mut TextureShelf,
     transfer: &mut TransferLight,
@@ -402,9 +443,17 @@ fn upload_parts(
         let empty = PlantMesh::default();
         let proxy = plant.shadow_proxy.get(index).unwrap_or(&empty);
         let material = &part.material;
+        let gloss = material.gloss.in_range();
+        let coefficients = plant.lighting.transfer(index);
+        let light = match (coefficients, sun) {
+            (None, _) => PartLight::Plain,
+            (Some(_), SunLight::LeafShader) => PartLight::Transfer,
+            (Some(_), SunLight::Harmonics) => PartLight::Harmonics,
+        };
         let uniform = PartUniform {
             base_color: material.base_color.extend(1.0).to_array(),
-            transmission: material.transmission.extend(f32::from(u8::from(plant.lighting.is_realigned()))).to_array(),
+            transmission: material.transmission.extend(realigned(plant)).to_array(),
+            gloss: [gloss.reflectance, gloss.roughness, 0.0, 0.0],
         };
         let uniform = gpu::buffer_with(device, "canopy_plant_part", BufferUsages::UNIFORM, &[uniform]);
         let color = textures.color(material, part.kind, device, queue);
@@ -419,7 +468,8 @@ fn upload_parts(
             model: upload_mesh(&part.mesh, plant.lighting.normals(index), plant.lighting.ambient(index), device),
             proxy: upload_mesh(proxy, None, &[], device),
             bind_group,
-            transfer: plant.lighting.transfer(index).map(|part| transfer.bind_group(part, layouts, device, pipelines)),
+            light,
+            transfer: coefficients.map(|part| transfer.bind_group(part, sun, layouts, device, pipelines)),
         });
     }
     parts
