@@ -190,7 +190,7 @@ fn degenerate_species_and_triangles_are_refused() {
         |s| s.branches[1].stem.length = f32::INFINITY,
         |s| s.trunk.segments = 0,
         |s| s.leaves.count = 0,
-        |s| s.leaves.transmission[1] = 1.5,
+        |s| s.leaves.transmission[1] = 2.5,
         |s| s.branches.iter_mut().for_each(|b| b.count = 400),
     ];
     for (index, break_it) in broken.iter().enumerate() {

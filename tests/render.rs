@@ -1,5 +1,6 @@
 //! Pictures: small scenes drawn without a window, on whatever graphics driver there is (a software one will do).
 
+mod foliage;
 mod pictures;
 mod shadows;
 mod world;

@@ -3,7 +3,8 @@
 use std::path::Path as FilePath;
 
 use canopy::scene::{
-    Ground, GrownForm, LengthUnit, Moon, Path, PlantSource, Position, Scene, SceneError, Sequence, Trees,
+    Ground, GrownForm, LeafGloss, LengthUnit, Lighting, Moon, Overrides, Path, PlantSource, Position, Scene,
+    SceneError, Sequence, SunLight, Transfer, Trees, parse_lighting,
 };
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
@@ -138,6 +139,46 @@ fn everything_is_read() -> Outcome {
     let path = Path::new(&scene.camera.path).ok_or("no path")?;
     assert_eq!(path.at(5.0), scene.camera.path[1].pose());
     assert_eq!((scene.quality.cascades, scene.quality.near_distance), (3, 40.0));
+    Ok(())
+}
+
+#[test]
+fn gloss_and_the_way_of_the_sun_are_read() -> Outcome {
+    let plain = parse(FULL)?;
+    assert_eq!(plain.species[0].gloss, LeafGloss { share: 0.045, roughness: 0.4 });
+    let text =
+        FULL.replace("weight: 3,", "weight: 3, gloss: (roughness: 0.2), lighting: Transfer(bands: 4, sun: Harmonics),");
+    let oak = &parse(&text)?.species[0];
+    assert_eq!(oak.gloss, LeafGloss { share: 0.045, roughness: 0.2 });
+    assert_eq!(
+        oak.lighting,
+        Some(Lighting::Transfer(Transfer { bands: 4, sun: SunLight::Harmonics, ..Transfer::default() }))
+    );
+    assert_eq!(Transfer::default().sun, SunLight::LeafShader);
+    faulty("weight: 3", "weight: 3, gloss: (share: 0.5)", 26, &["`species[0].gloss.share` is 0.5", "0 to 0.09"]);
+    faulty("weight: 3", "weight: 3, gloss: (roughness: 0)", 30, &["`species[0].gloss.roughness` is 0", "0.1 to 1"]);
+    let wrong = parse(&FULL.replace("weight: 3", "weight: 3, lighting: Transfer(sun: Disc)"));
+    assert!(wrong.is_err_and(|error| error.to_string().contains("LeafShader")));
+    Ok(())
+}
+
+#[test]
+fn a_request_changes_the_way_of_the_sun_and_keeps_the_rest() -> Outcome {
+    let mut scene = parse(&FULL.replace("weight: 3,", "weight: 3, lighting: Transfer(bands: 5),"))?;
+    let overrides = |name: &str| -> Result<Overrides, Box<dyn std::error::Error>> {
+        Ok(Overrides { lighting: Some(parse_lighting(name)?), ..Overrides::default() })
+    };
+    let transfer = |scene: &Scene, index: usize| match &scene.species[index].lighting {
+        Some(Lighting::Transfer(transfer)) => Some((transfer.bands, transfer.sun)),
+        _ => None,
+    };
+    overrides("harmonics")?.apply(&mut scene);
+    assert_eq!(transfer(&scene, 0), Some((5, SunLight::Harmonics)));
+    assert_eq!(transfer(&scene, 1), Some((3, SunLight::Harmonics)));
+    overrides("transfer")?.apply(&mut scene);
+    assert_eq!(transfer(&scene, 0), Some((5, SunLight::LeafShader)));
+    overrides("local")?.apply(&mut scene);
+    assert_eq!(scene.species[0].lighting, Some(Lighting::Local));
     Ok(())
 }
 

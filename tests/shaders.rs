@@ -28,12 +28,14 @@ use naga::{
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 
 /// All that the pipelines switch on or off.
-const DEFINES: [&str; 3] = ["FOLIAGE", "ALPHA_TO_COVERAGE", "TRANSFER"];
+const DEFINES: [&str; 4] = ["FOLIAGE", "ALPHA_TO_COVERAGE", "TRANSFER", "SUN_HARMONICS"];
 
-/// All combinations of [`DEFINES`].
+/// All combinations of [`DEFINES`]; the sun's harmonics need the transfer.
 fn variants() -> impl Iterator<Item = Vec<&'static str>> {
-    (0..1u32 << DEFINES.len())
-        .map(|bits| DEFINES.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, define)| *define).collect())
+    let all = (0..1u32 << DEFINES.len()).map(|bits| {
+        DEFINES.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, define)| *define).collect::<Vec<_>>()
+    });
+    all.filter(|defines| !defines.contains(&"SUN_HARMONICS") || defines.contains(&"TRANSFER"))
 }
 
 fn is_library(source: &str) -> bool {
@@ -206,8 +208,8 @@ fn gpu_structs_are_what_the_shaders_think() {
         ForestViewUniform { anchor_cell, anchor_offset, anchor_y, cell_size, fade_start, fade_end }
     );
     twin!(layouts, "Plane", PlaneUniform { center, u, v, normal });
-    twin!(layouts, "Variant", VariantUniform { planes, size, transmission, spread });
-    twin!(layouts, "Part", PartUniform { base_color, transmission });
+    twin!(layouts, "Variant", VariantUniform { planes, size, transmission, spread, gloss });
+    twin!(layouts, "Part", PartUniform { base_color, transmission, gloss });
     twin!(layouts, "Transfer", TransferUniform { scale, form });
     twin!(layouts, "Tree", PackedTree { xz, y, cell, look });
     twin!(layouts, "Tile", GpuTile { origin, spacing, first, morph_start, morph_end, clearance, level });

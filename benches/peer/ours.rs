@@ -55,6 +55,7 @@ impl Ours {
             world.spawn(Forest {
                 stand: field.stand.clone(),
                 plants: Arc::new(vec![plant]),
+                suns: Arc::default(),
                 origin: DVec3::ZERO,
                 fade,
                 view_distance: EVERYWHERE,

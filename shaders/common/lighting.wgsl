@@ -13,6 +13,9 @@ struct Surface {
     normal: vec3<f32>,
     // Linear factor on the albedo for light from behind; zero for wood and ground.
     transmission: vec3<f32>,
+    // Gloss of a leaf: share that its surface reflects (0: matt), roughness, and how far the gloss is that of many leaves
+    // that face everywhere, 0..1.
+    gloss: vec3<f32>,
     // Share of the surroundings that the surface sees, 0..1.
     ambient: f32,
     // Unit vector to the viewer, and how far the surface is many leaves that face everywhere: 0 one normal, 1 all alike.
@@ -42,14 +45,63 @@ fn even_sky(surface: Surface) -> vec3<f32> {
     return (sky_irradiance(surface.normal) + through) * surface.ambient;
 }
 
-// Exitant radiance towards the viewer; `visibility` of the key light in 0..1, `sky`: irradiance of the surroundings over pi,
-// what is transmitted included.
+// Share of the reflected light that has been inside a leaf, which reflects the share `reflectance` at its surface: the rest
+// is gloss. src/plant/gloss.rs derives it.
+fn inside_share(albedo: vec3<f32>, reflectance: f32) -> vec3<f32> {
+    return albedo / max(sqrt(albedo * albedo + reflectance * reflectance) + reflectance, vec3(1e-6));
+}
+
+// Light through a leaf as a factor on its base colour: the twin of PlantMaterial::transmitted in src/plant/gloss.rs.
+fn leaf_transmission(base_color: vec3<f32>, factor: vec3<f32>, reflectance: f32) -> vec3<f32> {
+    let c = clamp(base_color, vec3(0.0), vec3(1.0));
+    return min(factor * inside_share(c, reflectance), (1.0 - c) / max(c, vec3(1e-6)));
+}
+
+// The specular term of the leaf shader [Franzke 2005, 4.2.2], times pi and the cosine, for the share `sheen` that the surface
+// reflects in the mean over all directions: microfacets [Walter et al. 2007, GGX; the masking of Hammon 2017], of whose
+// Fresnel factor half is constant and half rises as Schlick's [1994]: a mean of (1 - cosine)^5 is 1/21. Leaves that face
+// everywhere reflect like a ball, alike in all directions but for that factor.
+fn leaf_gloss(surface: Surface, sheen: vec3<f32>) -> vec3<f32> {
+    let to_light = light.key_direction.xyz;
+    // Between two opposite directions lies every direction: any will do.
+    let between = surface.viewer + to_light;
+    let middle = between * inverseSqrt(max(dot(between, between), 1e-8));
+    let grazing = 1.0 - saturate(dot(middle, to_light));
+    let grazing_squared = grazing * grazing;
+    let fresnel = 0.5 + 10.5 * grazing_squared * grazing_squared * grazing;
+    let nl = saturate(dot(surface.normal, to_light));
+    let nv = max(abs(dot(surface.normal, surface.viewer)), 1e-3);
+    let nm = saturate(dot(surface.normal, middle));
+    let width = surface.gloss.y;
+    let spread = nm * nm * (width * width - 1.0) + 1.0;
+    // Distribution times pi; masking over four times the cosines.
+    let distribution = width * width / (spread * spread);
+    let masking = 0.5 / max(mix(2.0 * nl * nv, nl + nv, width), 1e-4);
+    return sheen * fresnel * mix(distribution * masking * nl, 0.25, surface.gloss.z);
+}
+
+// Exitant radiance towards the viewer. `near` and `far`: what the key light brings to the viewer's side and to the other
+// where nothing is in the way, irradiance over pi; `visibility` of the key light in 0..1; `sky`: irradiance of the
+// surroundings over pi, what is transmitted included.
+//
+// The gloss is taken out of the diffuse light of the key light alone: that of the sky has no lobe to be seen.
+fn exitant(surface: Surface, near: vec3<f32>, far: vec3<f32>, visibility: f32, sky: vec3<f32>) -> vec3<f32> {
+    var reflected = near;
+    var gloss = vec3(0.0);
+    if surface.gloss.x > 0.0 {
+        let inside = inside_share(surface.albedo, surface.gloss.x);
+        reflected *= inside;
+        gloss = leaf_gloss(surface, surface.albedo * (1.0 - inside)) * light.key_illuminance.rgb * INVERSE_PI;
+    }
+    return surface.albedo * ((reflected + far * surface.transmission) * visibility + sky) + gloss * visibility;
+}
+
+// Exitant radiance of a surface that the key light reaches by the angle to its normal.
 fn shade(surface: Surface, visibility: f32, sky: vec3<f32>) -> vec3<f32> {
     let cosine = dot(surface.normal, light.key_direction.xyz);
     let between = dot(surface.viewer, light.key_direction.xyz);
     let front = mix(max(cosine, 0.0), sphere_cosine(between), surface.spread);
     let back = mix(max(-cosine, 0.0), sphere_cosine(-between), surface.spread);
-    let direct = (front + back * surface.transmission) * visibility
-        * light.key_illuminance.rgb * INVERSE_PI;
-    return surface.albedo * (direct + sky);
+    let full = light.key_illuminance.rgb * INVERSE_PI;
+    return exitant(surface, front * full, back * full, visibility, sky);
 }

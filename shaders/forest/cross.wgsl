@@ -1,7 +1,7 @@
 // Crossed billboards [Franzke 2005, 4.3]: two upright planes and a level one, eighteen pulled vertices a tree.
 #import canopy::frame::{frame, light}
 #import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, cross_threshold, tint_foliage, stand_ambient, scattered, leaf_visibility}
-#import canopy::lighting::{Surface, shade, even_sky}
+#import canopy::lighting::{Surface, shade, even_sky, leaf_transmission}
 #import canopy::sky::{apply_fog, night_vision}
 #import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
 
@@ -100,9 +100,11 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     var surface: Surface;
     surface.albedo = mix(texel.rgb, tint_foliage(texel.rgb, in.look.w), foliage);
     surface.normal = normal;
-    surface.transmission = in.crown.rgb * foliage;
+    let gloss = variants[in.layer / PLANES].gloss.xyz;
+    surface.transmission = leaf_transmission(texel.rgb, in.crown.rgb, gloss.x) * foliage;
     surface.viewer = -normalize(in.relative);
     surface.spread = leaf_spread(in.layer / PLANES, level) * foliage;
+    surface.gloss = vec3(gloss.x * foliage, gloss.y, max(surface.spread, gloss.z));
     let map = ground_map(in.relative);
     let traced = variants[in.layer / PLANES].transmission.w > 0.5;
     surface.ambient = select(scattered(properties.b), properties.b, traced) * stand_ambient(in.look.z, map.y);

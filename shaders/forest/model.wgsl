@@ -1,18 +1,20 @@
 // The full model of a tree, near the camera.
 #import canopy::frame::{frame, light}
 #import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, model_threshold, tint_foliage, stand_ambient, scattered, leaf_visibility}
-#import canopy::lighting::{Surface, shade, even_sky}
+#import canopy::lighting::{Surface, shade, exitant, even_sky, leaf_transmission}
 #import canopy::sky::{apply_fog, night_vision}
 #import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
 
 #ifdef TRANSFER
-#import canopy::transfer::side_light
+#import canopy::transfer::{side_light, SUN_ROWS}
 #endif
 
 struct Part {
     base_color: vec4<f32>,
     // w: 1 where normals point out of the crown, whichever side of a leaf is seen.
     transmission: vec4<f32>,
+    // Reflectance, roughness.
+    gloss: vec4<f32>,
 }
 
 // Length of a stored normal whose ambient visibility is zero.
@@ -44,6 +46,11 @@ struct Varying {
     @location(5) @interpolate(perspective, centroid) front_sky: vec3<f32>,
     @location(6) @interpolate(perspective, centroid) back_sky: vec3<f32>,
 #endif
+#ifdef SUN_HARMONICS
+    // The same of the sun.
+    @location(7) @interpolate(perspective, centroid) front_sun: vec3<f32>,
+    @location(8) @interpolate(perspective, centroid) back_sun: vec3<f32>,
+#endif
 }
 
 @vertex
@@ -68,6 +75,14 @@ fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index
     out.back_sky = side_light(vertex, 1u, tree.yaw_code);
 #else
     out.back_sky = vec3(0.0);
+#endif
+#endif
+#ifdef SUN_HARMONICS
+    out.front_sun = side_light(vertex, 0u, SUN_ROWS + tree.yaw_code);
+#ifdef FOLIAGE
+    out.back_sun = side_light(vertex, 1u, SUN_ROWS + tree.yaw_code);
+#else
+    out.back_sun = vec3(0.0);
 #endif
 #endif
     return out;
@@ -104,6 +119,9 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
     var normal = normalize(in.normal);
     var coverage = 1.0;
 #ifdef FOLIAGE
+    let across = fwidth(in.uv);
+#endif
+#ifdef FOLIAGE
     let alpha = texel.a;
 #ifdef ALPHA_TO_COVERAGE
     coverage = clamp((alpha - in.threshold) / max(fwidth(alpha), 1e-4) + 0.5, 0.0, 1.0);
@@ -128,10 +146,14 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
     var surface: Surface;
     surface.albedo = texel.rgb * part.base_color.rgb;
 #ifdef FOLIAGE
+    surface.transmission = leaf_transmission(surface.albedo, part.transmission.rgb, part.gloss.x);
     surface.albedo = tint_foliage(surface.albedo, in.look.w);
+    surface.viewer = -normalize(in.relative);
+    // A pixel that covers half a picture of leaves covers several such pictures, and each faces elsewhere: highlights of one
+    // would sparkle. Normals that point out of the crown are no leaf's at all.
+    surface.gloss = vec3(part.gloss.xy, max(saturate(2.0 * max(across.x, across.y)), part.transmission.w));
 #endif
     surface.normal = normal;
-    surface.transmission = part.transmission.rgb;
     let map = ground_map(in.relative);
     let stand = stand_ambient(in.look.z, map.y);
 #ifdef TRANSFER
@@ -156,7 +178,17 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
     visibility *= leaf_visibility(in.look.x);
 #endif
 #endif
+#ifdef SUN_HARMONICS
+#ifdef FOLIAGE
+    let near_sun = select(in.front_sun, in.back_sun, behind);
+    let far_sun = select(in.back_sun, in.front_sun, behind);
+    var color = exitant(surface, near_sun, far_sun, visibility, sky);
+#else
+    var color = exitant(surface, in.front_sun, vec3(0.0), visibility, sky);
+#endif
+#else
     var color = shade(surface, visibility, sky);
+#endif
     color = mix(color, vec3(0.15, 0.9, 0.2) * dot(color, vec3(0.5)), 0.6 * frame.flags.y);
     return vec4(night_vision(apply_fog(color, in.relative)), coverage);
 }

@@ -11,11 +11,14 @@ struct Transfer {
 
 // Coefficients from one yaw's light to the next.
 const STRIDE: u32 = 36u;
+// The first row of the sun's light.
+const SUN_ROWS: u32 = 256u;
 
-// The surroundings' light as a plant of each yaw sees it.
+// The surroundings' light as a plant of each yaw sees it, then, where a plant wants it, the sun's.
 @group(3) @binding(0) var<storage, read> turned_light: array<vec4<f32>>;
 @group(3) @binding(1) var<storage, read> coefficients: array<u32>;
-@group(3) @binding(2) var<uniform> transfer: Transfer;
+// No uniform: its values steer loops, and lavapipe compiles a shader again for every binding of such a buffer.
+@group(3) @binding(2) var<storage, read> transfer: Transfer;
 
 fn snorm_at(byte: u32) -> f32 {
     return f32(extractBits(bitcast<i32>(coefficients[byte / 4u]), 8u * (byte % 4u), 8u)) / 127.0;
@@ -27,8 +30,9 @@ fn half_at(byte: u32) -> f32 {
     return bitcast<f32>(bits << 13u) * 5.192297e33;
 }
 
-// Irradiance over pi that the surroundings bring to a side of a vertex: 0 the normal's, 1 the other.
-fn side_light(vertex: u32, side: u32, yaw: u32) -> vec3<f32> {
+// Irradiance over pi that the light of a row brings to a side of a vertex: 0 the normal's, 1 the other. The row is the
+// tree's yaw for the surroundings, SUN_ROWS more for the sun.
+fn side_light(vertex: u32, side: u32, row: u32) -> vec3<f32> {
     let channels = transfer.form.w;
     let colored = channels == 3u;
     let first = 4u * vertex * transfer.form.x + side * transfer.form.y;
@@ -36,7 +40,7 @@ fn side_light(vertex: u32, side: u32, yaw: u32) -> vec3<f32> {
     if colored {
         mean = vec3(mean.x, half_at(first + 2u), half_at(first + 4u));
     }
-    let light = yaw * STRIDE;
+    let light = row * STRIDE;
     var sum = turned_light[light].rgb;
     var byte = first + 2u * channels;
     for (var band = 1u; band < transfer.form.z; band += 1u) {

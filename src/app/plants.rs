@@ -12,12 +12,13 @@ use crate::{
         transfer::{Channels, Interior, TransferSettings},
     },
     plant::{
-        Plant,
+        Gloss, Plant,
         gltf::{GltfOptions, load_plant},
         grow::{GrowParameters, grow},
     },
+    render::components::SunLight,
     scatter::packed::MAX_VARIANTS,
-    scene::{AmbientTerm, CrownNormals, GrownForm, Lighting, PlantSource, Quality, Scene, Species},
+    scene::{self, AmbientTerm, CrownNormals, GrownForm, Lighting, PlantSource, Quality, Scene, Species},
 };
 
 /// How one individual is made.
@@ -69,8 +70,22 @@ impl IndividualSource {
 pub struct Individual {
     /// How it is made.
     pub source: IndividualSource,
+    /// The gloss of its leaves.
+    pub gloss: Gloss,
     /// How its foliage is lit.
     pub lighting: LightingSettings,
+}
+
+impl Individual {
+    /// Makes the plant with its gloss; the strings are warnings.
+    ///
+    /// # Errors
+    /// Those of [`IndividualSource::build`].
+    pub fn build(&self) -> Result<(Plant, Vec<String>), AppError> {
+        let (mut plant, warnings) = self.source.build()?;
+        plant.set_leaf_gloss(self.gloss);
+        Ok((plant, warnings))
+    }
 }
 
 /// All individuals of a scene, and which belong to which species.
@@ -91,7 +106,9 @@ pub fn plan(scene: &Scene) -> Result<PlantPlan, AppError> {
     for species in &scene.species {
         let first = plan.individuals.len();
         let lighting = lighting_settings(species.lighting.as_ref());
-        let individuals = sources(species)?.into_iter().map(|source| Individual { source, lighting });
+        let gloss =
+            Gloss { reflectance: species.gloss.share as f32, roughness: species.gloss.roughness as f32 }.in_range();
+        let individuals = sources(species)?.into_iter().map(|source| Individual { source, gloss, lighting });
         plan.individuals.extend(individuals);
         plan.variants.push(first as u16..plan.individuals.len() as u16);
     }
@@ -138,6 +155,14 @@ fn sources(species: &Species) -> Result<Vec<IndividualSource>, AppError> {
                 .collect()
         }
     })
+}
+
+/// What a species' light asks of the pass.
+pub fn sun_light(lighting: Option<&Lighting>) -> SunLight {
+    match lighting {
+        Some(Lighting::Transfer(scene::Transfer { sun: scene::SunLight::Harmonics, .. })) => SunLight::Harmonics,
+        _ => SunLight::LeafShader,
+    }
 }
 
 /// What a species' light asks of the bake.

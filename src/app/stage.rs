@@ -11,7 +11,7 @@ use crate::{
     light::{MoonSetting, sun::Observer},
     lod::FadeBand,
     render::{
-        components::{Forest, Ground, SunShadowSettings},
+        components::{Forest, Ground, SunLight, SunShadowSettings},
         daylight::SkySettings,
     },
     scatter::{CoverMap, PackedStand, VariantBounds, cover_map, packed::DEFAULT_CELL_SIZE},
@@ -36,6 +36,8 @@ pub struct Stage {
     pub plants: Arc<Vec<BakedPlant>>,
     /// Variants of each of the scene's species.
     pub variants: Vec<Range<u16>>,
+    /// How the sun lights each.
+    pub suns: Arc<[SunLight]>,
     /// Share of ground under crowns; `None` without trees.
     pub cover: Option<Arc<CoverMap>>,
     /// Place on earth.
@@ -80,8 +82,12 @@ impl Stage {
         if has_trees && stand.trees.is_empty() {
             progress.warn("the scene's rules leave no place for any tree: only the ground is drawn");
         }
+        let sun = |(species, variants): (&scene::Species, &Range<u16>)| {
+            std::iter::repeat_n(plants::sun_light(species.lighting.as_ref()), variants.len())
+        };
+        let suns = scene.species.iter().zip(&species.variants).flat_map(sun).collect();
         let (stand, plants, variants) = (Arc::new(packed), Arc::new(plants), species.variants);
-        Ok(Self { terrain, stand, plants, variants, cover, observer, scene })
+        Ok(Self { terrain, stand, plants, variants, suns, cover, observer, scene })
     }
 
     /// The forest of the scene, or `None` without trees.
@@ -90,6 +96,7 @@ impl Stage {
         (!self.stand.trees.is_empty()).then(|| Forest {
             stand: self.stand.clone(),
             plants: self.plants.clone(),
+            suns: self.suns.clone(),
             origin: DVec3::ZERO,
             fade: FadeBand::new(quality.near_distance as f32, quality.fade_band as f32),
             view_distance: quality.view_distance as f32,
@@ -178,7 +185,7 @@ fn bake(
         let results: Vec<_> = group
             .par_iter()
             .map(|individual| {
-                let (plant, mut warnings) = individual.source.build()?;
+                let (plant, mut warnings) = individual.build()?;
                 let settings = plants::bake_settings(quality, individual.lighting);
                 let baked = bake_plant(Arc::new(plant), &settings, cache.as_ref());
                 warnings.extend(baked.0.lighting.warning().map(|what| format!("{}: {what}", baked.0.plant.name)));

@@ -52,7 +52,8 @@ pub struct Common {
     /// Samples per pixel, 1 (rough leaf edges, faster) or 4, instead of what the scene asks for.
     #[arg(long, global = true, value_name = "1|4", value_parser = parse_samples)]
     pub msaa: Option<u32>,
-    /// Light of all foliage: local, expressive or transfer [default: each species' own].
+    /// Light of all foliage: local, expressive, transfer or harmonics (transfer for the sun too) [default: each species'
+    /// own].
     #[arg(long, global = true, value_name = "LIGHT", value_parser = parse_lighting)]
     pub lighting: Option<Lighting>,
     /// Say which passes ran, which were skipped, and why.

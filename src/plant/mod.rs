@@ -3,6 +3,7 @@
 //! A [`Plant`] comes from a glTF file ([`gltf`]) or is grown by rule ([`grow`]). It stands with its trunk's
 //! foot at the origin, Y up, in metres. Everything downstream (bakes, levels of detail, passes) reads this type.
 
+mod gloss;
 pub mod gltf;
 pub mod grow;
 pub mod texture;
@@ -11,6 +12,8 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 use image::RgbaImage;
+
+pub use gloss::Gloss;
 
 /// One individual plant in its own frame: metres, Y up, the trunk's foot at the origin.
 #[derive(Clone, Debug, Default)]
@@ -66,9 +69,11 @@ pub struct PlantMaterial {
     pub normal_texture: Option<Arc<RgbaImage>>,
     /// Threshold of the alpha test, 0..1; foliage only.
     pub alpha_cutoff: f32,
-    /// Linear colour of the light that passes diffusely through a leaf, as a factor on the base colour, 0..1 each;
-    /// zero for wood.
+    /// Linear colour of the light that passes diffusely through a leaf, as a factor on what its inside reflects (its base
+    /// colour without its [`Gloss`]), 0..2 each; zero for wood. [`PlantMaterial::transmitted`] gives the light itself.
     pub transmission: Vec3,
+    /// What the surface of a leaf reflects; wood is matt.
+    pub gloss: Gloss,
 }
 
 impl Default for PlantMaterial {
@@ -79,6 +84,7 @@ impl Default for PlantMaterial {
             normal_texture: None,
             alpha_cutoff: 0.5,
             transmission: Vec3::ZERO,
+            gloss: Gloss::MATT,
         }
     }
 }

@@ -37,12 +37,25 @@ pub struct Forest {
     pub stand: Arc<PackedStand>,
     /// The plants, indexed by the trees' variant; at most 64.
     pub plants: Arc<Vec<BakedPlant>>,
+    /// How the sun lights each plant; [`SunLight::LeafShader`] where the list ends.
+    pub suns: Arc<[SunLight]>,
     /// Scene position in metres of the stand's own origin.
     pub origin: DVec3,
     /// Where full models give way to billboards.
     pub fade: FadeBand,
     /// Metres beyond which trees are not drawn.
     pub view_distance: f32,
+}
+
+/// How the sun (or the moon, where it is the brighter) lights a plant's full models.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum SunLight {
+    /// Each leaf by the angle of its own normal to the sun, front and back [Franzke 2005, 4.2.2].
+    #[default]
+    LeafShader,
+    /// The sun projected onto spherical harmonics, through the plant's transfer, dimmed by the shadow map [Franzke 2005,
+    /// 4.3.3]. Only for plants that are lit by transfer; others, and crosses, take the leaf shader.
+    Harmonics,
 }
 
 /// The ground under everything.

@@ -29,11 +29,25 @@ pub struct Transfer {
     pub rays: u32,
     /// How often light is followed from leaf to leaf, 0 to 8; 0: straight through leaves only. Default 3.
     pub bounces: u32,
+    /// How the sun lights full models; costs no bake of its own. Default `LeafShader`.
+    pub sun: SunLight,
+}
+
+/// How the sun lights foliage whose sky comes by radiance transfer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+pub enum SunLight {
+    /// Each leaf by the angle of its own normal to the sun [Franzke 2005, 4.2.2]: sharp, and true.
+    #[default]
+    LeafShader,
+    /// As published for landscapes [Franzke 2005, 4.3.3]: through the transfer as the sky, and dimmed by the shadow map. A
+    /// few bands hold no disc, and the plant's own shadow counts twice: soft and dark, to compare with. Crosses keep
+    /// `LeafShader`.
+    Harmonics,
 }
 
 impl Default for Transfer {
     fn default() -> Self {
-        Self { bands: 4, color: false, rays: 1024, bounces: 3 }
+        Self { bands: 4, color: false, rays: 1024, bounces: 3, sun: SunLight::LeafShader }
     }
 }
 
@@ -141,6 +155,7 @@ impl Lighting {
                 field(transfer.color != default.color, format!("color: {}", transfer.color));
                 field(transfer.rays != default.rays, format!("rays: {}", transfer.rays));
                 field(transfer.bounces != default.bounces, format!("bounces: {}", transfer.bounces));
+                field(transfer.sun != default.sun, format!("sun: {:?}", transfer.sun));
                 "Transfer"
             }
         };

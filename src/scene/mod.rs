@@ -44,7 +44,7 @@ mod trees;
 pub use camera::{Camera, PathKey, Pose, Viewpoint};
 pub use error::{Problem, SceneError};
 pub use ground::{Coordinates, Crop, Ground, GroundFile, GroundFlat, GroundImage, GroundNoise, Surroundings};
-pub use lighting::{AmbientTerm, CrownNormals, Expressive, Lighting, Transfer};
+pub use lighting::{AmbientTerm, CrownNormals, Expressive, Lighting, SunLight, Transfer};
 pub use locate::Position;
 pub use overrides::Overrides;
 pub use parse::{ArgumentError, parse_lighting, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size};
@@ -55,7 +55,7 @@ pub use quality::Quality;
 pub use request::{
     Clock, FlyOptions, Pictures, Progress, ReferenceOptions, RenderOptions, RenderReport, Silent, Still, View,
 };
-pub use species::{GltfPlants, GrownForm, GrownPlants, PlantSource, Species};
+pub use species::{GltfPlants, GrownForm, GrownPlants, LeafGloss, PlantSource, Species};
 pub use time::{LocalTime, TimeError, YEARS};
 pub use trees::{Anchor, Area, Clearings, InventoryTrees, LengthUnit, ScatteredTrees, Sequence, Trees};
 

@@ -9,7 +9,8 @@ pub struct Overrides {
     pub seed: Option<u64>,
     /// Samples per pixel, 1 or 4.
     pub msaa: Option<u32>,
-    /// The light of all species. A species that has this kind of light already keeps its own values.
+    /// The light of all species. A species that has this kind of light already keeps its own values, but for how the sun
+    /// lights it.
     pub lighting: Option<Lighting>,
 }
 
@@ -21,8 +22,10 @@ impl Overrides {
         let Some(lighting) = &self.lighting else { return };
         for species in &mut scene.species {
             let kind = |lighting: &Lighting| std::mem::discriminant(lighting);
-            if species.lighting.as_ref().map(kind) != Some(kind(lighting)) {
-                species.lighting = Some(lighting.clone());
+            match (&mut species.lighting, lighting) {
+                (Some(Lighting::Transfer(own)), Lighting::Transfer(given)) => own.sun = given.sun,
+                (Some(own), given) if kind(own) == kind(given) => {}
+                (own, given) => *own = Some(given.clone()),
             }
         }
     }

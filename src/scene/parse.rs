@@ -1,7 +1,7 @@
 //! Texts of the command line to values.
 
 use super::camera::Pose;
-use super::lighting::{Expressive, Lighting, Transfer};
+use super::lighting::{Expressive, Lighting, SunLight, Transfer};
 
 /// Why an argument is not what it should be.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -10,7 +10,7 @@ pub enum ArgumentError {
     #[error("`{0}` is no size; write width and height in pixels, each at least 1, as in 1280x720")]
     Size(String),
     /// Not a kind of light.
-    #[error("`{0}` is no light; write local, expressive or transfer")]
+    #[error("`{0}` is no light; write local, expressive, transfer or harmonics")]
     Lighting(String),
     /// Not a number of samples.
     #[error("`{0}` samples per pixel: write 1 (off) or 4")]
@@ -41,7 +41,8 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), ArgumentError> {
     size.filter(|(width, height)| *width > 0 && *height > 0).ok_or_else(|| ArgumentError::Size(text.to_owned()))
 }
 
-/// Reads the name of a light: `local`, `expressive` or `transfer`, with all its default values.
+/// Reads the name of a light: `local`, `expressive` or `transfer`, with all its default values, or `harmonics`: transfer with
+/// the sun by [`SunLight::Harmonics`].
 ///
 /// # Errors
 /// [`ArgumentError::Lighting`].
@@ -49,6 +50,7 @@ pub fn parse_lighting(text: &str) -> Result<Lighting, ArgumentError> {
     match text.trim() {
         "local" => Ok(Lighting::Local),
         "transfer" => Ok(Lighting::Transfer(Transfer::default())),
+        "harmonics" => Ok(Lighting::Transfer(Transfer { sun: SunLight::Harmonics, ..Transfer::default() })),
         "expressive" => Ok(Lighting::Expressive(Expressive::default())),
         _ => Err(ArgumentError::Lighting(text.to_owned())),
     }

@@ -171,7 +171,7 @@ impl PlantTracer {
         let base_color = self.surfaces[hit.part as usize].color(uv);
         let transmission = match part.kind {
             PartKind::Wood => Vec3::ZERO,
-            PartKind::Foliage => base_color * part.material.transmission,
+            PartKind::Foliage => part.material.transmitted(base_color),
         };
         SurfacePoint {
             position: a + (b - a) * hit.u + (c - a) * hit.v,

@@ -59,8 +59,8 @@ fn describe(page: &mut Page, scene: &Scene, path: &Path) -> Result<(), AppError>
     let observer = stage::observer(scene, &ground, path)?;
     let plan = plants::plan(scene)?;
     let mut individuals = Vec::with_capacity(plan.individuals.len());
-    for source in plan.individuals.iter().map(|individual| &individual.source) {
-        let (plant, warnings) = source.build()?;
+    for individual in &plan.individuals {
+        let (plant, warnings) = individual.build()?;
         heard.warnings.extend(warnings);
         individuals.push(unbaked(plant));
     }

@@ -33,8 +33,8 @@ pub struct Cross {
     pub planes: Vec<CrossPlane>,
     /// Their pictures, in the order of the planes.
     pub textures: CrossTextures,
-    /// Linear transmission colour of the foliage (mean over its area), a factor on the base colour as in
-    /// [`crate::plant::PlantMaterial::transmission`], 0..1 each; applies to texels in the measure of their foliage.
+    /// Transmission of the foliage (mean over its area), a factor as in [`crate::plant::PlantMaterial::transmission`], 0..2
+    /// each; applies to texels in the measure of their foliage.
     pub transmission: Vec3,
     /// Share of the leaves in a texel that face everywhere alike, 0..1, for each of the pictures' first mips (the last one
     /// stands for all that follow): what their mean normal no longer tells. 0: one leaf with the texel's normal.
@@ -195,7 +195,7 @@ fn mean_transmission(plant: &Plant) -> Vec3 {
         total += area as f32;
     }
     let mean = sum / total;
-    if mean.is_finite() { mean.clamp(Vec3::ZERO, Vec3::ONE) } else { Vec3::ZERO }
+    if mean.is_finite() { mean.clamp(Vec3::ZERO, Vec3::splat(2.0)) } else { Vec3::ZERO }
 }
 
 /// The mean of a texel's samples. All but `coverage` are weighted with it: sums over the samples that see the plant,

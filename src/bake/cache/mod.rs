@@ -52,6 +52,8 @@ impl CacheKey {
             list(bytemuck::bytes_of(&material.base_color));
             list(bytemuck::bytes_of(&material.alpha_cutoff));
             list(bytemuck::bytes_of(&material.transmission));
+            // Its roughness is read by no bake.
+            list(bytemuck::bytes_of(&material.gloss.reflectance));
             match &material.base_color_texture {
                 Some(image) => {
                     list(&image.width().to_le_bytes());

@@ -11,7 +11,7 @@ use image::{ImageReader, Limits, RgbaImage};
 use super::container::Document;
 use super::error::{WarningKind, Warnings};
 use super::{GltfOptions, LEAF_TRANSMISSION};
-use crate::plant::{PartKind, PlantMaterial};
+use crate::plant::{Gloss, PartKind, PlantMaterial};
 
 /// Longest side of an image in texels that is decoded.
 const LONGEST_SIDE: u32 = 16_384;
@@ -98,9 +98,12 @@ pub(super) fn read(
         normal_texture: None,
         alpha_cutoff: 0.5,
         transmission: Vec3::ZERO,
+        gloss: Gloss::MATT,
     };
     if kind == PartKind::Foliage {
-        material.transmission = options.transmission.map_or(LEAF_TRANSMISSION, |t| t.map(unit));
+        material.transmission =
+            options.transmission.map_or(LEAF_TRANSMISSION, |t| t.map(|factor| 2.0 * unit(0.5 * factor)));
+        material.gloss = Gloss::LEAF;
         let cutoff = unit(source.alpha_cutoff.as_ref().map_or(0.5, |cutoff| cutoff.0));
         // The factor's alpha scales the texture's; the threshold is scaled instead, to the same effect.
         let masked = source.alpha_mode == Checked::Valid(AlphaMode::Mask);

@@ -31,14 +31,13 @@ use super::{PartKind, Plant, PlantMesh, PlantPart};
 use error::{EXPORT_AGAIN, Fault, Warnings};
 use material::{Images, Surface};
 
-/// The default of [`super::PlantMaterial::transmission`] for foliage: greenish yellow.
+/// The default of [`super::PlantMaterial::transmission`] for foliage, as glTF has no field for it that is in wide use.
 ///
-/// A leaf's transmittance over its reflectance, band by band. In the plate model of a leaf [Jacquemoud & Baret
-/// 1990, "PROSPECT"] both come from the same scattering inside, so they are nearly equal where the leaf absorbs little
-/// (green). Where chlorophyll absorbs (red, and more so blue) reflectance keeps what the surface reflects, about 4 %,
-/// and transmittance all but vanishes. The three numbers round the ratios of a typical green leaf over the bands of
-/// the primaries; glTF has no field for them that is in wide use.
-pub const LEAF_TRANSMISSION: Vec3 = Vec3::new(0.6, 0.95, 0.2);
+/// A leaf's transmittance over what its inside reflects. In the plate model of a leaf [Jacquemoud & Baret 1990, "PROSPECT"]
+/// both come from the same scattering, so they have the same colour, and what tells the light through a leaf from the light
+/// of its face is the colourless share that the surface reflects ([`super::Gloss`]). A typical green leaf reflects 12 % and
+/// transmits 10 % of green light; without the surface's 4.5 % that is a ratio of 1.3.
+pub const LEAF_TRANSMISSION: Vec3 = Vec3::splat(1.3);
 
 /// A plant that stands farther off than this share of its height is moved to the origin.
 const FAR_OFF: f32 = 0.1;
@@ -56,7 +55,8 @@ pub struct GltfOptions {
     pub foliage_materials: Vec<String>,
     /// Names of materials that are wood whatever their alpha mode.
     pub wood_materials: Vec<String>,
-    /// Light through leaves as a linear factor on the base colour, 0..1 each; `None` takes [`LEAF_TRANSMISSION`].
+    /// Light through leaves, as [`super::PlantMaterial::transmission`] has it, 0..2 each; `None` takes
+    /// [`LEAF_TRANSMISSION`].
     pub transmission: Option<Vec3>,
     /// Name of the plant; `None` takes the file's name without its ending.
     pub name: Option<String>,

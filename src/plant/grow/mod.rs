@@ -30,7 +30,7 @@ pub use parameters::{
     StemParameters,
 };
 
-use super::{PartKind, Plant, PlantMaterial, PlantPart};
+use super::{Gloss, PartKind, Plant, PlantMaterial, PlantPart};
 use random::Random;
 
 /// The numbers of triangles that a plant can be grown with.
@@ -112,6 +112,7 @@ pub fn grow(species: &GrowParameters, seed: u64, triangles: usize) -> Result<Pla
                     base_color_texture: Some(cluster),
                     alpha_cutoff: 0.5,
                     transmission: Vec3::from(species.leaves.transmission),
+                    gloss: Gloss::LEAF,
                     ..PlantMaterial::default()
                 },
             },

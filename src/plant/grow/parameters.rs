@@ -154,8 +154,8 @@ pub struct LeafParameters {
     pub tint: [f32; 3],
     /// Largest deviation of an individual's tint as a fraction, 0 to 0.5. Default 0.12.
     pub tint_variation: f32,
-    /// Linear colour of the light that passes through, as a factor on the colour, 0 to 1 each.
-    /// Default (0.6, 0.75, 0.25).
+    /// Linear colour of the light that passes through, as a factor on the colour without the leaves' gloss, 0 to 2 each.
+    /// Default (1.3, 1.3, 1.3).
     pub transmission: [f32; 3],
 }
 
@@ -379,7 +379,7 @@ impl LeafParameters {
         check("leaves.shell", self.shell, 0.0, 1.0)?;
         check("leaves.tint_variation", self.tint_variation, 0.0, 0.5)?;
         check_color("leaves.tint", self.tint)?;
-        check_color("leaves.transmission", self.transmission)
+        check_factors("leaves.transmission", self.transmission, 2.0)
     }
 }
 
@@ -393,5 +393,9 @@ fn check(field: &str, value: f32, low: f32, high: f32) -> Result<(), GrowError> 
 }
 
 fn check_color(field: &str, color: [f32; 3]) -> Result<(), GrowError> {
-    color.iter().enumerate().try_for_each(|(i, &value)| check(&format!("{field}[{i}]"), value, 0.0, 1.0))
+    check_factors(field, color, 1.0)
+}
+
+fn check_factors(field: &str, factors: [f32; 3], high: f32) -> Result<(), GrowError> {
+    factors.iter().enumerate().try_for_each(|(i, &value)| check(&format!("{field}[{i}]"), value, 0.0, high))
 }

@@ -177,7 +177,7 @@ impl GrowParameters {
                 shell: 0.25,
                 tint: [0.82, 0.84, 0.9],
                 tint_variation: 0.1,
-                transmission: [0.35, 0.45, 0.16],
+                transmission: [0.8, 0.8, 0.8],
             },
             bark: BarkParameters { kind: BarkKind::Scaly, tile: 0.6, tint: [1.0, 1.0, 1.0] },
             wood_share: 0.28,
@@ -243,7 +243,7 @@ impl Default for LeafParameters {
             shell: 0.65,
             tint: [0.62, 0.66, 0.72],
             tint_variation: 0.12,
-            transmission: [0.6, 0.75, 0.25],
+            transmission: [1.3, 1.3, 1.3],
         }
     }
 }

@@ -11,7 +11,7 @@ use bevy::{
     },
 };
 
-use super::{ForestPipelines, GpuForests, PreparedForests};
+use super::{ForestPipelines, GpuForests, PreparedForests, resources::PartLight};
 use crate::{
     plant::PartKind,
     render::{components::CanopyCamera, frame::FrameBindGroup},
@@ -37,15 +37,16 @@ pub fn forest_pass(
         prepared.get(entity).is_some_and(|forest| forest.lists.model_count() + forest.lists.cross_count() > 0)
     });
     let ready = |id| cache.get_render_pipeline(id);
-    let [wood, foliage] = current.models.map(ready);
-    let transfer = current.transfer.map(|ids| ids.map(ready));
-    let (Some(wood), Some(foliage), Some(crosses)) = (wood, foliage, ready(current.crosses)) else { return };
-    let (traced_wood, traced_foliage) = match transfer {
-        Some([Some(wood), Some(foliage)]) => (wood, foliage),
-        Some(_) => return,
-        // No part asks for these.
-        None => (wood, foliage),
-    };
+    let Some(crosses) = ready(current.crosses) else { return };
+    let mut models = Vec::with_capacity(2 * PartLight::ALL.len());
+    for (light, ids) in PartLight::ALL.into_iter().zip(current.models) {
+        for (kind, id) in [PartKind::Wood, PartKind::Foliage].into_iter().zip(ids.into_iter().flatten()) {
+            let Some(pipeline) = ready(id) else { return };
+            models.push((kind, light, pipeline));
+        }
+    }
+    // All wood first: what it hides of the leaves is not shaded.
+    models.sort_by_key(|(kind, ..)| *kind == PartKind::Foliage);
     if !something {
         return;
     }
@@ -67,18 +68,13 @@ pub fn forest_pass(
         let Some(lists) = prepared.get(entity) else { continue };
         pass.set_bind_group(0, frame, &[]);
         pass.set_bind_group(1, &lists.bind_group, &[0]);
-        for (kind, traced, pipeline) in [
-            (PartKind::Wood, false, wood),
-            (PartKind::Wood, true, traced_wood),
-            (PartKind::Foliage, false, foliage),
-            (PartKind::Foliage, true, traced_foliage),
-        ] {
+        for &(kind, light, pipeline) in &models {
             pass.set_render_pipeline(pipeline);
             for (range, parts) in lists.lists.models.iter().zip(&forest.parts) {
                 if range.is_empty() {
                     continue;
                 }
-                for part in parts.iter().filter(|part| part.kind == kind && part.transfer.is_some() == traced) {
+                for part in parts.iter().filter(|part| part.kind == kind && part.light == light) {
                     if part.model.index_count == 0 {
                         continue;
                     }

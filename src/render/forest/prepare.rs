@@ -22,8 +22,7 @@ use bevy::{
 use glam::{DVec3, IVec2};
 
 use super::{
-    resources::{ForestLayouts, ForestViewUniform, GpuForest, GpuForests},
-    transfer::TransferLight,
+    resources::{ForestLayouts, ForestViewUniform, GpuForest, GpuForests, PartLight},
     vertex::PlantVertex,
 };
 use crate::{
@@ -162,7 +161,7 @@ pub fn prepare_view_lists(
 /// What a pipeline of the forest pass depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum PipelineKey {
-    Model { kind: PartKind, transfer: bool, format: TextureFormat, samples: u32 },
+    Model { kind: PartKind, light: PartLight, format: TextureFormat, samples: u32 },
     Cross { format: TextureFormat, samples: u32 },
 }
 
@@ -177,10 +176,8 @@ pub struct ForestPipelines {
 /// Pipelines of one view.
 #[derive(Clone, Copy, Debug)]
 pub struct CurrentPipelines {
-    /// Wood, foliage.
-    pub models: [CachedRenderPipelineId; 2],
-    /// The same of plants that are lit by radiance transfer, where there are any.
-    pub transfer: Option<[CachedRenderPipelineId; 2]>,
+    /// Wood and foliage in each light of [`PartLight::ALL`] that a plant has; `None` for the others.
+    pub models: [Option<[CachedRenderPipelineId; 2]>; 3],
     /// Crosses.
     pub crosses: CachedRenderPipelineId,
 }
@@ -190,9 +187,9 @@ pub fn prepare_pipelines(
     frame: Res<PreparedFrame>,
     frame_layout: Res<FrameLayout>,
     layouts: Res<ForestLayouts>,
+    forests: Res<GpuForests>,
     shaders: Res<CanopyShaders>,
     cache: Res<PipelineCache>,
-    light: Res<TransferLight>,
     mut pipelines: ResMut<ForestPipelines>,
 ) {
     let Some(view) = &frame.view else {
@@ -206,12 +203,15 @@ pub fn prepare_pipelines(
             .entry(key)
             .or_insert_with(|| cache.queue_render_pipeline(describe(key, &frame_layout.0, &layouts, &shaders)))
     };
-    let mut models = |transfer| {
-        [PartKind::Wood, PartKind::Foliage].map(|kind| pipeline(PipelineKey::Model { kind, transfer, format, samples }))
-    };
-    let (plain, transfer) = (models(false), light.is_used().then(|| models(true)));
+    let models = PartLight::ALL.map(|light| {
+        let mut parts = forests.iter().flat_map(|(_, forest)| forest.parts.iter().flatten());
+        parts.any(|part| part.light == light).then(|| {
+            [PartKind::Wood, PartKind::Foliage]
+                .map(|kind| pipeline(PipelineKey::Model { kind, light, format, samples }))
+        })
+    });
     let crosses = pipeline(PipelineKey::Cross { format, samples });
-    pipelines.current = Some(CurrentPipelines { models: plain, transfer, crosses });
+    pipelines.current = Some(CurrentPipelines { models, crosses });
 }
 
 fn describe(
@@ -220,7 +220,10 @@ fn describe(
     layouts: &ForestLayouts,
     shaders: &CanopyShaders,
 ) -> RenderPipelineDescriptor {
-    let transfer = matches!(key, PipelineKey::Model { transfer: true, .. });
+    let light = match key {
+        PipelineKey::Model { light, .. } => light,
+        PipelineKey::Cross { .. } => PartLight::Plain,
+    };
     let (label, path, group, buffers, format, samples, foliage, cull_mode) = match key {
         PipelineKey::Model { kind, format, samples, .. } => {
             let foliage = kind == PartKind::Foliage;
@@ -238,9 +241,12 @@ fn describe(
         defs.push("FOLIAGE".into());
     }
     let mut layout = vec![frame.clone(), layouts.instances.clone(), group];
-    if transfer {
+    if light != PartLight::Plain {
         defs.push("TRANSFER".into());
         layout.push(layouts.transfer.clone());
+    }
+    if light == PartLight::Harmonics {
+        defs.push("SUN_HARMONICS".into());
     }
     let to_coverage = samples > 1 && foliage;
     if to_coverage {

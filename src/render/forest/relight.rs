@@ -12,7 +12,7 @@ use bevy::render::{
 };
 
 use super::{
-    resources::{self, ForestLayouts, GpuForest, PLANES, VariantUniform},
+    resources::{self, ForestLayouts, GpuForest, PLANES, PartLight, VariantUniform},
     transfer::TransferLight,
 };
 use crate::{
@@ -57,7 +57,9 @@ pub fn relight(
                 queue.write_buffer(&gpu_part.model.vertices, 0, bytemuck::cast_slice(&vertices));
                 queue.write_buffer(&gpu_part.uniform, 0, bytemuck::bytes_of(&uniform));
                 let traced = new.lighting.transfer(number);
-                gpu_part.transfer = traced.map(|part| transfer.bind_group(part, layouts, device, pipelines));
+                let sun = known.forest.suns.get(index).copied().unwrap_or_default();
+                gpu_part.light = PartLight::new(traced.is_some(), sun);
+                gpu_part.transfer = traced.map(|part| transfer.bind_group(part, sun, layouts, device, pipelines));
             }
         }
         // What a cross' pictures hold and what its variant says of them belong together.

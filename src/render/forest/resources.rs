@@ -36,7 +36,12 @@ use crate::{
         PartKind, PlantMaterial, PlantMesh,
         texture::{MipChain, color_mips, leaf_mips, normal_mips},
     },
-    render::{components::Forest, cull::VariantSize, extract::ExtractedScene, gpu},
+    render::{
+        components::{Forest, SunLight},
+        cull::VariantSize,
+        extract::ExtractedScene,
+        gpu,
+    },
     scatter::{PackedStand, PackedTree},
 };
 
@@ -87,6 +92,8 @@ pub struct VariantUniform {
     pub transmission: [f32; 4],
     /// How far the leaves of a texel face everywhere, mip by mip.
     pub spread: [[f32; 4]; SPREAD_LEVELS / 4],
+    /// Gloss of its leaves: reflectance, roughness, 1 where normals point out of the crown; unused.
+    pub gloss: [f32; 4],
 }
 
 /// `Part` of `shaders/forest/model.wgsl`.
@@ -97,6 +104,8 @@ pub struct PartUniform {
     pub base_color: [f32; 4],
     /// Transmission factor; w: 1 where the normals point out of the crown, whichever side of a leaf is seen.
     pub transmission: [f32; 4],
+    /// Gloss: reflectance, roughness; unused, unused.
+    pub gloss: [f32; 4],
 }
 
 /// Bind group layouts of everything that draws trees.
@@ -168,7 +177,10 @@ impl FromWorld for ForestLayouts {
                     (
                         storage_buffer_read_only_sized(false, None),
                         storage_buffer_read_only_sized(false, None),
-                        uniform_buffer_sized(false, std::num::NonZeroU64::new(size_of::<TransferUniform>() as u64)),
+                        storage_buffer_read_only_sized(
+                            false,
+                            std::num::NonZeroU64::new(size_of::<TransferUniform>() as u64),
+                        ),
                     ),
                 ),
             ),
@@ -200,8 +212,35 @@ pub struct GpuPart {
     pub proxy: GpuMesh,
     /// Group 2.
     pub bind_group: BindGroup,
+    /// Which pipeline draws it.
+    pub light: PartLight,
     /// Group 3 of plants that are lit by radiance transfer.
     pub transfer: Option<BindGroup>,
+}
+
+/// What light reaches a part's full model, and how.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PartLight {
+    /// Sky by normal and k_a, sun by the leaf shader.
+    Plain,
+    /// Sky by transfer, sun by the leaf shader.
+    Transfer,
+    /// Sky and sun by transfer.
+    Harmonics,
+}
+
+impl PartLight {
+    /// The light of a part that has transfer coefficients or not.
+    pub(super) fn new(traced: bool, sun: SunLight) -> Self {
+        match (traced, sun) {
+            (false, _) => Self::Plain,
+            (true, SunLight::LeafShader) => Self::Transfer,
+            (true, SunLight::Harmonics) => Self::Harmonics,
+        }
+    }
+
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Plain, Self::Transfer, Self::Harmonics];
 }
 
 /// A forest's GPU side.
@@ -268,6 +307,7 @@ pub fn prepare_forests(
         if let Some(known) = forests.forests.get_mut(entity)
             && Arc::ptr_eq(&known.stand, &forest.stand)
             && (Arc::ptr_eq(&known.plants, &forest.plants) || relight::differ_in_light(&known.plants, &forest.plants))
+            && known.forest.suns == forest.suns
         {
             if !Arc::ptr_eq(&known.plants, &forest.plants) {
                 relight::relight(known, &forest.plants, &layouts, &mut transfer, &device, &queue, &pipelines);
@@ -299,7 +339,11 @@ fn upload(
     let parts = forest
         .plants
         .iter()
-        .map(|plant| upload_parts(plant, layouts, &mut textures, transfer, device, queue, pipelines))
+        .enumerate()
+        .map(|(index, plant)| {
+            let sun = forest.suns.get(index).copied().unwrap_or_default();
+            upload_parts(plant, sun, layouts, &mut textures, transfer, device, queue, pipelines)
+        })
         .collect();
     let sizes: Vec<VariantSize> = forest.plants.iter().map(variant_size).collect();
     let (cross_properties, cross_bind_group) = upload_crosses(&forest.plants, layouts, device, queue, pipelines);
@@ -335,12 +379,19 @@ pub(super) fn variant(index: usize, plant: &BakedPlant, size: &VariantSize) -> V
         };
     }
     let traced = f32::from(u8::from(matches!(*plant.lighting, BakedLighting::Transfer(_))));
+    let gloss = plant.plant.leaf_gloss();
     VariantUniform {
         planes,
         size: [size.height, size.radius, (index * PLANES) as f32, 1.0],
         transmission: plant.cross.transmission.extend(traced).to_array(),
         spread: bytemuck::cast(plant.cross.spread),
+        gloss: [gloss.reflectance, gloss.roughness, realigned(&plant.lighting), 0.0],
     }
+}
+
+/// 1 where the foliage's normals point out of the crown.
+fn realigned(lighting: &BakedLighting) -> f32 {
+    f32::from(u8::from(lighting.is_realigned()))
 }
 
 /// What an image is used for: each use filters it otherwise.
@@ -398,8 +449,10 @@ fn plain(texel: [u8; 4]) -> MipChain {
     MipChain { width: 1, height: 1, levels: vec![texel.to_vec()] }
 }
 
+#[expect(clippy::too_many_arguments, reason = "what an upload needs")]
 fn upload_parts(
     plant: &BakedPlant,
+    sun: SunLight,
     layouts: &ForestLayouts,
     textures: &mut TextureShelf,
     transfer: &mut TransferLight,
@@ -413,8 +466,10 @@ fn upload_parts(
         let empty = PlantMesh::default();
         let proxy = plant.shadow_proxy.get(index).unwrap_or(&empty);
         let material = &part.material;
+        let coefficients = plant.lighting.transfer(index);
         let usage = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
-        let uniform = gpu::buffer_with(device, "canopy_plant_part", usage, &[part_uniform(material, &plant.lighting)]);
+        let uniform = part_uniform(material, &plant.lighting);
+        let uniform = gpu::buffer_with(device, "canopy_plant_part", usage, &[uniform]);
         let color = textures.color(material, part.kind, device, queue);
         let normal = textures.normal(material, device, queue);
         let bind_group = device.create_bind_group(
@@ -428,16 +483,19 @@ fn upload_parts(
             model: upload_mesh(&part.mesh, &vertices(&part.mesh, &plant.lighting, index), device),
             proxy: upload_mesh(proxy, &vertices(proxy, &BakedLighting::Local, index), device),
             bind_group,
-            transfer: plant.lighting.transfer(index).map(|part| transfer.bind_group(part, layouts, device, pipelines)),
+            light: PartLight::new(coefficients.is_some(), sun),
+            transfer: coefficients.map(|part| transfer.bind_group(part, sun, layouts, device, pipelines)),
         });
     }
     parts
 }
 
 pub(super) fn part_uniform(material: &PlantMaterial, lighting: &BakedLighting) -> PartUniform {
+    let gloss = material.gloss.in_range();
     PartUniform {
         base_color: material.base_color.extend(1.0).to_array(),
-        transmission: material.transmission.extend(f32::from(u8::from(lighting.is_realigned()))).to_array(),
+        transmission: material.transmission.extend(realigned(lighting)).to_array(),
+        gloss: [gloss.reflectance, gloss.roughness, 0.0, 0.0],
     }
 }
 

@@ -3,6 +3,9 @@
 //! A packed tree has one of 256 yaws, so the light is turned for all of them at once when it has changed, exactly and at
 //! any band, and a vertex does nothing but two dot products. Without a plant that is lit by transfer there is no buffer,
 //! no binding, and nothing is computed.
+//!
+//! A plant can take the sun the same way [Franzke 2005, 4.3.3], [`SunLight::Harmonics`]: its light is a second set of 256
+//! rows, which is neither computed nor uploaded while no plant asks for it, and costs a vertex two more dot products.
 
 use std::{f32::consts::TAU, sync::Arc};
 
@@ -24,15 +27,17 @@ use crate::{
     bake::transfer::{PackedPart, TransferSettings},
     light::{
         LightState,
-        sh::{MAX_BANDS, rotate_y},
+        sh::{MAX_BANDS, basis_into, rotate_y},
     },
-    render::{extract::ExtractedScene, frame::PreparedFrame, gpu, report::FrameReport},
+    render::{components::SunLight, extract::ExtractedScene, frame::PreparedFrame, gpu, report::FrameReport},
 };
 
 /// Yaws of a packed tree.
 const YAWS: usize = 256;
 /// Coefficients from one yaw's light to the next: those of all bands.
 const STRIDE: usize = MAX_BANDS * MAX_BANDS;
+/// Bytes of one light in all yaws.
+const SET_BYTES: u64 = (YAWS * STRIDE * size_of::<[f32; 4]>()) as u64;
 
 /// `Transfer` of `shaders/forest/transfer.wgsl`.
 #[repr(C)]
@@ -58,10 +63,18 @@ impl TransferUniform {
 #[derive(Resource, Default)]
 pub struct TransferLight {
     buffer: Option<Buffer>,
-    /// Most bands that a plant asks for.
-    bands: usize,
+    wanted: Wanted,
     /// What the buffer holds.
-    known: Option<(Arc<LightState>, f32, usize)>,
+    known: Option<(Arc<LightState>, f32, Wanted)>,
+}
+
+/// What plants ask of the turned light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Wanted {
+    /// The most bands.
+    bands: usize,
+    /// The sun's light too.
+    sun: bool,
 }
 
 impl TransferLight {
@@ -69,22 +82,25 @@ impl TransferLight {
     pub fn bind_group(
         &mut self,
         (settings, part): (&TransferSettings, &PackedPart),
+        sun: SunLight,
         layouts: &ForestLayouts,
         device: &RenderDevice,
         pipelines: &PipelineCache,
     ) -> BindGroup {
-        self.bands = self.bands.max(settings.bands.into());
+        self.wanted.bands = self.wanted.bands.max(settings.bands.into());
+        self.wanted.sun |= sun == SunLight::Harmonics;
         let light = self.buffer.get_or_insert_with(|| {
             device.create_buffer(&BufferDescriptor {
                 label: Some("canopy_turned_light"),
-                size: (YAWS * STRIDE * size_of::<[f32; 4]>()) as u64,
+                // Sky and sun.
+                size: 2 * SET_BYTES,
                 usage: BufferUsages::STORAGE | BufferUsages::COPY_DST,
                 mapped_at_creation: false,
             })
         });
         let coefficients = gpu::buffer_with(device, "canopy_transfer", BufferUsages::STORAGE, &part.bytes);
         let uniform = [TransferUniform::new(settings, part)];
-        let uniform = gpu::buffer_with(device, "canopy_transfer_layout", BufferUsages::UNIFORM, &uniform);
+        let uniform = gpu::buffer_with(device, "canopy_transfer_layout", BufferUsages::STORAGE, &uniform);
         device.create_bind_group(
             "canopy_transfer",
             &pipelines.get_bind_group_layout(&layouts.transfer),
@@ -95,14 +111,9 @@ impl TransferLight {
             )),
         )
     }
-
-    /// Whether any plant is lit by transfer.
-    pub fn is_used(&self) -> bool {
-        self.buffer.is_some()
-    }
 }
 
-/// Turns the light where it, the exposure or the number of bands has changed.
+/// Turns the light where it, the exposure or what is asked of it has changed.
 pub fn prepare_transfer_light(
     scene: Res<ExtractedScene>,
     frame: Res<PreparedFrame>,
@@ -120,17 +131,30 @@ pub fn prepare_transfer_light(
         return;
     };
     let (Some(view), Some(daylight)) = (&frame.view, &scene.daylight) else { return };
-    let same = |(light, exposure, bands): &(Arc<LightState>, f32, usize)| {
-        Arc::ptr_eq(light, &daylight.0) && *exposure == view.exposure && *bands == transfer.bands
+    let same = |(light, exposure, wanted): &(Arc<LightState>, f32, Wanted)| {
+        Arc::ptr_eq(light, &daylight.0) && *exposure == view.exposure && *wanted == transfer.wanted
     };
     if transfer.known.as_ref().is_some_and(same) {
         report.skipped("transfer light", "the light rests");
         return;
     }
-    let light = daylight.0.surroundings().project(transfer.bands);
-    queue.write_buffer(buffer, 0, bytemuck::cast_slice(&turned(&light, view.exposure)));
-    transfer.known = Some((daylight.0.clone(), view.exposure, transfer.bands));
-    report.ran("transfer light", format!("{} bands turned into {YAWS} yaws", transfer.bands));
+    let Wanted { bands, sun } = transfer.wanted;
+    let sky = daylight.0.surroundings().project(bands);
+    queue.write_buffer(buffer, 0, bytemuck::cast_slice(&turned(&sky, view.exposure)));
+    if sun {
+        let light = beam(daylight.0.key_direction, daylight.0.key_illuminance, bands);
+        queue.write_buffer(buffer, SET_BYTES, bytemuck::cast_slice(&turned(&light, view.exposure)));
+    }
+    transfer.known = Some((daylight.0.clone(), view.exposure, transfer.wanted));
+    let of = if sun { "sky and sun, " } else { "" };
+    report.ran("transfer light", format!("{of}{bands} bands turned into {YAWS} yaws"));
+}
+
+/// Coefficients of light that comes from one direction (unit), `illuminance` lux on what faces it.
+fn beam(direction: Vec3, illuminance: Vec3, bands: usize) -> Vec<Vec3> {
+    let mut basis = vec![0.0; bands * bands];
+    basis_into(direction, &mut basis);
+    basis.into_iter().map(|value| illuminance * value).collect()
 }
 
 /// `light` as each yaw's plant sees it, times `exposure`; zeros beyond its bands.
@@ -151,6 +175,18 @@ mod tests {
 
     use super::*;
     use crate::light::sh::{basis, evaluate};
+
+    #[test]
+    fn a_beam_lights_what_faces_it() {
+        let sun = Vec3::new(0.6, 0.5, -0.4).normalize();
+        let light = beam(sun, Vec3::new(1.0, 2.0, 4.0), 6);
+        assert_eq!(light.len(), 36);
+        // The mean over the sphere is the illuminance over 4 pi, and nothing is brighter than the beam's own direction.
+        let mean = light[0] * 0.282_094_79;
+        assert!((mean * (2.0 * TAU) - Vec3::new(1.0, 2.0, 4.0)).abs().max_element() < 1e-4, "{mean}");
+        let along = evaluate(&light, sun).x;
+        assert!([Vec3::X, Vec3::Y, Vec3::NEG_Z, -sun].iter().all(|w| evaluate(&light, *w).x < 0.6 * along));
+    }
 
     #[test]
     fn a_plant_sees_the_light_turned_the_other_way() {

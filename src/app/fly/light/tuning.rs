@@ -425,7 +425,12 @@ mod tests {
 
     #[test]
     fn every_light_is_written_as_it_is_read() -> Result<(), Box<dyn std::error::Error>> {
-        for text in ["Local", "Transfer()", "Transfer(bands: 6, color: true, rays: 16, bounces: 0)", "Expressive()"] {
+        for text in [
+            "Local",
+            "Transfer()",
+            "Transfer(bands: 6, color: true, rays: 16, bounces: 0, sun: Harmonics)",
+            "Expressive()",
+        ] {
             let light = parsed(text)?.ok_or("no light")?;
             assert_eq!(light.to_ron(), text);
         }
