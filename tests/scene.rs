@@ -174,7 +174,7 @@ fn a_request_changes_the_way_of_the_sun_and_keeps_the_rest() -> Outcome {
     };
     overrides("harmonics")?.apply(&mut scene);
     assert_eq!(transfer(&scene, 0), Some((5, SunLight::Harmonics)));
-    assert_eq!(transfer(&scene, 1), Some((3, SunLight::Harmonics)));
+    assert_eq!(transfer(&scene, 1), Some((Transfer::default().bands, SunLight::Harmonics)));
     overrides("transfer")?.apply(&mut scene);
     assert_eq!(transfer(&scene, 0), Some((5, SunLight::LeafShader)));
     overrides("local")?.apply(&mut scene);

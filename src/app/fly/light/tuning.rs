@@ -338,9 +338,9 @@ mod tests {
 
     #[test]
     fn another_light_is_for_the_session_and_back() {
-        let scene = Lighting::Transfer(Transfer { bands: 4, ..Transfer::default() });
+        let scene = Lighting::Transfer(Transfer { bands: 5, ..Transfer::default() });
         let mut tuning = Tuning::new(scene.clone());
-        assert_eq!((tuning.lines(), tuning.lighting().to_ron()), (&[Line::Light][..], "Transfer(bands: 4)".to_owned()));
+        assert_eq!((tuning.lines(), tuning.lighting().to_ron()), (&[Line::Light][..], "Transfer(bands: 5)".to_owned()));
         assert!(!tuning.turn(Line::Radius, true, false, Some(&USED)) && !tuning.turn(Line::Light, false, false, None));
         assert!(tuning.turn(Line::Light, true, false, None) && tuning.is_turned());
         assert!(tuning.turn(Line::Normals, true, false, None) && !tuning.turn(Line::Normals, true, false, None));
