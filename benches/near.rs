@@ -5,6 +5,8 @@
 //! with the traced one: mean FLIP at 67 pixels per degree over the whole picture, and where the trees are (where the
 //! picture without trees differs from the traced one) the relative RMSE and the light, both linear.
 //!
+//! `harmonics` is `transfer` with the sun through the transfer too, as published.
+//!
 //! With `--out` the pictures stay, and each row of the table is one more picture: local, expressive, transfer, traced.
 
 use std::path::{Path, PathBuf};
@@ -38,7 +40,9 @@ struct Arguments {
 }
 
 const SCENES: [&str; 2] = ["one_tree", "small_stand"];
-const LIGHTS: [&str; 3] = ["local", "expressive", "transfer"];
+const LIGHTS: [&str; 4] = ["local", "expressive", "transfer", "harmonics"];
+/// How many of them have a place in the row of pictures.
+const SHOWN: usize = 3;
 /// Noon, with the sun high behind the camera, and evening, with the sun low on the left before it.
 const HOURS: [(&str, &str); 2] = [("noon", "2026-06-21T12:30+01:00"), ("low sun", "2026-06-21T19:15+01:00")];
 const PIXELS_PER_DEGREE: f32 = 67.0;
@@ -66,6 +70,7 @@ fn main() -> anyhow::Result<()> {
                 drawn.save(&name(light), &[])?;
                 row.push(drawn);
             }
+            row.truncate(SHOWN);
             row.push(traced);
             beside(&row).save(&name("all"), &[])?;
         }

@@ -9,6 +9,7 @@ use std::{
 };
 
 use canopy::{
+    bake::billboard::LIGHT_SCALE,
     light::atmosphere::SkyView,
     render::{
         forest::{ForestViewUniform, PartUniform, PlaneUniform, PlantVertex, TransferUniform, VariantUniform},
@@ -28,14 +29,15 @@ use naga::{
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 
 /// All that the pipelines switch on or off.
-const DEFINES: [&str; 4] = ["FOLIAGE", "ALPHA_TO_COVERAGE", "TRANSFER", "SUN_HARMONICS"];
+const DEFINES: [&str; 5] = ["FOLIAGE", "ALPHA_TO_COVERAGE", "TRANSFER", "SUN_HARMONICS", "PLAIN_TOO"];
 
-/// All combinations of [`DEFINES`]; the sun's harmonics need the transfer.
+/// All combinations of [`DEFINES`]; the last two mean something with transfer only.
 fn variants() -> impl Iterator<Item = Vec<&'static str>> {
     let all = (0..1u32 << DEFINES.len()).map(|bits| {
         DEFINES.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, define)| *define).collect::<Vec<_>>()
     });
-    all.filter(|defines| !defines.contains(&"SUN_HARMONICS") || defines.contains(&"TRANSFER"))
+    let needs = ["SUN_HARMONICS", "PLAIN_TOO"];
+    all.filter(move |defines| defines.contains(&"TRANSFER") || !needs.iter().any(|define| defines.contains(define)))
 }
 
 fn is_library(source: &str) -> bool {
@@ -305,6 +307,7 @@ fn constants_that_stand_twice_agree() {
     assert_eq!(constant("common/sky.wgsl", "HORIZON_ROW"), [SkyView::HORIZON_ROW as f64]);
     assert_eq!(constant("common/frame.wgsl", "NOISE_PERIOD"), [NOISE_PERIOD]);
     assert_eq!(constant("terrain/terrain.wgsl", "SIDE"), [(TILE_QUADS + 1) as f64]);
+    assert_eq!(constant("forest/cross.wgsl", "LIGHT_SCALE"), [f64::from((LIGHT_SCALE * 1e6).round()) / 1e6]);
     let frame = SOURCES.iter().find(|(path, _)| *path == "common/frame.wgsl").expect("frame.wgsl").1;
     assert!(frame.contains(&format!("const MAX_CASCADES: i32 = {MAX_CASCADES};")));
     assert!(NOISE_PERIOD.log2().fract() == 0.0, "not a power of two: the noise would have a seam");

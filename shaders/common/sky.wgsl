@@ -36,6 +36,14 @@ fn sky_irradiance(n: vec3<f32>) -> vec3<f32> {
     return max(sum, vec3(0.0));
 }
 
+// Irradiance over pi that the sky brings to what has these two bands of transfer: a vector, and in w the first coefficient.
+fn sky_transfer(side: vec4<f32>) -> vec3<f32> {
+    let s = &light.sky;
+    // The light is kept as a Lambertian surface returns it: its second band times 2/3.
+    let band = side.y * (*s)[2].rgb - side.x * (*s)[1].rgb - side.z * (*s)[3].rgb;
+    return max(side.w * (*s)[0].rgb + 1.5 * band, vec3(0.0));
+}
+
 // Optical depth of a haze whose density falls exponentially with height, along a straight ray.
 fn fog_optical_depth(relative: vec3<f32>) -> f32 {
     let distance = length(relative);

@@ -2,12 +2,19 @@
 #import canopy::frame::{frame, light}
 #import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, cross_threshold, tint_foliage, stand_ambient, scattered, leaf_visibility}
 #import canopy::lighting::{Surface, shade, even_sky, leaf_transmission}
-#import canopy::sky::{apply_fog, night_vision}
+#import canopy::sky::{apply_fog, night_vision, sky_transfer}
 #import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
 
 @group(2) @binding(0) var color_pictures: texture_2d_array<f32>;
 @group(2) @binding(1) var property_pictures: texture_2d_array<f32>;
 @group(2) @binding(2) var picture_sampler: sampler;
+#ifdef TRANSFER
+// How the sky's light reaches the leaves: src/bake/billboard/light.rs.
+@group(3) @binding(0) var light_pictures: texture_2d_array<f32>;
+
+// What 1 stands for in them.
+const LIGHT_SCALE: f32 = 0.4;
+#endif
 
 struct Varying {
     @builtin(position) clip: vec4<f32>,
@@ -107,7 +114,20 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.gloss = vec3(gloss.x * foliage, gloss.y, max(surface.spread, gloss.z));
     let map = ground_map(in.relative);
     let traced = variants[in.layer / PLANES].transmission.w > 0.5;
-    surface.ambient = select(scattered(properties.b), properties.b, traced) * stand_ambient(in.look.z, map.y);
+    let stand = stand_ambient(in.look.z, map.y);
+#ifdef TRANSFER
+    let lit_layer = u32(variants[in.layer / PLANES].gloss.w) + in.layer % PLANES;
+    let stored = textureSampleLevel(light_pictures, picture_sampler, in.uv, lit_layer, level) * LIGHT_SCALE;
+    let side = in.right * stored.x + in.up * stored.y + in.front * stored.z;
+    var sky = (1.0 + surface.transmission) * sky_transfer(vec4(side, stored.w)) * stand;
+#ifdef PLAIN_TOO
+    surface.ambient = scattered(properties.b) * stand;
+    sky = select(even_sky(surface), sky, traced);
+#endif
+#else
+    surface.ambient = scattered(properties.b) * stand;
+    let sky = even_sky(surface);
+#endif
     var visibility = terrain_visibility(map, in.look.y);
     if visibility > 0.0 {
         // The picture stands for a round crown: what faces the light lies before the plane that casts the shadow, what
@@ -120,7 +140,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         visibility *= mix(own, near.x * mix(0.75, 1.0, own), near.y);
     }
     visibility *= select(mix(1.0, leaf_visibility(properties.b), foliage), 1.0, traced);
-    var color = shade(surface, visibility, even_sky(surface));
+    var color = shade(surface, visibility, sky);
     color = mix(color, vec3(0.2, 0.35, 1.0) * dot(color, vec3(0.5)), 0.6 * frame.flags.y);
     return vec4(night_vision(apply_fog(color, in.relative)), coverage);
 }

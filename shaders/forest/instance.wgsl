@@ -38,7 +38,8 @@ struct Variant {
     transmission: vec4<f32>,
     // How far the leaves of a texel face everywhere, 0..1, mip by mip.
     spread: array<vec4<f32>, 2>,
-    // Gloss of its leaves: reflectance, roughness, 1 where normals point out of the crown.
+    // Gloss of its leaves: reflectance, roughness, 1 where normals point out of the crown; w: first layer of its lighting
+    // pictures.
     gloss: vec4<f32>,
 }
 

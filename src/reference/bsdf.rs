@@ -1,7 +1,9 @@
 //! The leaf, the bark and the ground as light sees them: diffuse reflection and diffuse transmission.
 //!
 //! The twin of `shade` in `shaders/common/lighting.wgsl`: a surface sends back `albedo / pi` of the light on the
-//! viewer's side, and `albedo * transmission / pi` of the light on the other [Franzke 2005, 4.2.2, the diffuse terms].
+//! viewer's side, and `albedo * transmission / pi` of the light on the other [Franzke 2005, 4.2.2, the diffuse terms]. The
+//! light through a leaf has the colour that `plant/gloss.rs` derives, as in the shader. The gloss has no lobe here: as it is a
+//! part of the base colour, the same light leaves a surface in the mean over all directions.
 //!
 //! Energy: both shares together may not exceed 1. A material that says otherwise is scaled down, channel by channel, to
 //! reflect and transmit 1 together in the ratio that it states.

@@ -110,7 +110,7 @@ impl Progress for Heard {
 
 /// A plant as a stand needs it: of a baked plant it reads the height alone.
 fn unbaked(plant: Plant) -> BakedPlant {
-    let textures = CrossTextures { color: Vec::new(), properties: Vec::new() };
+    let textures = CrossTextures { color: Vec::new(), properties: Vec::new(), light: Vec::new() };
     BakedPlant {
         plant: Arc::new(plant),
         lighting: Arc::new(BakedLighting::Local),

@@ -3,7 +3,7 @@
 //! Two vertical planes at right angles through the trunk's axis and a horizontal one through the foliage's centre.
 //! Each plane's picture is the *whole* plant seen along the plane's normal, so three quads stand for the tree from
 //! every side. No light is baked in: a texel keeps base colour, normal, ambient visibility k_a and whether it is
-//! leaf or wood, and is lit like the full model.
+//! leaf or wood, and is lit like the full model; of a plant lit by radiance transfer also how the sky reaches it (`light.rs`).
 //!
 //! ```text
 //!   plant + k_a --rasterise (rasterize.rs)--> samples --resolve--> texels --color.rs------> base colour, alpha
@@ -14,15 +14,19 @@
 //! loses parallax away from it; a plane seen from behind shows the picture of its front, mirrored.
 
 mod color;
+mod light;
 mod properties;
 
-use glam::{Mat3, Vec3};
+pub use light::LIGHT_SCALE;
+
+use glam::{Mat3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use self::properties::SpreadSum;
 use super::geometry;
 use super::lighting::BakedLighting;
 use super::rasterize::{Hit, Raster, View};
+use crate::light::atmosphere::luminance;
 use crate::plant::texture::MipChain;
 use crate::plant::{Bounds, PartKind, Plant};
 
@@ -86,13 +90,19 @@ pub struct CrossTextures {
     /// B: ambient visibility k_a. A: share of foliage (1 leaf, 0 wood), the weight of transmission.
     /// Linear 8 bit; texels outside the outline continue those inside.
     pub properties: Vec<MipChain>,
+    /// How the light of the sky reaches the leaves, of plants that are lit by radiance transfer; none for others. Signed bytes,
+    /// of which 127 stands for [`LIGHT_SCALE`]: a vector in the plane's frame, whose third component is turned like the normal's
+    /// where the plane is seen from behind, and the mean over all directions. What leaves a texel under the sky is its base
+    /// colour times `1 + transmission` times the mean times the sky's first coefficient plus the vector times that of its second
+    /// band.
+    pub light: Vec<MipChain>,
 }
 
 /// How crossed billboards are made. Values out of range are moved into it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CrossSettings {
     /// Edge of the square textures in texels, a power of two, 64..=1024 (rounded up to one). Larger: crosses may come
-    /// nearer to the viewer; memory grows with the square (256: 2.1 MB a plant).
+    /// nearer to the viewer; memory grows with the square (256: 2.1 MB a plant, 3.1 MB of one lit by transfer).
     pub resolution: u32,
     /// Samples a texel along each axis, 1..=8. More: smoother colours and normals, time grows with the square.
     pub supersampling: u32,
@@ -127,17 +137,20 @@ pub fn bake_cross(plant: &Plant, lighting: &BakedLighting, settings: &CrossSetti
     let settings = settings.in_range();
     let planes = planes(plant);
     let resolution = settings.resolution as usize;
+    let sides = light::vertex_sides(lighting);
     let pictures: Vec<_> = planes
         .par_iter()
         .map(|plane| {
-            let texels = picture(plant, lighting, plane, &settings);
+            let texels = picture(plant, lighting, sides.as_deref(), plane, &settings);
             let properties = properties::mips(&texels, resolution, settings.normal_smoothing);
-            (color::mips(&texels, resolution), properties)
+            let light = sides.is_some().then(|| light::mips(&texels, resolution));
+            (color::mips(&texels, resolution), (properties, light))
         })
         .collect();
     let (color, properties): (Vec<_>, Vec<_>) = pictures.into_iter().unzip();
+    let (properties, light): (Vec<_>, Vec<_>) = properties.into_iter().unzip();
     let (properties, spreads): (Vec<_>, Vec<_>) = properties.into_iter().unzip();
-    let textures = CrossTextures { color, properties };
+    let textures = CrossTextures { color, properties, light: light.into_iter().flatten().collect() };
     Cross { planes, textures, transmission: mean_transmission(plant), spread: mean_spread(&spreads) }
 }
 
@@ -212,16 +225,25 @@ struct Texel {
     ambient: f32,
     /// Share of leaves.
     foliage: f32,
+    /// How the sky's light reaches it, in the plane's frame ([`light::stored`]).
+    light: Vec4,
 }
 
 /// The picture of the plant on one plane, row by row from the top.
-fn picture(plant: &Plant, lighting: &BakedLighting, plane: &CrossPlane, settings: &CrossSettings) -> Vec<Texel> {
+fn picture(
+    plant: &Plant,
+    lighting: &BakedLighting,
+    sides: Option<&[Vec<light::Sides>]>,
+    plane: &CrossPlane,
+    settings: &CrossSettings,
+) -> Vec<Texel> {
     const ROWS: u32 = 8;
     let (resolution, samples) = (settings.resolution, settings.supersampling);
     let view = View { center: plane.center, right: plane.u, up: plane.v, toward: plane.normal };
     let side = resolution * samples;
     let raster = Raster::new(plant, &view, side, side, ROWS * samples);
-    let shader = Shader { plant, lighting, raster: &raster, to_plane: plane.frame().transpose(), toward: plane.normal };
+    let shader =
+        Shader { plant, lighting, sides, raster: &raster, to_plane: plane.frame().transpose(), toward: plane.normal };
     let (side, samples, resolution) = (side as usize, samples as usize, resolution as usize);
     let bands: Vec<Vec<Texel>> = (0..raster.band_count())
         .into_par_iter()
@@ -239,6 +261,7 @@ fn picture(plant: &Plant, lighting: &BakedLighting, plane: &CrossPlane, settings
                 texel.normal *= share;
                 texel.ambient *= share;
                 texel.foliage *= share;
+                texel.light *= share;
             }
             texels
         })
@@ -251,6 +274,7 @@ struct Shader<'a> {
     plant: &'a Plant,
     lighting: &'a BakedLighting,
     raster: &'a Raster,
+    sides: Option<&'a [Vec<light::Sides>]>,
     to_plane: Mat3,
     toward: Vec3,
 }
@@ -280,6 +304,17 @@ impl Shader<'_> {
         let uv = weighted().map(|(c, w)| w * mesh.uvs[c]).sum();
         let color = self.raster.surface(hit.part).color(uv);
 
+        if let Some(sides) = self.sides.and_then(|parts| parts.get(hit.part as usize)) {
+            let blended = |side: usize| -> Vec4 {
+                weighted().map(|(c, w)| w * sides.get(c).map_or(Vec4::ZERO, |sides| sides[side])).sum()
+            };
+            let front = usize::from(from_behind && part.kind == PartKind::Foliage);
+            let through = match part.kind {
+                PartKind::Foliage => luminance(part.material.transmitted(color)) / luminance(color).max(1e-6),
+                PartKind::Wood => 0.0,
+            };
+            texel.light += light::stored(blended(front), blended(1 - front), through, &self.to_plane);
+        }
         texel.coverage += 1.0;
         texel.color += if color.is_finite() { color.clamp(Vec3::ZERO, Vec3::ONE) } else { Vec3::ZERO };
         texel.normal += self.to_plane * normal;

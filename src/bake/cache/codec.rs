@@ -26,7 +26,7 @@ use crate::plant::texture::MipChain;
 use crate::plant::{Plant, PlantMesh};
 
 /// Version of the format *and* of the bakes: to be raised whenever either gives other bytes for the same input.
-pub(super) const VERSION: u32 = 6;
+pub(super) const VERSION: u32 = 7;
 
 const MAGIC: [u8; 8] = *b"CANOPYBK";
 const HEAD: usize = 52;
@@ -50,7 +50,8 @@ pub(super) fn encode(baked: &BakedPlant, key: &[u8; 32]) -> Vec<u8> {
     out.list(&baked.cross.planes, |out, plane| {
         [plane.center, plane.u, plane.v, plane.normal].iter().for_each(|vector| out.vector(*vector));
     });
-    for chains in [&baked.cross.textures.color, &baked.cross.textures.properties] {
+    let textures = &baked.cross.textures;
+    for chains in [&textures.color, &textures.properties, &textures.light] {
         out.list(chains, |out, chain| {
             out.count(chain.width);
             out.count(chain.height);
@@ -92,7 +93,11 @@ pub(super) fn decode(file: &[u8], key: &[u8; 32], plant: &Arc<Plant>) -> Option<
     let shadow_proxy = reader.list(Reader::mesh)?;
     let planes = reader
         .list(|r| Some(CrossPlane { center: r.vector()?, u: r.vector()?, v: r.vector()?, normal: r.vector()? }))?;
-    let textures = CrossTextures { color: reader.list(Reader::chain)?, properties: reader.list(Reader::chain)? };
+    let textures = CrossTextures {
+        color: reader.list(Reader::chain)?,
+        properties: reader.list(Reader::chain)?,
+        light: reader.list(Reader::chain)?,
+    };
     let transmission = reader.vector()?;
     let mut spread = [0.0; SPREAD_LEVELS];
     for share in &mut spread {
@@ -102,7 +107,8 @@ pub(super) fn decode(file: &[u8], key: &[u8; 32], plant: &Arc<Plant>) -> Option<
         && lighting.fits(plant)
         && shadow_proxy.len() == plant.parts.len()
         && textures.color.len() == planes.len()
-        && textures.properties.len() == planes.len();
+        && textures.properties.len() == planes.len()
+        && textures.light.len() == if matches!(lighting, BakedLighting::Transfer(_)) { planes.len() } else { 0 };
     let cross = Arc::new(Cross { planes, textures, transmission, spread });
     let (lighting, shadow_proxy) = (Arc::new(lighting), Arc::new(shadow_proxy));
     fits.then(|| BakedPlant { plant: Arc::clone(plant), lighting, shadow_proxy, cross })
@@ -320,7 +326,7 @@ mod tests {
             shadow_proxy: Arc::new(vec![mesh]),
             cross: Arc::new(Cross {
                 planes: vec![plane],
-                textures: CrossTextures { color: vec![chain.clone()], properties: vec![chain] },
+                textures: CrossTextures { color: vec![chain.clone()], properties: vec![chain], light: Vec::new() },
                 transmission: Vec3::new(0.1, 0.2, 0.3),
                 spread: [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 1.0],
             }),

@@ -11,7 +11,10 @@ use bevy::{
     },
 };
 
-use super::{ForestPipelines, GpuForests, PreparedForests, resources::PartLight};
+use super::{
+    ForestPipelines, GpuForests, PreparedForests,
+    resources::{CrossLight, PartLight},
+};
 use crate::{
     plant::PartKind,
     render::{components::CanopyCamera, frame::FrameBindGroup},
@@ -37,7 +40,12 @@ pub fn forest_pass(
         prepared.get(entity).is_some_and(|forest| forest.lists.model_count() + forest.lists.cross_count() > 0)
     });
     let ready = |id| cache.get_render_pipeline(id);
-    let Some(crosses) = ready(current.crosses) else { return };
+    let mut crosses = Vec::with_capacity(CrossLight::ALL.len());
+    for (light, id) in CrossLight::ALL.into_iter().zip(current.crosses) {
+        let Some(id) = id else { continue };
+        let Some(pipeline) = ready(id) else { return };
+        crosses.push((light, pipeline));
+    }
     let mut models = Vec::with_capacity(2 * PartLight::ALL.len());
     for (light, ids) in PartLight::ALL.into_iter().zip(current.models) {
         for (kind, id) in [PartKind::Wood, PartKind::Foliage].into_iter().zip(ids.into_iter().flatten()) {
@@ -89,9 +97,13 @@ pub fn forest_pass(
             }
         }
         let range = &lists.lists.crosses;
-        if !range.is_empty() {
-            pass.set_render_pipeline(crosses);
+        let pipeline = crosses.iter().find(|(light, _)| *light == forest.cross_light);
+        if let Some((_, pipeline)) = pipeline.filter(|_| !range.is_empty()) {
+            pass.set_render_pipeline(pipeline);
             pass.set_bind_group(2, &forest.cross_bind_group, &[]);
+            if let Some(pictures) = &forest.cross_pictures {
+                pass.set_bind_group(3, pictures, &[]);
+            }
             pass.draw(range.start * VERTICES_A_CROSS..range.end * VERTICES_A_CROSS, 0..1);
         }
     }

@@ -22,7 +22,7 @@ use bevy::{
 use glam::{DVec3, IVec2};
 
 use super::{
-    resources::{ForestLayouts, ForestViewUniform, GpuForest, GpuForests, PartLight},
+    resources::{CrossLight, ForestLayouts, ForestViewUniform, GpuForest, GpuForests, PartLight},
     vertex::PlantVertex,
 };
 use crate::{
@@ -162,7 +162,7 @@ pub fn prepare_view_lists(
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum PipelineKey {
     Model { kind: PartKind, light: PartLight, format: TextureFormat, samples: u32 },
-    Cross { format: TextureFormat, samples: u32 },
+    Cross { light: CrossLight, format: TextureFormat, samples: u32 },
 }
 
 /// Pipelines of the forest pass, made on first use.
@@ -178,8 +178,8 @@ pub struct ForestPipelines {
 pub struct CurrentPipelines {
     /// Wood and foliage in each light of [`PartLight::ALL`] that a plant has; `None` for the others.
     pub models: [Option<[CachedRenderPipelineId; 2]>; 3],
-    /// Crosses.
-    pub crosses: CachedRenderPipelineId,
+    /// Crosses, by [`CrossLight::ALL`]; `None` for those that no forest has.
+    pub crosses: [Option<CachedRenderPipelineId>; 3],
 }
 
 /// Requests the pipelines that the view needs.
@@ -210,7 +210,10 @@ pub fn prepare_pipelines(
                 .map(|kind| pipeline(PipelineKey::Model { kind, light, format, samples }))
         })
     });
-    let crosses = pipeline(PipelineKey::Cross { format, samples });
+    let crosses = CrossLight::ALL.map(|light| {
+        let wanted = forests.iter().any(|(_, forest)| forest.cross_light == light);
+        wanted.then(|| pipeline(PipelineKey::Cross { light, format, samples }))
+    });
     pipelines.current = Some(CurrentPipelines { models, crosses });
 }
 
@@ -220,10 +223,6 @@ fn describe(
     layouts: &ForestLayouts,
     shaders: &CanopyShaders,
 ) -> RenderPipelineDescriptor {
-    let light = match key {
-        PipelineKey::Model { light, .. } => light,
-        PipelineKey::Cross { .. } => PartLight::Plain,
-    };
     let (label, path, group, buffers, format, samples, foliage, cull_mode) = match key {
         PipelineKey::Model { kind, format, samples, .. } => {
             let foliage = kind == PartKind::Foliage;
@@ -232,7 +231,7 @@ fn describe(
             let label = if foliage { "canopy_foliage" } else { "canopy_wood" };
             (label, "forest/model.wgsl", group, vec![PlantVertex::layout()], format, samples, foliage, cull)
         }
-        PipelineKey::Cross { format, samples } => {
+        PipelineKey::Cross { format, samples, .. } => {
             ("canopy_crosses", "forest/cross.wgsl", layouts.cross.clone(), vec![], format, samples, true, None)
         }
     };
@@ -241,12 +240,22 @@ fn describe(
         defs.push("FOLIAGE".into());
     }
     let mut layout = vec![frame.clone(), layouts.instances.clone(), group];
-    if light != PartLight::Plain {
-        defs.push("TRANSFER".into());
-        layout.push(layouts.transfer.clone());
-    }
-    if light == PartLight::Harmonics {
-        defs.push("SUN_HARMONICS".into());
+    match key {
+        PipelineKey::Model { light: PartLight::Plain, .. } | PipelineKey::Cross { light: CrossLight::Plain, .. } => {}
+        PipelineKey::Model { light, .. } => {
+            defs.push("TRANSFER".into());
+            layout.push(layouts.transfer.clone());
+            if light == PartLight::Harmonics {
+                defs.push("SUN_HARMONICS".into());
+            }
+        }
+        PipelineKey::Cross { light, .. } => {
+            defs.push("TRANSFER".into());
+            layout.push(layouts.cross_light.clone());
+            if light == CrossLight::Mixed {
+                defs.push("PLAIN_TOO".into());
+            }
+        }
     }
     let to_coverage = samples > 1 && foliage;
     if to_coverage {

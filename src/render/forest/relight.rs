@@ -2,7 +2,8 @@
 //! and pictures of crosses apart, and only those of the plants that changed. Meshes, textures, outlines, the stand and so
 //! the shadow maps stay.
 //!
-//! Cost: 20 bytes a vertex written and their normals packed, and 1 MB a plant where its crosses changed (256 texels).
+//! Cost: 20 bytes a vertex written and their normals packed, and 1 MB a plant where its crosses changed (256 texels);
+//! where lighting pictures come or go, 1 MB for each plant that has them.
 
 use std::sync::Arc;
 
@@ -12,7 +13,7 @@ use bevy::render::{
 };
 
 use super::{
-    resources::{self, ForestLayouts, GpuForest, PLANES, PartLight, VariantUniform},
+    resources::{self, CrossLight, ForestLayouts, GpuForest, PLANES, PartLight},
     transfer::TransferLight,
 };
 use crate::{
@@ -62,15 +63,22 @@ pub fn relight(
                 gpu_part.transfer = traced.map(|part| transfer.bind_group(part, sun, layouts, device, pipelines));
             }
         }
-        // What a cross' pictures hold and what its variant says of them belong together.
         if !Arc::ptr_eq(&old.cross, &new.cross) {
             for (plane, chain) in new.cross.textures.properties.iter().enumerate() {
                 gpu::write_layer(queue, &known.cross_properties, (index * PLANES + plane) as u32, chain);
             }
-            let variant = resources::variant(index, new, &known.sizes[index]);
-            let offset = (index * size_of::<VariantUniform>()) as u64;
-            queue.write_buffer(&known.variants, offset, bytemuck::bytes_of(&variant));
         }
+    }
+    let has_lighting_pictures = |plant: &BakedPlant| !plant.cross.textures.light.is_empty();
+    let mut crosses = known.plants.iter().zip(plants.iter()).filter(|(old, new)| !Arc::ptr_eq(&old.cross, &new.cross));
+    if crosses.clone().any(|(old, new)| has_lighting_pictures(old) || has_lighting_pictures(new)) {
+        // Plants that come and go among them move the layers of the others.
+        known.cross_light = CrossLight::of(plants);
+        known.cross_pictures = resources::upload_cross_light(plants, layouts, device, queue, pipelines);
+    }
+    if crosses.next().is_some() {
+        let variants = resources::variants(plants, &known.sizes);
+        queue.write_buffer(&known.variants, 0, bytemuck::cast_slice(&variants));
     }
     known.plants = plants.clone();
 }

@@ -92,7 +92,8 @@ pub struct VariantUniform {
     pub transmission: [f32; 4],
     /// How far the leaves of a texel face everywhere, mip by mip.
     pub spread: [[f32; 4]; SPREAD_LEVELS / 4],
-    /// Gloss of its leaves: reflectance, roughness, 1 where normals point out of the crown; unused.
+    /// Gloss of its leaves: reflectance, roughness, 1 where normals point out of the crown; w: first layer of its lighting
+    /// pictures.
     pub gloss: [f32; 4],
 }
 
@@ -117,6 +118,8 @@ pub struct ForestLayouts {
     pub part: BindGroupLayoutDescriptor,
     /// Group 2 of crosses.
     pub cross: BindGroupLayoutDescriptor,
+    /// Group 3 of crosses of which some are lit by radiance transfer.
+    pub cross_light: BindGroupLayoutDescriptor,
     /// Group 3: radiance transfer.
     pub transfer: BindGroupLayoutDescriptor,
     part_sampler: Sampler,
@@ -170,6 +173,10 @@ impl FromWorld for ForestLayouts {
                     (texture_2d_array(float), texture_2d_array(float), sampler(SamplerBindingType::Filtering)),
                 ),
             ),
+            cross_light: BindGroupLayoutDescriptor::new(
+                "canopy_cross_light",
+                &BindGroupLayoutEntries::single(ShaderStages::FRAGMENT, texture_2d_array(float)),
+            ),
             transfer: BindGroupLayoutDescriptor::new(
                 "canopy_transfer",
                 &BindGroupLayoutEntries::sequential(
@@ -186,6 +193,32 @@ impl FromWorld for ForestLayouts {
             ),
             part_sampler: part_sampler(AddressMode::Repeat),
             cross_sampler: part_sampler(AddressMode::ClampToEdge),
+        }
+    }
+}
+
+/// How the sky's light reaches the crosses of a forest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum CrossLight {
+    /// All by normal and k_a.
+    Plain,
+    /// Some by lighting pictures.
+    Mixed,
+    /// All by lighting pictures.
+    Pictures,
+}
+
+impl CrossLight {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Plain, Self::Mixed, Self::Pictures];
+
+    /// That of crosses of these plants.
+    pub(super) fn of(plants: &[BakedPlant]) -> Self {
+        let lit = plants.iter().filter(|plant| !plant.cross.textures.light.is_empty()).count();
+        match lit {
+            0 => Self::Plain,
+            all if all == plants.len() => Self::Pictures,
+            _ => Self::Mixed,
         }
     }
 }
@@ -264,6 +297,10 @@ pub struct GpuForest {
     pub(super) cross_properties: Texture,
     /// Group 2 of the crosses.
     pub cross_bind_group: BindGroup,
+    /// Which pipeline draws the crosses.
+    pub cross_light: CrossLight,
+    /// Group 3 of the crosses, where some have lighting pictures.
+    pub cross_pictures: Option<BindGroup>,
     /// Counts up with every change of content, so that shadows know.
     pub generation: u64,
 }
@@ -347,8 +384,7 @@ fn upload(
         .collect();
     let sizes: Vec<VariantSize> = forest.plants.iter().map(variant_size).collect();
     let (cross_properties, cross_bind_group) = upload_crosses(&forest.plants, layouts, device, queue, pipelines);
-    let variants: Vec<VariantUniform> =
-        forest.plants.iter().zip(&sizes).enumerate().map(|(i, (plant, size))| variant(i, plant, size)).collect();
+    let variants = variants(&forest.plants, &sizes);
     GpuForest {
         stand: forest.stand.clone(),
         plants: forest.plants.clone(),
@@ -360,6 +396,8 @@ fn upload(
         parts,
         cross_properties,
         cross_bind_group,
+        cross_light: CrossLight::of(&forest.plants),
+        cross_pictures: upload_cross_light(&forest.plants, layouts, device, queue, pipelines),
         generation,
     }
 }
@@ -368,7 +406,23 @@ fn variant_size(plant: &BakedPlant) -> VariantSize {
     VariantSize { height: plant.plant.height(), radius: plant.plant.reach() }
 }
 
-pub(super) fn variant(index: usize, plant: &BakedPlant, size: &VariantSize) -> VariantUniform {
+/// What the shaders know of each plant.
+pub(super) fn variants(plants: &[BakedPlant], sizes: &[VariantSize]) -> Vec<VariantUniform> {
+    let mut lit_layer = 0;
+    plants
+        .iter()
+        .zip(sizes)
+        .enumerate()
+        .map(|(index, (plant, size))| {
+            let variant = variant(index, plant, size, lit_layer);
+            lit_layer += plant.cross.textures.light.len();
+            variant
+        })
+        .collect()
+}
+
+/// `lit_layer`: the first of its lighting pictures, if it has any.
+fn variant(index: usize, plant: &BakedPlant, size: &VariantSize, lit_layer: usize) -> VariantUniform {
     let mut planes = [PlaneUniform::default(); PLANES];
     for (slot, plane) in planes.iter_mut().zip(&plant.cross.planes) {
         *slot = PlaneUniform {
@@ -385,7 +439,7 @@ pub(super) fn variant(index: usize, plant: &BakedPlant, size: &VariantSize) -> V
         size: [size.height, size.radius, (index * PLANES) as f32, 1.0],
         transmission: plant.cross.transmission.extend(traced).to_array(),
         spread: bytemuck::cast(plant.cross.spread),
-        gloss: [gloss.reflectance, gloss.roughness, realigned(&plant.lighting), 0.0],
+        gloss: [gloss.reflectance, gloss.roughness, realigned(&plant.lighting), lit_layer as f32],
     }
 }
 
@@ -542,4 +596,22 @@ fn upload_crosses(
         &BindGroupEntries::sequential((&colors, &properties, &layouts.cross_sampler)),
     );
     (texture, bind_group)
+}
+
+/// The lighting pictures, of those plants that have them.
+pub(super) fn upload_cross_light(
+    plants: &[BakedPlant],
+    layouts: &ForestLayouts,
+    device: &RenderDevice,
+    queue: &RenderQueue,
+    pipelines: &PipelineCache,
+) -> Option<BindGroup> {
+    let layers: Vec<&MipChain> = plants.iter().flat_map(|plant| &plant.cross.textures.light).collect();
+    if layers.is_empty() {
+        return None;
+    }
+    let format = TextureFormat::Rgba8Snorm;
+    let (_, view) = gpu::texture_array(device, queue, "canopy_cross_light", format, &layers, gpu::SMALLEST_TESTED_MIP);
+    let layout = pipelines.get_bind_group_layout(&layouts.cross_light);
+    Some(device.create_bind_group("canopy_cross_light", &layout, &BindGroupEntries::single(&view)))
 }
