@@ -503,7 +503,6 @@ fn plain(texel: [u8; 4]) -> MipChain {
     MipChain { width: 1, height: 1, levels: vec![texel.to_vec()] }
 }
 
-#[expect(clippy::too_many_arguments, reason = "what an upload needs")]
 fn upload_parts(
     plant: &BakedPlant,
     sun: SunLight,
