@@ -29,14 +29,14 @@ use naga::{
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 
 /// All that the pipelines switch on or off.
-const DEFINES: [&str; 5] = ["FOLIAGE", "ALPHA_TO_COVERAGE", "TRANSFER", "SUN_HARMONICS", "PLAIN_TOO"];
+const DEFINES: [&str; 6] = ["FOLIAGE", "ALPHA_TO_COVERAGE", "TRANSFER", "TRANSFER_COLOR", "SUN_HARMONICS", "PLAIN_TOO"];
 
-/// All combinations of [`DEFINES`]; the last two mean something with transfer only.
+/// All combinations of [`DEFINES`]; the last three mean something with transfer only.
 fn variants() -> impl Iterator<Item = Vec<&'static str>> {
     let all = (0..1u32 << DEFINES.len()).map(|bits| {
         DEFINES.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, define)| *define).collect::<Vec<_>>()
     });
-    let needs = ["SUN_HARMONICS", "PLAIN_TOO"];
+    let needs = ["TRANSFER_COLOR", "SUN_HARMONICS", "PLAIN_TOO"];
     all.filter(move |defines| defines.contains(&"TRANSFER") || !needs.iter().any(|define| defines.contains(define)))
 }
 

@@ -6,7 +6,7 @@
 #import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
 
 #ifdef TRANSFER
-#import canopy::transfer::{side_light, SUN_ROWS}
+#import canopy::transfer::{light_sides, SUN_ROWS}
 #endif
 
 struct Part {
@@ -70,20 +70,14 @@ fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index
     out.look = vec4(ambient, local.y, local.y / height, tree.tint);
     out.threshold = model_threshold(length(tree.position.xz));
 #ifdef TRANSFER
-    out.front_sky = side_light(vertex, 0u, tree.yaw_code);
-#ifdef FOLIAGE
-    out.back_sky = side_light(vertex, 1u, tree.yaw_code);
-#else
-    out.back_sky = vec3(0.0);
-#endif
+    let sky = light_sides(vertex, tree.yaw_code);
+    out.front_sky = sky.front;
+    out.back_sky = sky.back;
 #endif
 #ifdef SUN_HARMONICS
-    out.front_sun = side_light(vertex, 0u, SUN_ROWS + tree.yaw_code);
-#ifdef FOLIAGE
-    out.back_sun = side_light(vertex, 1u, SUN_ROWS + tree.yaw_code);
-#else
-    out.back_sun = vec3(0.0);
-#endif
+    let sun = light_sides(vertex, SUN_ROWS + tree.yaw_code);
+    out.front_sun = sun.front;
+    out.back_sun = sun.back;
 #endif
     return out;
 }

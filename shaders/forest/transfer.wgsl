@@ -3,14 +3,20 @@
 #define_import_path canopy::transfer
 
 struct Transfer {
-    // What 127 stands for in each band, relative to the first coefficient.
-    scale: array<vec4<f32>, 2>,
-    // Words from one vertex to the next, bytes from one side to the other, bands, channels.
+    // What 127 stands for in each coefficient after the first, relative to it, four a word of codes.
+    scale: array<vec4<f32>, 9>,
+    // Words from one vertex to the next, of its means, and of the codes of one side and channel; unused.
     form: vec4<u32>,
 }
 
-// Coefficients from one yaw's light to the next.
-const STRIDE: u32 = 36u;
+// Irradiance over pi on the side of a vertex's normal and on the other.
+struct Sides {
+    front: vec3<f32>,
+    back: vec3<f32>,
+}
+
+// Vectors from one yaw's light to the next: the first coefficient, then red, green and blue of each word of four.
+const STRIDE: u32 = 28u;
 // The first row of the sun's light.
 const SUN_ROWS: u32 = 256u;
 
@@ -20,40 +26,62 @@ const SUN_ROWS: u32 = 256u;
 // No uniform: its values steer loops, and lavapipe compiles a shader again for every binding of such a buffer.
 @group(3) @binding(2) var<storage, read> transfer: Transfer;
 
-fn snorm_at(byte: u32) -> f32 {
-    return f32(extractBits(bitcast<i32>(coefficients[byte / 4u]), 8u * (byte % 4u), 8u)) / 127.0;
-}
-
 // A half that is not negative, by its bits: unpack2x16float is not on every device.
-fn half_at(byte: u32) -> f32 {
-    let bits = extractBits(coefficients[byte / 4u], 8u * (byte % 4u), 15u);
+fn mean_at(vertex: u32, index: u32) -> f32 {
+    let bits = extractBits(coefficients[vertex + index / 2u], 16u * (index % 2u), 15u);
     return bitcast<f32>(bits << 13u) * 5.192297e33;
 }
 
-// Irradiance over pi that the light of a row brings to a side of a vertex: 0 the normal's, 1 the other. The row is the
-// tree's yaw for the surroundings, SUN_ROWS more for the sun.
-fn side_light(vertex: u32, side: u32, row: u32) -> vec3<f32> {
-    let channels = transfer.form.w;
-    let colored = channels == 3u;
-    let first = 4u * vertex * transfer.form.x + side * transfer.form.y;
-    var mean = vec3(half_at(first));
-    if colored {
-        mean = vec3(mean.x, half_at(first + 2u), half_at(first + 4u));
-    }
+// What light of four coefficients brings to a side whose codes for them are in `word`, and in words `stride` further on for
+// green and blue where light takes on colour.
+fn brought(word: u32, stride: u32, scale: vec4<f32>, light: u32) -> vec3<f32> {
+    let red = unpack4x8snorm(coefficients[word]) * scale;
+#ifdef TRANSFER_COLOR
+    let green = unpack4x8snorm(coefficients[word + stride]) * scale;
+    let blue = unpack4x8snorm(coefficients[word + 2u * stride]) * scale;
+#else
+    let green = red;
+    let blue = red;
+#endif
+    return vec3(dot(red, turned_light[light]), dot(green, turned_light[light + 1u]), dot(blue, turned_light[light + 2u]));
+}
+
+// Irradiance over pi that the light of a row brings to the sides of a vertex. The row is the tree's yaw for the
+// surroundings, SUN_ROWS more for the sun.
+fn light_sides(vertex: u32, row: u32) -> Sides {
+    let first = vertex * transfer.form.x;
+    let codes = first + transfer.form.y;
+    let words = transfer.form.z;
     let light = row * STRIDE;
-    var sum = turned_light[light].rgb;
-    var byte = first + 2u * channels;
-    for (var band = 1u; band < transfer.form.z; band += 1u) {
-        let scale = transfer.scale[band / 4u][band % 4u];
-        for (var i = band * band; i < (band + 1u) * (band + 1u); i += 1u) {
-            var value = vec3(snorm_at(byte));
-            if colored {
-                value = vec3(value.x, snorm_at(byte + 1u), snorm_at(byte + 2u));
-            }
-            sum += turned_light[light + i].rgb * value * scale;
-            byte += channels;
-        }
+    var sides: Sides;
+    sides.front = turned_light[light].rgb;
+#ifdef TRANSFER_COLOR
+    let other = 3u * words;
+#else
+    let other = words;
+#endif
+#ifdef FOLIAGE
+    sides.back = sides.front;
+#endif
+    for (var k = 0u; k < words; k += 1u) {
+        let at = light + 1u + 3u * k;
+        sides.front += brought(codes + k, words, transfer.scale[k], at);
+#ifdef FOLIAGE
+        sides.back += brought(codes + other + k, words, transfer.scale[k], at);
+#endif
     }
     // A few bands can fall below zero where next to nothing arrives.
-    return max(sum * mean, vec3(0.0));
+#ifdef TRANSFER_COLOR
+    sides.front = max(sides.front * vec3(mean_at(first, 0u), mean_at(first, 1u), mean_at(first, 2u)), vec3(0.0));
+#else
+    sides.front = max(sides.front * mean_at(first, 0u), vec3(0.0));
+#endif
+#ifdef FOLIAGE
+#ifdef TRANSFER_COLOR
+    sides.back = max(sides.back * vec3(mean_at(first, 3u), mean_at(first, 4u), mean_at(first, 5u)), vec3(0.0));
+#else
+    sides.back = max(sides.back * mean_at(first, 1u), vec3(0.0));
+#endif
+#endif
+    return sides;
 }

@@ -52,7 +52,7 @@ mod rays;
 use std::sync::Arc;
 
 pub use evaluate::{exitant_radiance, share};
-pub use pack::{PackedPart, PackedTransfer, TransferFormat};
+pub use pack::{PackedPart, PackedTransfer, TransferFormat, code_words, mean_words};
 pub use rays::direction_set;
 
 use crate::light::sh::MAX_BANDS;

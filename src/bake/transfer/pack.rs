@@ -1,11 +1,14 @@
 //! Coefficients as bytes for the GPU and the cache.
 //!
 //! ```text
-//! vertex = side [side] padding to 4 bytes            front, and for foliage back
-//! side, Float32 or Float16:  bands² × channels numbers, as in TransferPart
-//! side, Snorm8:              channels × f16  c_0, one a channel
-//!                            (bands² - 1) × channels × i8   127 c_i / (c_0 scale_l), rounded
+//! Float32, Float16:  vertex = front, and for foliage back; each bands² × channels numbers, as in TransferPart; padding to
+//!                    4 bytes
+//! Snorm8:            vertex = means, codes
+//!   means            one f16 a side and channel, c_0; padding to 4 bytes
+//!   codes            for each side and channel (bands² - 1) × i8, 127 c_i / (c_0 scale_l), rounded; padding to 4 bytes
 //! ```
+//!
+//! Codes begin at whole words, so that a shader unpacks four of them at once.
 //!
 //! A transfer function is not negative, so by the addition theorem the coefficients of its band l are at most
 //! sqrt(2 l + 1) c_0 long, and fitted ones not much longer: eight bits relative to c_0 are spent on what can occur, in
@@ -57,20 +60,28 @@ pub struct PackedPart {
 }
 
 impl TransferFormat {
-    /// Bytes of one side of one vertex.
-    pub fn side_bytes(self, settings: &TransferSettings) -> usize {
-        let count = settings.coefficients();
-        match self {
-            Self::Float32 => 4 * count,
-            Self::Float16 => 2 * count,
-            Self::Snorm8 => count + settings.channels.count(),
-        }
-    }
-
     /// Bytes of one vertex with this many sides, padding included.
     pub fn vertex_bytes(self, settings: &TransferSettings, sides: usize) -> usize {
-        (sides * self.side_bytes(settings)).next_multiple_of(4)
+        let numbers = sides * settings.coefficients();
+        match self {
+            Self::Float32 => 4 * numbers,
+            Self::Float16 => (2 * numbers).next_multiple_of(4),
+            Self::Snorm8 => {
+                let lists = sides * settings.channels.count();
+                4 * (mean_words(settings, sides) + lists * code_words(settings))
+            }
+        }
     }
+}
+
+/// [`TransferFormat::Snorm8`]: words of 4 bytes that the means of a vertex with this many sides take.
+pub fn mean_words(settings: &TransferSettings, sides: usize) -> usize {
+    (sides * settings.channels.count()).div_ceil(2)
+}
+
+/// [`TransferFormat::Snorm8`]: words of 4 bytes that the codes of one side and channel take.
+pub fn code_words(settings: &TransferSettings) -> usize {
+    (settings.coefficients() / settings.channels.count() - 1).div_ceil(4)
 }
 
 impl TransferBake {
@@ -85,18 +96,15 @@ impl PackedTransfer {
     /// The coefficients that the bytes stand for. Bytes that are missing count as zeros; never NaN.
     pub fn unpack(&self) -> TransferBake {
         let count = self.settings.coefficients();
-        let side_bytes = self.format.side_bytes(&self.settings);
         let unpack = |part: &PackedPart| {
             let mut out = TransferPart::default();
             let vertices = part.bytes.len().checked_div(part.vertex_bytes).unwrap_or(0);
             for vertex in 0..vertices {
-                let bytes = &part.bytes[vertex * part.vertex_bytes..];
+                let bytes = &part.bytes[vertex * part.vertex_bytes..(vertex + 1) * part.vertex_bytes];
                 for (side, target) in [&mut out.front, &mut out.back].into_iter().take(part.sides).enumerate() {
                     let start = target.len();
                     target.resize(start + count, 0.0);
-                    if let Some(bytes) = bytes.get(side * side_bytes..(side + 1) * side_bytes) {
-                        self.decode(bytes, &part.scale, &mut target[start..]);
-                    }
+                    self.decode(bytes, part, side, &mut target[start..]);
                 }
             }
             out
@@ -104,29 +112,33 @@ impl PackedTransfer {
         TransferBake { settings: self.settings, parts: self.parts.iter().map(unpack).collect() }
     }
 
-    /// One side's coefficients from its bytes.
-    fn decode(&self, bytes: &[u8], scale: &[f32; MAX_BANDS], out: &mut [f32]) {
+    /// One side's coefficients from the bytes of its vertex.
+    fn decode(&self, bytes: &[u8], part: &PackedPart, side: usize, out: &mut [f32]) {
         let finite = |value: f32| if value.is_finite() { value } else { 0.0 };
+        let half = |at: usize| {
+            let bytes = bytes.get(2 * at..2 * at + 2).map_or([0; 2], |bytes| [bytes[0], bytes[1]]);
+            finite(f16::from_le_bytes(bytes).to_f32())
+        };
+        let first = side * out.len();
         match self.format {
             TransferFormat::Float32 => {
-                for (value, bytes) in out.iter_mut().zip(bytes.chunks_exact(4)) {
+                let side = bytes.get(4 * first..).unwrap_or_default();
+                for (value, bytes) in out.iter_mut().zip(side.chunks_exact(4)) {
                     *value = finite(f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]));
                 }
             }
-            TransferFormat::Float16 => {
-                for (value, bytes) in out.iter_mut().zip(bytes.chunks_exact(2)) {
-                    *value = finite(f16::from_le_bytes([bytes[0], bytes[1]]).to_f32());
-                }
-            }
+            TransferFormat::Float16 => out.iter_mut().enumerate().for_each(|(i, value)| *value = half(first + i)),
             TransferFormat::Snorm8 => {
                 let channels = self.settings.channels.count();
-                let (first, rest) = bytes.split_at(2 * channels);
+                let (means, words) = (mean_words(&self.settings, part.sides), code_words(&self.settings));
                 for channel in 0..channels {
-                    let c0 = finite(f16::from_le_bytes([first[2 * channel], first[2 * channel + 1]]).to_f32());
+                    let list = side * channels + channel;
+                    let c0 = half(list);
                     out[channel] = c0;
-                    for i in 1..out.len() / channels {
-                        let code = f32::from(rest[(i - 1) * channels + channel] as i8).max(-127.0);
-                        out[i * channels + channel] = finite(code / 127.0 * scale[i.isqrt()] * c0);
+                    let codes = bytes.get(4 * (means + list * words)..).unwrap_or_default();
+                    for (i, code) in (1..out.len() / channels).zip(codes) {
+                        let code = f32::from(*code as i8).max(-127.0);
+                        out[i * channels + channel] = finite(code / 127.0 * part.scale[i.isqrt()] * c0);
                     }
                 }
             }
@@ -142,30 +154,43 @@ fn pack_part(part: &TransferPart, settings: &TransferSettings, format: TransferF
     let scale = if format == TransferFormat::Snorm8 { scales(part, count, channels) } else { [0.0; MAX_BANDS] };
     let mut bytes = Vec::with_capacity(vertices * vertex_bytes);
     for vertex in 0..vertices {
-        for side in [&part.front, &part.back].into_iter().take(sides) {
-            if let Some(values) = side.get(vertex * count..(vertex + 1) * count) {
-                encode(values, format, &scale, channels, &mut bytes);
+        let values = |side: &'_ Vec<f32>| side.get(vertex * count..(vertex + 1) * count).map(<[f32]>::to_vec);
+        let of_sides: Vec<Vec<f32>> = [&part.front, &part.back]
+            .into_iter()
+            .take(sides)
+            .map(|side| values(side).unwrap_or(vec![0.0; count]))
+            .collect();
+        match format {
+            TransferFormat::Float32 => bytes.extend(of_sides.iter().flatten().flat_map(|value| value.to_le_bytes())),
+            TransferFormat::Float16 => {
+                bytes.extend(of_sides.iter().flatten().flat_map(|value| f16::from_f32(*value).to_le_bytes()));
             }
+            TransferFormat::Snorm8 => encode(&of_sides, settings, &scale, &mut bytes),
         }
         bytes.resize((vertex + 1) * vertex_bytes, 0);
     }
     PackedPart { sides, vertex_bytes, scale, bytes }
 }
 
-fn encode(values: &[f32], format: TransferFormat, scale: &[f32; MAX_BANDS], channels: usize, bytes: &mut Vec<u8>) {
-    match format {
-        TransferFormat::Float32 => values.iter().for_each(|value| bytes.extend(value.to_le_bytes())),
-        TransferFormat::Float16 => values.iter().for_each(|value| bytes.extend(f16::from_f32(*value).to_le_bytes())),
-        TransferFormat::Snorm8 => {
-            let first: Vec<f16> = values[..channels].iter().map(|value| f16::from_f32(value.max(0.0))).collect();
-            first.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
-            for (i, values) in values.chunks_exact(channels).enumerate().skip(1) {
-                for (value, first) in values.iter().zip(&first) {
-                    // A cast turns what is not a number (no light at all) into zero.
-                    let code = 127.0 * value / (first.to_f32() * scale[i.isqrt()]);
-                    bytes.push((code.clamp(-127.0, 127.0).round() as i8) as u8);
-                }
+/// Appends a vertex.
+fn encode(sides: &[Vec<f32>], settings: &TransferSettings, scale: &[f32; MAX_BANDS], bytes: &mut Vec<u8>) {
+    let channels = settings.channels.count();
+    let start = bytes.len();
+    let mean = |side: &[f32], channel: usize| f16::from_f32(side[channel].max(0.0));
+    for side in sides {
+        bytes.extend((0..channels).flat_map(|channel| mean(side, channel).to_le_bytes()));
+    }
+    bytes.resize(start + 4 * mean_words(settings, sides.len()), 0);
+    for side in sides {
+        for channel in 0..channels {
+            let end = bytes.len() + 4 * code_words(settings);
+            let c0 = mean(side, channel).to_f32();
+            for (i, value) in side[channel..].iter().step_by(channels).enumerate().skip(1) {
+                // A cast turns what is not a number (no light at all) into zero.
+                let code = 127.0 * value / (c0 * scale[i.isqrt()]);
+                bytes.push((code.clamp(-127.0, 127.0).round() as i8) as u8);
             }
+            bytes.resize(end, 0);
         }
     }
 }
@@ -216,7 +241,7 @@ mod tests {
             assert_eq!(bake.pack(TransferFormat::Float32).unpack(), bake);
             for (format, bytes) in [(TransferFormat::Float16, 36), (TransferFormat::Snorm8, 20)] {
                 let packed = bake.pack(format);
-                assert_eq!(packed.parts[0].vertex_bytes, (bytes * channels.count()).next_multiple_of(4));
+                assert_eq!(packed.parts[0].vertex_bytes, bytes * channels.count());
                 let (back, count) = (packed.unpack(), bake.settings.coefficients());
                 let pairs = |p: &TransferPart| [p.front.clone(), p.back.clone()].concat();
                 let (want, got) = (pairs(&bake.parts[0]), pairs(&back.parts[0]));

@@ -28,6 +28,7 @@ use super::{
 use crate::{
     plant::PartKind,
     render::{
+        components::SunLight,
         cull::{DrawLists, cull_view},
         frame::{FrameLayout, PreparedFrame},
         gpu::{self, GrowingBuffer},
@@ -177,7 +178,7 @@ pub struct ForestPipelines {
 #[derive(Clone, Copy, Debug)]
 pub struct CurrentPipelines {
     /// Wood and foliage in each light of [`PartLight::ALL`] that a plant has; `None` for the others.
-    pub models: [Option<[CachedRenderPipelineId; 2]>; 3],
+    pub models: [Option<[CachedRenderPipelineId; 2]>; PartLight::ALL.len()],
     /// Crosses, by [`CrossLight::ALL`]; `None` for those that no forest has.
     pub crosses: [Option<CachedRenderPipelineId>; 3],
 }
@@ -242,10 +243,13 @@ fn describe(
     let mut layout = vec![frame.clone(), layouts.instances.clone(), group];
     match key {
         PipelineKey::Model { light: PartLight::Plain, .. } | PipelineKey::Cross { light: CrossLight::Plain, .. } => {}
-        PipelineKey::Model { light, .. } => {
+        PipelineKey::Model { light: PartLight::Transfer { color, sun }, .. } => {
             defs.push("TRANSFER".into());
             layout.push(layouts.transfer.clone());
-            if light == PartLight::Harmonics {
+            if color {
+                defs.push("TRANSFER_COLOR".into());
+            }
+            if sun == SunLight::Harmonics {
                 defs.push("SUN_HARMONICS".into());
             }
         }

@@ -59,7 +59,7 @@ pub fn relight(
                 queue.write_buffer(&gpu_part.uniform, 0, bytemuck::bytes_of(&uniform));
                 let traced = new.lighting.transfer(number);
                 let sun = known.forest.suns.get(index).copied().unwrap_or_default();
-                gpu_part.light = PartLight::new(traced.is_some(), sun);
+                gpu_part.light = PartLight::new(traced.map(|(settings, _)| settings), sun);
                 gpu_part.transfer = traced.map(|part| transfer.bind_group(part, sun, layouts, device, pipelines));
             }
         }

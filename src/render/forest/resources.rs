@@ -31,7 +31,12 @@ use super::{
     vertex::PlantVertex,
 };
 use crate::{
-    bake::{BakedPlant, billboard::SPREAD_LEVELS, lighting::BakedLighting},
+    bake::{
+        BakedPlant,
+        billboard::SPREAD_LEVELS,
+        lighting::BakedLighting,
+        transfer::{Channels, TransferSettings},
+    },
     plant::{
         PartKind, PlantMaterial, PlantMesh,
         texture::{MipChain, color_mips, leaf_mips, normal_mips},
@@ -256,24 +261,29 @@ pub struct GpuPart {
 pub enum PartLight {
     /// Sky by normal and k_a, sun by the leaf shader.
     Plain,
-    /// Sky by transfer, sun by the leaf shader.
-    Transfer,
-    /// Sky and sun by transfer.
-    Harmonics,
+    /// Sky by transfer.
+    Transfer {
+        /// Whether light takes on colour on its way through the crown.
+        color: bool,
+        /// What the sun comes by.
+        sun: SunLight,
+    },
 }
 
 impl PartLight {
-    /// The light of a part that has transfer coefficients or not.
-    pub(super) fn new(traced: bool, sun: SunLight) -> Self {
-        match (traced, sun) {
-            (false, _) => Self::Plain,
-            (true, SunLight::LeafShader) => Self::Transfer,
-            (true, SunLight::Harmonics) => Self::Harmonics,
-        }
-    }
-
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Plain, Self::Transfer, Self::Harmonics];
+    pub const ALL: [Self; 5] = [
+        Self::Plain,
+        Self::Transfer { color: false, sun: SunLight::LeafShader },
+        Self::Transfer { color: false, sun: SunLight::Harmonics },
+        Self::Transfer { color: true, sun: SunLight::LeafShader },
+        Self::Transfer { color: true, sun: SunLight::Harmonics },
+    ];
+
+    /// The light of a part, with the settings of its transfer if it has one.
+    pub(super) fn new(transfer: Option<&TransferSettings>, sun: SunLight) -> Self {
+        transfer.map_or(Self::Plain, |settings| Self::Transfer { color: settings.channels == Channels::Rgb, sun })
+    }
 }
 
 /// A forest's GPU side.
@@ -536,7 +546,7 @@ fn upload_parts(
             model: upload_mesh(&part.mesh, &vertices(&part.mesh, &plant.lighting, index), device),
             proxy: upload_mesh(proxy, &vertices(proxy, &BakedLighting::Local, index), device),
             bind_group,
-            light: PartLight::new(coefficients.is_some(), sun),
+            light: PartLight::new(coefficients.map(|(settings, _)| settings), sun),
             transfer: coefficients.map(|part| transfer.bind_group(part, sun, layouts, device, pipelines)),
         });
     }

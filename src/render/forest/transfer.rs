@@ -1,7 +1,7 @@
 //! Radiance transfer on the GPU: a part's coefficients, and the light turned into every yaw that a tree can have.
 //!
 //! A packed tree has one of 256 yaws, so the light is turned for all of them at once when it has changed, exactly and at
-//! any band, and a vertex does nothing but two dot products. Without a plant that is lit by transfer there is no buffer,
+//! any band, and a vertex does nothing but two dot products, four coefficients at a time. Without a plant that is lit by transfer there is no buffer,
 //! no binding, and nothing is computed.
 //!
 //! A plant can take the sun the same way [Franzke 2005, 4.3.3], [`SunLight::Harmonics`]: its light is a second set of 256
@@ -24,7 +24,7 @@ use glam::Vec3;
 
 use super::resources::{ForestLayouts, GpuForests};
 use crate::{
-    bake::transfer::{PackedPart, TransferSettings},
+    bake::transfer::{PackedPart, TransferSettings, code_words, mean_words},
     light::{
         LightState,
         sh::{MAX_BANDS, basis_into, rotate_y},
@@ -34,8 +34,10 @@ use crate::{
 
 /// Yaws of a packed tree.
 const YAWS: usize = 256;
-/// Coefficients from one yaw's light to the next: those of all bands.
-const STRIDE: usize = MAX_BANDS * MAX_BANDS;
+/// Words of four coefficients after the first, of all bands.
+const WORDS: usize = (MAX_BANDS * MAX_BANDS - 1).div_ceil(4);
+/// Vectors from one yaw's light to the next: the first coefficient, then red, green and blue of each word.
+const STRIDE: usize = 1 + 3 * WORDS;
 /// Bytes of one light in all yaws.
 const SET_BYTES: u64 = (YAWS * STRIDE * size_of::<[f32; 4]>()) as u64;
 
@@ -43,19 +45,20 @@ const SET_BYTES: u64 = (YAWS * STRIDE * size_of::<[f32; 4]>()) as u64;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct TransferUniform {
-    /// What 127 stands for in each band, relative to the first coefficient; two unused.
-    pub scale: [[f32; 4]; 2],
-    /// Words from one vertex to the next, bytes from one side to the other, bands, channels.
+    /// What 127 stands for in each coefficient after the first, relative to it, four a word of codes.
+    pub scale: [[f32; 4]; WORDS],
+    /// Words from one vertex to the next, of its means, and of the codes of one side and channel; unused.
     pub form: [u32; 4],
 }
 
 impl TransferUniform {
     fn new(settings: &TransferSettings, part: &PackedPart) -> Self {
-        let mut scale = [0.0; 8];
-        scale[..MAX_BANDS].copy_from_slice(&part.scale);
-        let side = crate::bake::transfer::TransferFormat::Snorm8.side_bytes(settings) as u32;
-        let (words, channels) = (part.vertex_bytes as u32 / 4, settings.channels.count() as u32);
-        Self { scale: bytemuck::cast(scale), form: [words, side, settings.bands.into(), channels] }
+        let mut scale = [0.0; 4 * WORDS];
+        for (i, scale) in scale.iter_mut().enumerate() {
+            *scale = part.scale.get((i + 1).isqrt()).copied().unwrap_or(0.0);
+        }
+        let form = [part.vertex_bytes / 4, mean_words(settings, part.sides), code_words(settings), 0];
+        Self { scale: bytemuck::cast(scale), form: form.map(|words| words as u32) }
     }
 }
 
@@ -159,14 +162,18 @@ fn beam(direction: Vec3, illuminance: Vec3, bands: usize) -> Vec<Vec3> {
 
 /// `light` as each yaw's plant sees it, times `exposure`; zeros beyond its bands.
 fn turned(light: &[Vec3], exposure: f32) -> Vec<[f32; 4]> {
-    (0..YAWS)
-        .flat_map(|yaw| {
-            let mut seen = light.to_vec();
-            rotate_y(&mut seen, -(yaw as f32) * TAU / YAWS as f32);
-            seen.resize(STRIDE, Vec3::ZERO);
-            seen.into_iter().map(|value| (value * exposure).extend(0.0).to_array())
-        })
-        .collect()
+    let mut rows = Vec::with_capacity(YAWS * STRIDE);
+    for yaw in 0..YAWS {
+        let mut seen = light.to_vec();
+        rotate_y(&mut seen, -(yaw as f32) * TAU / YAWS as f32);
+        seen.resize(1 + 4 * WORDS, Vec3::ZERO);
+        seen.iter_mut().for_each(|value| *value *= exposure);
+        rows.push(seen[0].extend(0.0).to_array());
+        for word in seen[1..].chunks_exact(4) {
+            rows.extend((0..3).map(|channel| [0, 1, 2, 3].map(|i: usize| word[i][channel])));
+        }
+    }
+    rows
 }
 
 #[cfg(test)]
@@ -195,12 +202,14 @@ mod tests {
         let turned = turned(&light, 2.0);
         assert_eq!(turned.len(), YAWS * STRIDE);
         for yaw in [0, 1, 64, 200] {
-            let row: Vec<f32> = turned[yaw * STRIDE..][..16].iter().map(|value| value[0]).collect();
+            let row = &turned[yaw * STRIDE..][..STRIDE];
+            let codes = row[1..].chunks_exact(3).flat_map(|word| word[0]);
+            let row: Vec<f32> = std::iter::once(row[0][0]).chain(codes).collect();
             let in_plant = Vec3::new(0.1, 0.7, 0.7).normalize();
             let in_world = Quat::from_rotation_y(yaw as f32 * TAU / YAWS as f32) * in_plant;
             let expected = 2.0 * evaluate(&light, in_world).x;
-            assert!((evaluate(&row, in_plant) - expected).abs() < 1e-4, "{yaw}");
-            assert!(turned[yaw * STRIDE + 16..][..20].iter().flatten().all(|value| *value == 0.0));
+            assert!((evaluate(&row[..16], in_plant) - expected).abs() < 1e-4, "{yaw}");
+            assert!(row[16..].iter().all(|value| *value == 0.0));
         }
     }
 }
