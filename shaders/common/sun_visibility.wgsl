@@ -17,13 +17,17 @@ fn terrain_visibility(map: vec2<f32>, height_above_ground: f32) -> f32 {
     return smoothstep(-6.0, 0.0, height_above_ground - map.x);
 }
 
-// `bias` is 1 for solid surfaces; less where the position is known to lie off the caster.
+// Metres.
+const MOST_LEAF_BIAS: f32 = 0.3;
+
+// `bias` is 1 for solid surfaces; less where the position is known to lie off the caster, more among leaves.
 fn cascade_visibility(index: i32, relative: vec3<f32>, normal: vec3<f32>, bias: f32) -> f32 {
     let texel = shadow.cascades[index].size.x;
     let slope = 1.0 - abs(dot(normal, light.key_direction.xyz));
     // Offset along the normal by the reach of the filter, and along the ray by one texel.
     let offset = normal * (0.6 + 1.6 * slope) + light.key_direction.xyz * 1.2;
-    let position = relative + offset * (texel * bias);
+    // What a bias above 1 adds is a matter of leaves, not of the map: in the coarse ones it would be metres.
+    let position = relative + offset * min(texel * bias, max(texel, MOST_LEAF_BIAS));
     let map = shadow.cascades[index].map_from_relative * vec4(position, 1.0);
     let uv = map.xy * vec2(0.5, -0.5) + 0.5;
     let step = shadow.count.y;
