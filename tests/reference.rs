@@ -247,6 +247,20 @@ fn slabs_transmit_reflect_and_pass_light_to_each_other() {
 }
 
 #[test]
+fn sun_and_sky_add_up_to_the_whole() {
+    let ball = scene(&sphere(PartKind::Wood, 0.6));
+    let shot = shot(DVec3::new(0.0, 1.0, 5.0), 0.0, 0.0, (16, 16));
+    let sum = |light: Light| {
+        let tracer = PathTracer::new(&ball, &light, FLAT).unwrap();
+        film(&tracer, &shot, 32).radiance().iter().map(|pixel| f64::from(pixel.y)).sum::<f64>()
+    };
+    // A camera sees the surroundings too: they are counted with the sky, and the disc's light with the sun.
+    let (all, sun, sky) = (sum(sunny()), sum(sunny().without_environment()), sum(sunny().without_key()));
+    assert!(sun > 0.0 && sky > 0.0);
+    assert!(((sun + sky) / all - 1.0).abs() < 0.01, "{sun} {sky} {all}");
+}
+
+#[test]
 fn bounces_add_up_to_the_whole() {
     let (r, t) = (0.4f32, 0.35f32);
     let scene = scene(&leaves(&[0.0, 0.001], 40.0, r, t / r));

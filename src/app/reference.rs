@@ -13,7 +13,7 @@ use crate::{
         Camera, Development, Film, Fog, Ground, GroundColor, GroundShape, Instance, Light, PathTracer, ReferenceScene,
         Shot, Soil, TraceSettings,
     },
-    scene::{Frame, Pictures, Progress, ReferenceOptions, RenderOptions, RenderPlan, Scene, Still},
+    scene::{Frame, LightGroup, Pictures, Progress, ReferenceOptions, RenderOptions, RenderPlan, Scene, Still},
 };
 
 /// How often the film is kept on disk while it grows.
@@ -39,7 +39,13 @@ pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Res
     let scene = scene(&stage)?;
     progress.end();
     let settings = TraceSettings { bounces: options.bounces.unwrap_or(u32::MAX), ..TraceSettings::default() };
-    let tracer = PathTracer::new(&scene, &Light::of(&light, None), settings)?;
+    let all = Light::of(&light, None);
+    let chosen = match options.light {
+        LightGroup::All => all,
+        LightGroup::Sun => all.without_environment(),
+        LightGroup::Sky => all.without_key(),
+    };
+    let tracer = PathTracer::new(&scene, &chosen, settings)?;
     let shot = Shot {
         camera: Camera { view: frame.view, size: options.size, near: NEAR.into() },
         fog: options.fog.then(|| Fog::new(&light, frame.view.position.y)),

@@ -183,12 +183,26 @@ pub struct Reference {
     /// How often light is scattered between surfaces, 0 for light straight from sun and sky [default: as it will].
     #[arg(long, value_name = "NUMBER")]
     pub bounces: Option<u32>,
+    /// Which light there is: the sun's (or the moon's) alone, the sky's alone, or all.
+    #[arg(long, value_enum, default_value_t = LightChoice::All)]
+    pub light: LightChoice,
     /// Leave the renderer's fog out.
     #[arg(long)]
     pub clear_air: bool,
     /// Go on with an earlier picture of the same scene, light and camera.
     #[arg(long)]
     pub resume: bool,
+}
+
+/// Which light a picture of the ground truth has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum LightChoice {
+    /// All of it.
+    All,
+    /// Sun or moon alone, and what ground and plants make of it.
+    Sun,
+    /// The sky alone, and what ground and plants make of it.
+    Sky,
 }
 
 /// Arguments of `canopy info`.

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use canopy::scene::{Clock, FlyOptions, Overrides, Pictures, ReferenceOptions, RenderOptions, Still, View};
+use canopy::scene::{Clock, FlyOptions, LightGroup, Overrides, Pictures, ReferenceOptions, RenderOptions, Still, View};
 use clap::CommandFactory;
 use clap::error::ErrorKind;
 
-use super::arguments::{Arguments, CameraArguments, Common, Fly, Reference, Render};
+use super::arguments::{Arguments, CameraArguments, Common, Fly, LightChoice, Reference, Render};
 
 /// The scene of `canopy fly` without a name.
 const DEMO: &str = "scenes/demo.ron";
@@ -67,6 +67,11 @@ pub fn reference_options(reference: Reference, common: &Common) -> Result<Refere
         size: reference.size,
         samples: reference.spp,
         bounces: reference.bounces,
+        light: match reference.light {
+            LightChoice::All => LightGroup::All,
+            LightChoice::Sun => LightGroup::Sun,
+            LightChoice::Sky => LightGroup::Sky,
+        },
         fog: !reference.clear_air,
         resume: reference.resume,
         overrides: overrides(common),
@@ -203,6 +208,8 @@ mod tests {
         let options = read("--out a.EXR --spp 7 --bounces 2 --resume --clear-air --size 64x32")?;
         assert!(options.samples == 7 && options.bounces == Some(2) && options.resume && !options.fog);
         assert!(read("--out a.png")?.fog);
+        assert_eq!(read("--out a.png")?.light, LightGroup::All);
+        assert_eq!(read("--out a.png --light sky")?.light, LightGroup::Sky);
         for wrong in ["", "--out a.jpg", "--out a.exr --spp 0", "--out a.exr --bounces -1"] {
             assert_eq!(read(wrong).map(|_| ()).map_err(|error| error.exit_code()), Err(2), "{wrong}");
         }

@@ -76,6 +76,16 @@ impl Light {
         }
     }
 
+    /// The same without the light that casts shadows; its disc is still seen.
+    pub fn without_key(self) -> Self {
+        Self { key: None, ..self }
+    }
+
+    /// The same without the light of the surroundings.
+    pub fn without_environment(self) -> Self {
+        Self { environment: Environment::Even(Vec3::ZERO), ..self }
+    }
+
     /// The light, checked and ready to be drawn from, over a scene with or without a ground.
     pub(crate) fn prepare(&self, ground: bool) -> Result<PreparedLight, ReferenceError> {
         let unit = |what, direction: Vec3| {

@@ -53,7 +53,8 @@ pub use place::{Moon, Place};
 pub use plan::{Frame, PlanError, RenderPlan};
 pub use quality::Quality;
 pub use request::{
-    Clock, FlyOptions, Pictures, Progress, ReferenceOptions, RenderOptions, RenderReport, Silent, Still, View,
+    Clock, FlyOptions, LightGroup, Pictures, Progress, ReferenceOptions, RenderOptions, RenderReport, Silent, Still,
+    View,
 };
 pub use species::{GltfPlants, GrownForm, GrownPlants, LeafGloss, PlantSource, Species};
 pub use time::{LocalTime, TimeError, YEARS};

@@ -52,6 +52,18 @@ pub struct RenderOptions {
     pub explain: bool,
 }
 
+/// Which light a picture of the ground truth has: light adds up, so errors of the two can be told apart.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum LightGroup {
+    /// All of it.
+    #[default]
+    All,
+    /// What casts shadows, sun or moon, and what ground and plants make of it.
+    Sun,
+    /// The sky, and what ground and plants make of it.
+    Sky,
+}
+
 /// Everything about a picture of the ground truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReferenceOptions {
@@ -69,6 +81,8 @@ pub struct ReferenceOptions {
     pub samples: u32,
     /// How often light may be scattered between surfaces; `None` is as often as it will.
     pub bounces: Option<u32>,
+    /// Which light there is.
+    pub light: LightGroup,
     /// Whether the renderer's fog lies before what the camera sees.
     pub fog: bool,
     /// Go on from where an earlier picture of the same scene, light and camera stopped, and keep the state for the next.
