@@ -16,7 +16,7 @@ use canopy::{
     app::{Picture, Renderer, Stage, reference},
     plant::texture::srgb_to_linear,
     render::components::Ground,
-    scene::{LocalTime, Overrides, ReferenceOptions, Silent, View, parse_lighting, parse_size},
+    scene::{LightGroup, LocalTime, Overrides, ReferenceOptions, Silent, View, parse_lighting, parse_size},
 };
 use clap::Parser;
 use nv_flip::{FlipImageRgb8, FlipPool, flip};
@@ -103,6 +103,7 @@ fn trace(arguments: &Arguments, scene: &Path, at: LocalTime, out: &Path) -> anyh
         size: arguments.size,
         samples: arguments.spp,
         bounces: None,
+        light: LightGroup::All,
         fog: true,
         resume: false,
         overrides: Overrides { lighting: Some(canopy::scene::Lighting::Local), ..Overrides::default() },
