@@ -6,11 +6,16 @@
 //!
 //! Limits: at most 64 variants a forest; no motion vectors; one camera.
 
+mod crosses;
+mod layouts;
+mod parts;
 mod pass;
 mod prepare;
 mod relight;
 mod resources;
+mod textures;
 mod transfer;
+mod uniforms;
 mod vertex;
 
 use bevy::{
@@ -23,13 +28,15 @@ use bevy::{
     render::{GpuResourceAppExt, Render, RenderApp, RenderSystems},
 };
 
+pub(crate) use layouts::ForestLayouts;
 pub use prepare::ForestStatistics;
 pub(crate) use prepare::{
     ForestPipelines, PreparedForests, forest_view, instance_bind_group, opaque_depth, prepare_view_lists,
 };
-pub(crate) use resources::{ForestLayouts, prepare_forests};
-pub use resources::{ForestViewUniform, GpuForests, PartUniform, PlaneUniform, VariantUniform};
+pub use resources::GpuForests;
+pub(crate) use resources::prepare_forests;
 pub use transfer::TransferUniform;
+pub use uniforms::{ForestViewUniform, PartUniform, PlaneUniform, VariantUniform};
 pub use vertex::PlantVertex;
 
 /// Draws [`Forest`](super::components::Forest)s.

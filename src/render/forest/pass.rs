@@ -11,10 +11,7 @@ use bevy::{
     },
 };
 
-use super::{
-    ForestPipelines, GpuForests, PreparedForests,
-    resources::{CrossLight, PartLight},
-};
+use super::{ForestPipelines, GpuForests, PreparedForests, crosses::CrossLight, parts::PartLight};
 use crate::{
     plant::PartKind,
     render::{components::CanopyCamera, frame::FrameBindGroup},

@@ -22,7 +22,11 @@ use bevy::{
 use glam::{DVec3, IVec2};
 
 use super::{
-    resources::{CrossLight, ForestLayouts, ForestViewUniform, GpuForest, GpuForests, PartLight},
+    crosses::CrossLight,
+    layouts::ForestLayouts,
+    parts::PartLight,
+    resources::{GpuForest, GpuForests},
+    uniforms::ForestViewUniform,
     vertex::PlantVertex,
 };
 use crate::{

@@ -13,8 +13,12 @@ use bevy::render::{
 };
 
 use super::{
-    resources::{self, CrossLight, ForestLayouts, GpuForest, PLANES, PartLight},
+    crosses::{CrossLight, upload_cross_light},
+    layouts::ForestLayouts,
+    parts::{PartLight, vertices},
+    resources::GpuForest,
     transfer::TransferLight,
+    uniforms::{PLANES, part_uniform, variants},
 };
 use crate::{
     bake::{BakedPlant, billboard::Cross},
@@ -53,8 +57,8 @@ pub fn relight(
     for (index, (old, new)) in known.plants.iter().zip(plants.iter()).enumerate() {
         if !Arc::ptr_eq(&old.lighting, &new.lighting) {
             for (number, (gpu_part, part)) in known.parts[index].iter_mut().zip(&new.plant.parts).enumerate() {
-                let vertices = resources::vertices(&part.mesh, &new.lighting, number);
-                let uniform = resources::part_uniform(&part.material, &new.lighting);
+                let vertices = vertices(&part.mesh, &new.lighting, number);
+                let uniform = part_uniform(&part.material, &new.lighting);
                 queue.write_buffer(&gpu_part.model.vertices, 0, bytemuck::cast_slice(&vertices));
                 queue.write_buffer(&gpu_part.uniform, 0, bytemuck::bytes_of(&uniform));
                 let traced = new.lighting.transfer(number);
@@ -74,10 +78,10 @@ pub fn relight(
     if crosses.clone().any(|(old, new)| has_lighting_pictures(old) || has_lighting_pictures(new)) {
         // Plants that come and go among them move the layers of the others.
         known.cross_light = CrossLight::of(plants);
-        known.cross_pictures = resources::upload_cross_light(plants, layouts, device, queue, pipelines);
+        known.cross_pictures = upload_cross_light(plants, layouts, device, queue, pipelines);
     }
     if crosses.next().is_some() {
-        let variants = resources::variants(plants, &known.sizes);
+        let variants = variants(plants, &known.sizes);
         queue.write_buffer(&known.variants, 0, bytemuck::cast_slice(&variants));
     }
     known.plants = plants.clone();

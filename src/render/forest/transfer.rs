@@ -22,7 +22,7 @@ use bevy::{
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use super::resources::{ForestLayouts, GpuForests};
+use super::{layouts::ForestLayouts, resources::GpuForests};
 use crate::{
     bake::transfer::{PackedPart, TransferSettings, code_words, mean_words},
     light::{

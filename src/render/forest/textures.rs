@@ -1,0 +1,76 @@
+//! The pictures of full models, each filtered for its use and uploaded once.
+
+use std::sync::Arc;
+
+use bevy::{
+    platform::collections::HashMap,
+    render::{
+        render_resource::{TextureFormat, TextureView},
+        renderer::{RenderDevice, RenderQueue},
+    },
+};
+
+use crate::{
+    plant::{
+        PartKind, PlantMaterial,
+        texture::{MipChain, color_mips, leaf_mips, normal_mips},
+    },
+    render::gpu,
+};
+
+/// What an image is used for: each use filters it otherwise.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum TextureUse {
+    Wood,
+    /// With the bits of the alpha test's threshold.
+    Foliage(u32),
+    Normal,
+}
+
+/// Textures that several parts share are uploaded once.
+#[derive(Default)]
+pub struct TextureShelf {
+    views: HashMap<(usize, TextureUse), TextureView>,
+}
+
+impl TextureShelf {
+    /// The base colour of a part of `kind`; white without a picture.
+    pub fn color(
+        &mut self,
+        material: &PlantMaterial,
+        kind: PartKind,
+        device: &RenderDevice,
+        queue: &RenderQueue,
+    ) -> TextureView {
+        let format = TextureFormat::Rgba8UnormSrgb;
+        let Some(image) = &material.base_color_texture else {
+            return gpu::texture(device, queue, "canopy_white", format, &plain([255; 4]), 1);
+        };
+        let foliage = kind == PartKind::Foliage;
+        let usage = if foliage { TextureUse::Foliage(material.alpha_cutoff.to_bits()) } else { TextureUse::Wood };
+        self.views
+            .entry((Arc::as_ptr(image) as usize, usage))
+            .or_insert_with(|| {
+                let chain = if foliage { leaf_mips(image, material.alpha_cutoff) } else { color_mips(image) };
+                let smallest = if foliage { gpu::SMALLEST_TESTED_MIP } else { 1 };
+                gpu::texture(device, queue, "canopy_base_color", format, &chain, smallest)
+            })
+            .clone()
+    }
+
+    /// The normal map; flat without a picture.
+    pub fn normal(&mut self, material: &PlantMaterial, device: &RenderDevice, queue: &RenderQueue) -> TextureView {
+        let format = TextureFormat::Rgba8Unorm;
+        let Some(image) = &material.normal_texture else {
+            return gpu::texture(device, queue, "canopy_flat", format, &plain([128, 128, 255, 255]), 1);
+        };
+        self.views
+            .entry((Arc::as_ptr(image) as usize, TextureUse::Normal))
+            .or_insert_with(|| gpu::texture(device, queue, "canopy_normal", format, &normal_mips(image), 1))
+            .clone()
+    }
+}
+
+fn plain(texel: [u8; 4]) -> MipChain {
+    MipChain { width: 1, height: 1, levels: vec![texel.to_vec()] }
+}

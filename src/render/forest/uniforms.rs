@@ -1,0 +1,125 @@
+//! What the shaders know of a forest, its plants and their parts.
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::{
+    bake::{BakedPlant, billboard::SPREAD_LEVELS, lighting::BakedLighting},
+    plant::PlantMaterial,
+    render::cull::VariantSize,
+};
+
+/// `ForestView` of `shaders/forest/instance.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct ForestViewUniform {
+    /// Cell of the anchor.
+    pub anchor_cell: [i32; 2],
+    /// Metres of the anchor inside its cell.
+    pub anchor_offset: [f32; 2],
+    /// Anchor's height over the stand's datum.
+    pub anchor_y: f32,
+    /// Metres along a cell's side.
+    pub cell_size: f32,
+    /// Where the full model begins to give way, metres.
+    pub fade_start: f32,
+    /// Where it is gone, metres.
+    pub fade_end: f32,
+}
+
+/// `Plane` of `shaders/forest/instance.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct PlaneUniform {
+    /// Middle of the picture, metres in the plant's frame.
+    pub center: [f32; 4],
+    /// Half extent to the picture's right.
+    pub u: [f32; 4],
+    /// Half extent upwards.
+    pub v: [f32; 4],
+    /// Unit normal towards the side that the picture was taken from.
+    pub normal: [f32; 4],
+}
+
+/// Planes of a cross.
+pub const PLANES: usize = 3;
+
+/// `Variant` of `shaders/forest/instance.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct VariantUniform {
+    /// Two upright planes and a level one.
+    pub planes: [PlaneUniform; PLANES],
+    /// Height, crown radius, first layer of its pictures, 1 where it has a full model.
+    pub size: [f32; 4],
+    /// Transmission of its leaves; w: 1 where k_a was traced and holds what leaves send each other.
+    pub transmission: [f32; 4],
+    /// How far the leaves of a texel face everywhere, mip by mip.
+    pub spread: [[f32; 4]; SPREAD_LEVELS / 4],
+    /// Gloss of its leaves: reflectance, roughness, 1 where normals point out of the crown; w: first layer of its lighting
+    /// pictures.
+    pub gloss: [f32; 4],
+}
+
+/// `Part` of `shaders/forest/model.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct PartUniform {
+    /// Linear factor on the texture.
+    pub base_color: [f32; 4],
+    /// Transmission factor; w: 1 where the normals point out of the crown, whichever side of a leaf is seen.
+    pub transmission: [f32; 4],
+    /// Gloss: reflectance, roughness; unused, unused.
+    pub gloss: [f32; 4],
+}
+
+/// What the shaders know of each plant.
+pub fn variants(plants: &[BakedPlant], sizes: &[VariantSize]) -> Vec<VariantUniform> {
+    let mut lit_layer = 0;
+    plants
+        .iter()
+        .zip(sizes)
+        .enumerate()
+        .map(|(index, (plant, size))| {
+            let variant = variant(index, plant, size, lit_layer);
+            lit_layer += plant.cross.textures.light.len();
+            variant
+        })
+        .collect()
+}
+
+/// `lit_layer`: the first of its lighting pictures, if it has any.
+fn variant(index: usize, plant: &BakedPlant, size: &VariantSize, lit_layer: usize) -> VariantUniform {
+    let mut planes = [PlaneUniform::default(); PLANES];
+    for (slot, plane) in planes.iter_mut().zip(&plant.cross.planes) {
+        *slot = PlaneUniform {
+            center: plane.center.extend(0.0).to_array(),
+            u: plane.u.extend(0.0).to_array(),
+            v: plane.v.extend(0.0).to_array(),
+            normal: plane.normal.extend(0.0).to_array(),
+        };
+    }
+    let traced = f32::from(u8::from(matches!(*plant.lighting, BakedLighting::Transfer(_))));
+    let gloss = plant.plant.leaf_gloss();
+    VariantUniform {
+        planes,
+        size: [size.height, size.radius, (index * PLANES) as f32, 1.0],
+        transmission: plant.cross.transmission.extend(traced).to_array(),
+        spread: bytemuck::cast(plant.cross.spread),
+        gloss: [gloss.reflectance, gloss.roughness, realigned(&plant.lighting), lit_layer as f32],
+    }
+}
+
+/// 1 where the foliage's normals point out of the crown.
+fn realigned(lighting: &BakedLighting) -> f32 {
+    f32::from(u8::from(lighting.is_realigned()))
+}
+
+/// What the shaders know of a part's material.
+pub fn part_uniform(material: &PlantMaterial, lighting: &BakedLighting) -> PartUniform {
+    let gloss = material.gloss.in_range();
+    PartUniform {
+        base_color: material.base_color.extend(1.0).to_array(),
+        transmission: material.transmission.extend(realigned(lighting)).to_array(),
+        gloss: [gloss.reflectance, gloss.roughness, 0.0, 0.0],
+    }
+}
