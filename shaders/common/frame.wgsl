@@ -73,3 +73,4 @@ const NOISE_PERIOD: f32 = 1024.0;
 @group(0) @binding(5) var shadow_map: texture_depth_2d_array;
 @group(0) @binding(6) var shadow_sampler: sampler_comparison;
 @group(0) @binding(7) var ground_texture: texture_2d<f32>;
+@group(0) @binding(8) var stand_texture: texture_2d<f32>;

@@ -4,6 +4,7 @@
 
 #import canopy::frame::light
 #import canopy::sky::sky_irradiance
+#import canopy::stand::{StandLight, in_stand}
 
 const INVERSE_PI: f32 = 0.31830989;
 
@@ -31,18 +32,11 @@ fn sphere_cosine(cosine: f32) -> f32 {
     return (sqrt(1.0 - c * c) + acos(-c) * c) * 0.21220659;
 }
 
-// Share of the sky's light that comes through the share `depth` (0..1) of a stand whose crowns cover the share `cover` of
-// the ground, by Beer and Lambert's law [Monsi & Saeki 1953]. The exponent is fitted to the path tracer in a stand of 300
-// stems a hectare: 1.5 would be the mean of the hemisphere over one layer of crowns, but crowns stand behind crowns. What
-// leaves pass on is the 0.05.
-fn sky_through(cover: f32, depth: f32) -> f32 {
-    return mix(0.05, 1.0, pow(1.0 - 0.92 * clamp(cover, 0.0, 1.0), 2.5 * clamp(depth, 0.0, 1.0)));
-}
-
-// What the surroundings bring to a surface that sees the share `ambient` of them evenly, over pi.
-fn even_sky(surface: Surface) -> vec3<f32> {
-    let through = surface.transmission * sky_irradiance(-surface.normal);
-    return (sky_irradiance(surface.normal) + through) * surface.ambient;
+// What the surroundings bring to a surface in a stand that sees the share `ambient` of them evenly, over pi.
+fn even_sky(surface: Surface, stand: StandLight) -> vec3<f32> {
+    let n = surface.normal;
+    let through = surface.transmission * in_stand(sky_irradiance(-n), -n.y, stand);
+    return (in_stand(sky_irradiance(n), n.y, stand) + through) * surface.ambient;
 }
 
 // Share of the reflected light that has been inside a leaf, which reflects the share `reflectance` at its surface: the rest

@@ -4,16 +4,16 @@
 
 #import canopy::frame::{frame, light, shadow, shadow_map, shadow_sampler, ground_texture, sky_sampler, MAX_CASCADES}
 
-// x: height above the ground that the light clears, y: share of ground under crowns.
-fn ground_map(relative: vec3<f32>) -> vec2<f32> {
+// x: height above the ground that the light clears, y: share of ground under crowns, z: the same in the surroundings.
+fn ground_map(relative: vec3<f32>) -> vec3<f32> {
     let uv = (relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;
-    return textureSampleLevel(ground_texture, sky_sampler, uv, 0.0).xy;
+    return textureSampleLevel(ground_texture, sky_sampler, uv, 0.0).xyz;
 }
 
 // Light that clears the terrain: a penumbra that widens with the distance to the ridge is approximated by one of
 // fixed height, the sun's disc over a kilometre. It lies below the horizon: open ground, whose horizon is itself, once
 // stood in the middle of it and had half its light.
-fn terrain_visibility(map: vec2<f32>, height_above_ground: f32) -> f32 {
+fn terrain_visibility(map: vec3<f32>, height_above_ground: f32) -> f32 {
     return smoothstep(-6.0, 0.0, height_above_ground - map.x);
 }
 

@@ -1,8 +1,9 @@
 // Crossed billboards [Franzke 2005, 4.3]: two upright planes and a level one, eighteen pulled vertices a tree.
 #import canopy::frame::{frame, light}
-#import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, cross_threshold, tint_foliage, stand_ambient, scattered, leaf_visibility}
+#import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, cross_threshold, tint_foliage, scattered, leaf_visibility}
 #import canopy::lighting::{Surface, shade, even_sky, leaf_transmission}
 #import canopy::sky::{apply_fog, night_vision, sky_transfer}
+#import canopy::stand::{stand_light, in_stand_by_transfer}
 #import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
 
 @group(2) @binding(0) var color_pictures: texture_2d_array<f32>;
@@ -114,21 +115,28 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.gloss = vec3(gloss.x * foliage, gloss.y, max(surface.spread, gloss.z));
     let map = ground_map(in.relative);
     let traced = variants[in.layer / PLANES].transmission.w > 0.5;
-    let stand = stand_ambient(in.look.z, map.y);
+    let stand = stand_light(map.z, 1.0 - in.look.z);
+    var visibility = terrain_visibility(map, in.look.y);
 #ifdef TRANSFER
     let lit_layer = u32(variants[in.layer / PLANES].gloss.w) + in.layer % PLANES;
     let stored = textureSampleLevel(light_pictures, picture_sampler, in.uv, lit_layer, level) * LIGHT_SCALE;
     let side = in.right * stored.x + in.up * stored.y + in.front * stored.z;
-    var sky = (1.0 + surface.transmission) * sky_transfer(vec4(side, stored.w)) * stand;
+    // The rise comes multiplied with the mean here.
+    let open = sky_transfer(vec4(side, stored.w));
+    let around = in_stand_by_transfer(open, vec3(stored.w), vec3(side.y / max(stored.w, 1e-3)), stand);
+    let lit_leaves = variants[in.layer / PLANES].scattered;
+    let rise = variants[in.layer / PLANES].scattered_rise.x * light.key_direction.y;
+    let share = max(0.28209479 * lit_leaves.w + 0.48860251 * rise, 0.0) * stand.beam * visibility;
+    let scattered_sun = light.key_illuminance.rgb * lit_leaves.rgb * share;
+    var sky = (1.0 + surface.transmission) * (around + scattered_sun);
 #ifdef PLAIN_TOO
-    surface.ambient = scattered(properties.b) * stand;
-    sky = select(even_sky(surface), sky, traced);
+    surface.ambient = scattered(properties.b);
+    sky = select(even_sky(surface, stand), sky, traced);
 #endif
 #else
-    surface.ambient = scattered(properties.b) * stand;
-    let sky = even_sky(surface);
+    surface.ambient = scattered(properties.b);
+    let sky = even_sky(surface, stand);
 #endif
-    var visibility = terrain_visibility(map, in.look.y);
     if visibility > 0.0 {
         // The picture stands for a round crown: what faces the light lies before the plane that casts the shadow, what
         // turns away from it behind.

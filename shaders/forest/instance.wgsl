@@ -1,8 +1,6 @@
 // Trees of 16 bytes: src/scatter/packed.rs packs what this unpacks.
 #define_import_path canopy::instance
 
-#import canopy::lighting::sky_through
-
 struct Tree {
     xz: u32,
     y: f32,
@@ -41,6 +39,10 @@ struct Variant {
     // Gloss of its leaves: reflectance, roughness, 1 where normals point out of the crown; w: first layer of its lighting
     // pictures.
     gloss: vec4<f32>,
+    // Light of the key light that its leaves send each other, in the mean (scattered_sun in transfer.wgsl): colour; w: the
+    // first coefficient. Where it comes from: x: the second band's rise towards the zenith.
+    scattered: vec4<f32>,
+    scattered_rise: vec4<f32>,
 }
 
 struct Instance {
@@ -109,9 +111,4 @@ fn scattered(k: f32) -> f32 {
 // map does not know, and 0.8 + 0.75 k, at most 1.3, would be a little nearer (benches/expressive.rs).
 fn leaf_visibility(k: f32) -> f32 {
     return min(0.35 + 2.0 * k, 1.1);
-}
-
-// Share of the sky that the neighbours' crowns leave at a relative height in the stand.
-fn stand_ambient(relative_height: f32, cover: f32) -> f32 {
-    return sky_through(cover, 1.0 - relative_height);
 }

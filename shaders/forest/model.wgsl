@@ -1,12 +1,13 @@
 // The full model of a tree, near the camera.
 #import canopy::frame::{frame, light}
-#import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, model_threshold, tint_foliage, stand_ambient, scattered, leaf_visibility}
+#import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, model_threshold, tint_foliage, scattered, leaf_visibility}
 #import canopy::lighting::{Surface, shade, exitant, even_sky, leaf_transmission}
 #import canopy::sky::{apply_fog, night_vision}
+#import canopy::stand::stand_light
 #import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
 
 #ifdef TRANSFER
-#import canopy::transfer::{light_sides, SUN_ROWS}
+#import canopy::transfer::{light_sides, light_in_stand, scattered_sun, SUN_ROWS}
 #endif
 
 struct Part {
@@ -78,9 +79,17 @@ fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index
     out.look = vec4(ambient, local.y, local.y / height, tree.tint);
     out.threshold = model_threshold(length(tree.position.xz));
 #ifdef TRANSFER
-    let sky = light_sides(vertex, tree.yaw_code);
+    let map = ground_map(relative);
+    let stand = stand_light(map.z, 1.0 - out.look.z);
+    let sky = light_in_stand(vertex, tree.yaw_code, stand);
     out.front_sky = sky.front;
     out.back_sky = sky.back;
+#ifndef SUN_HARMONICS
+    let to_light = turn(light.key_direction.xyz, vec2(tree.yaw.x, -tree.yaw.y));
+    let scattered = scattered_sun(vertex, to_light) * (stand.beam * terrain_visibility(map, local.y));
+    out.front_sky += scattered;
+    out.back_sky += scattered;
+#endif
 #endif
 #ifdef SUN_HARMONICS
     let sun = light_sides(vertex, SUN_ROWS + tree.yaw_code);
@@ -157,18 +166,17 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
 #endif
     surface.normal = normal;
     let map = ground_map(in.relative);
-    let stand = stand_ambient(in.look.z, map.y);
 #ifdef TRANSFER
 #ifdef FOLIAGE
     let near_sky = select(in.front_sky, in.back_sky, behind);
     let far_sky = select(in.back_sky, in.front_sky, behind);
-    let sky = (near_sky + surface.transmission * far_sky) * stand;
+    let sky = near_sky + surface.transmission * far_sky;
 #else
-    let sky = in.front_sky * stand;
+    let sky = in.front_sky;
 #endif
 #else
-    surface.ambient = scattered(in.look.x) * stand;
-    let sky = even_sky(surface);
+    surface.ambient = scattered(in.look.x);
+    let sky = even_sky(surface, stand_light(map.z, 1.0 - in.look.z));
 #endif
     var visibility = terrain_visibility(map, in.look.y);
     if visibility > 0.0 {

@@ -2,11 +2,17 @@
 // src/bake/transfer/pack.rs packed.
 #define_import_path canopy::transfer
 
+#import canopy::frame::light
+#import canopy::stand::{StandLight, in_stand_by_transfer}
+
 struct Transfer {
     // What 127 stands for in each coefficient after the first, relative to it, four a word of codes.
     scale: array<vec4<f32>, 9>,
-    // Words from one vertex to the next, of its means, and of the codes of one side and channel; unused.
+    // Words from one vertex to the next, of its means, and of the codes of one side and channel; where the codes of the key
+    // light that leaves send each other begin, a word a vertex.
     form: vec4<u32>,
+    // Colour of the key light that leaves send each other; w: what 127 stands for in its codes.
+    scattered: vec4<f32>,
 }
 
 // Irradiance over pi on the side of a vertex's normal and on the other.
@@ -44,6 +50,60 @@ fn brought(word: u32, stride: u32, scale: vec4<f32>, light: u32) -> vec3<f32> {
     let blue = red;
 #endif
     return vec3(dot(red, turned_light[light]), dot(green, turned_light[light + 1u]), dot(blue, turned_light[light + 2u]));
+}
+
+// Means of both sides, and how far their second band rises towards the zenith, relative to them.
+struct Means {
+    front: vec3<f32>,
+    front_rise: vec3<f32>,
+    back: vec3<f32>,
+    back_rise: vec3<f32>,
+}
+
+fn means(vertex: u32) -> Means {
+    let first = vertex * transfer.form.x;
+    let codes = first + transfer.form.y;
+    let words = transfer.form.z;
+    let scale = transfer.scale[0].y;
+    var out: Means;
+#ifdef TRANSFER_COLOR
+    out.front = vec3(mean_at(first, 0u), mean_at(first, 1u), mean_at(first, 2u));
+    out.front_rise = vec3(rise(codes), rise(codes + words), rise(codes + 2u * words)) * scale;
+    out.back = vec3(mean_at(first, 3u), mean_at(first, 4u), mean_at(first, 5u));
+    out.back_rise = vec3(rise(codes + 3u * words), rise(codes + 4u * words), rise(codes + 5u * words)) * scale;
+#else
+    out.front = vec3(mean_at(first, 0u));
+    out.front_rise = vec3(rise(codes) * scale);
+    out.back = vec3(mean_at(first, 1u));
+    out.back_rise = vec3(rise(codes + words) * scale);
+#endif
+    return out;
+}
+
+// The third coefficient of a side and channel, relative to what 127 stands for.
+fn rise(word: u32) -> f32 {
+    return unpack4x8snorm(coefficients[word]).y;
+}
+
+// What the surroundings bring to both sides of a vertex of a tree in a stand.
+fn light_in_stand(vertex: u32, yaw: u32, stand: StandLight) -> Sides {
+    let open = light_sides(vertex, yaw);
+    let own = means(vertex);
+    var sides: Sides;
+    sides.front = in_stand_by_transfer(open.front, own.front, own.front_rise, stand);
+#ifdef FOLIAGE
+    sides.back = in_stand_by_transfer(open.back, own.back, own.back_rise, stand);
+#endif
+    return sides;
+}
+
+// Irradiance over pi of the key light that the leaves around a vertex send it, the same on both of its sides, where nothing
+// else is in the way. `to_light`: in the plant's frame.
+fn scattered_sun(vertex: u32, to_light: vec3<f32>) -> vec3<f32> {
+    let codes = unpack4x8snorm(coefficients[transfer.form.w + vertex]) * transfer.scattered.w;
+    let band = codes.z * to_light.y - codes.y * to_light.x - codes.w * to_light.z;
+    let share = max(0.28209479 * codes.x + 0.48860251 * band, 0.0);
+    return light.key_illuminance.rgb * transfer.scattered.rgb * share;
 }
 
 // Irradiance over pi that the light of a row brings to the sides of a vertex. The row is the tree's yaw for the

@@ -1,7 +1,8 @@
 // The ground: tiles that morph into each other (src/terrain/tiles), coloured by slope, height, canopy cover and noise.
 #import canopy::frame::{frame, light, shadow}
-#import canopy::lighting::{Surface, shade, even_sky, sky_through}
+#import canopy::lighting::{Surface, shade, even_sky}
 #import canopy::sky::{apply_fog, night_vision}
+#import canopy::stand::ground_light
 #import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
 
 struct TileVertex {
@@ -123,19 +124,20 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.albedo = albedo;
     surface.normal = normal;
     surface.transmission = vec3(0.0);
-    surface.ambient = sky_through(cover, 1.0) * (0.8 + 0.2 * grain.r);
+    surface.ambient = 0.8 + 0.2 * grain.r;
+    var shade_cover = map.z;
     if outside {
         surface.ambient = 0.85;
+        shade_cover = 0.0;
     }
 
+    let stand = ground_light(shade_cover);
     var visibility = select(terrain_visibility(map, 0.0), 1.0, outside);
     if visibility > 0.0 {
         let near = cascaded_visibility(in.relative, smooth_normal, 1.0, in.clip.xy);
         // Beyond the maps: the share of light that finds its way between the crowns.
-        let sine = max(light.key_direction.w, 0.12);
-        let between = select(pow(max(1.0 - 0.92 * cover, 0.02), 1.0 / sine), 1.0, outside);
-        visibility *= mix(between, near.x, near.y);
+        visibility *= mix(stand.beam, near.x, near.y);
     }
-    let color = shade(surface, visibility, even_sky(surface));
+    let color = shade(surface, visibility, even_sky(surface, stand));
     return vec4(night_vision(apply_fog(color, in.relative)), 1.0);
 }

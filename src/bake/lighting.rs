@@ -4,7 +4,7 @@
 //! |---|---|--:|
 //! | [`LightingSettings::Local`] | nothing | 0 |
 //! | [`LightingSettings::Expressive`] | realigned normals, k_a ([`super::implicit`]) | 0: k_a is the normal's length |
-//! | [`LightingSettings::Transfer`] | how the sky reaches each side of each vertex ([`super::transfer`]) | see there; 36 for foliage with 4 bands |
+//! | [`LightingSettings::Transfer`] | how the sky reaches each side of each vertex ([`super::transfer`]) | see there; 40 for foliage with 4 bands |
 //!
 //! The models are alternatives: what a plant does not use is neither baked, nor kept, nor uploaded.
 
@@ -13,7 +13,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::implicit::{ImplicitSettings, NoSurface, bake_implicit};
-use super::transfer::{PackedPart, PackedTransfer, TransferFormat, TransferSettings, bake_transfer};
+use super::transfer::{PackedPart, PackedTransfer, SCATTERED, TransferFormat, TransferSettings, bake_transfer};
 use crate::plant::Plant;
 
 /// Which light a plant gets.
@@ -137,6 +137,22 @@ impl BakedLighting {
             Self::Transfer(TransferLighting { packed, .. }) => Some((&packed.settings, packed.parts.get(part)?)),
             _ => None,
         }
+    }
+
+    /// Light of a sun that leaves send each other, in the mean over the foliage's vertices: the first coefficient and the rise
+    /// of the second band towards the zenith ([`super::transfer::TransferPart::scattered`]); zeros where it was not baked.
+    pub fn scattered(&self) -> (f32, f32) {
+        let Self::Transfer(TransferLighting { packed, .. }) = self else { return (0.0, 0.0) };
+        let (mut mean, mut rise, mut count) = (0.0, 0.0, 0.0);
+        for part in packed.parts.iter().filter(|part| part.sides == 2) {
+            for vertex in part.scattered.chunks_exact(SCATTERED) {
+                let value = |index: usize| f64::from(vertex[index] as i8) / 127.0 * f64::from(part.scattered_scale);
+                mean += value(0);
+                rise += value(2);
+                count += 1.0;
+            }
+        }
+        if count > 0.0 { ((mean / count) as f32, (rise / count) as f32) } else { (0.0, 0.0) }
     }
 
     /// Whether the lists have as many entries as `plant` has parts and vertices.

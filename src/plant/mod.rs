@@ -6,6 +6,7 @@
 mod gloss;
 pub mod gltf;
 pub mod grow;
+mod optics;
 pub mod texture;
 
 use std::sync::Arc;
@@ -14,6 +15,7 @@ use glam::{Vec2, Vec3};
 use image::RgbaImage;
 
 pub use gloss::Gloss;
+pub use optics::LeafColors;
 
 /// One individual plant in its own frame: metres, Y up, the trunk's foot at the origin.
 #[derive(Clone, Debug, Default)]

@@ -21,6 +21,7 @@ macro_rules! sources {
 pub const SOURCES: &[(&str, &str)] = sources![
     "common/frame.wgsl",
     "common/sky.wgsl",
+    "common/stand.wgsl",
     "common/sun_visibility.wgsl",
     "common/lighting.wgsl",
     "forest/instance.wgsl",

@@ -78,6 +78,69 @@ impl CoverMap {
     }
 }
 
+impl CoverMap {
+    /// The map with the mean of each place's surroundings, weighted by a pyramid that falls to nothing `reach` metres away
+    /// along either axis, on texels of the same size; nothing grows beyond the map, which is enlarged to hold what spreads.
+    /// A few milliseconds for a million texels.
+    pub fn widened(&self, reach: f64) -> Self {
+        let (columns, rows) = (self.columns as usize, self.rows as usize);
+        let half = (0.5 * reach / self.texel).round();
+        // Two means over boxes of `2 half + 1` texels are a pyramid.
+        if self.cover.len() != columns * rows || self.cover.is_empty() || !(1.0..1024.0).contains(&half) {
+            return self.clone();
+        }
+        let half = half as usize;
+        let border = 2 * half;
+        let (width, height) = (columns + 2 * border, rows + 2 * border);
+        let mut out = vec![0.0f32; width * height];
+        out.par_chunks_mut(width).enumerate().for_each(|(row, line)| {
+            let Some(row) = row.checked_sub(border).filter(|row| *row < rows) else { return };
+            let from = &self.cover[row * columns..(row + 1) * columns];
+            line[border..border + columns].iter_mut().zip(from).for_each(|(to, from)| *to = f32::from(*from));
+            box_mean(line, half);
+            box_mean(line, half);
+        });
+        let mut turned = transposed(&out, width);
+        turned.par_chunks_mut(height).for_each(|line| {
+            box_mean(line, half);
+            box_mean(line, half);
+        });
+        let cover = transposed(&turned, height).iter().map(|value| value.round() as u8).collect();
+        Self {
+            origin: self.origin - border as f64 * self.texel,
+            texel: self.texel,
+            columns: width as u32,
+            rows: height as u32,
+            cover,
+        }
+    }
+}
+
+/// Each value as the mean of those up to `half` places away; nothing lies outside.
+fn box_mean(line: &mut [f32], half: usize) {
+    let mut sums = Vec::with_capacity(line.len() + 1);
+    let mut sum = 0.0f64;
+    sums.push(sum);
+    sums.extend(line.iter().map(|value| {
+        sum += f64::from(*value);
+        sum
+    }));
+    let count = (2 * half + 1) as f64;
+    for (i, value) in line.iter_mut().enumerate() {
+        let (from, to) = (i.saturating_sub(half), (i + half + 1).min(sums.len() - 1));
+        *value = ((sums[to] - sums[from]) / count) as f32;
+    }
+}
+
+fn transposed(values: &[f32], width: usize) -> Vec<f32> {
+    let height = values.len() / width.max(1);
+    let mut out = vec![0.0; values.len()];
+    out.par_chunks_mut(height.max(1)).enumerate().for_each(|(column, line)| {
+        line.iter_mut().enumerate().for_each(|(row, value)| *value = values[row * width + column]);
+    });
+    out
+}
+
 /// A stand whose crowns can be mapped.
 pub trait Crowns {
     /// Foot (X, Z), variant and scale of each tree.

@@ -26,7 +26,7 @@ use crate::plant::texture::MipChain;
 use crate::plant::{Plant, PlantMesh};
 
 /// Version of the format *and* of the bakes: to be raised whenever either gives other bytes for the same input.
-pub(super) const VERSION: u32 = 8;
+pub(super) const VERSION: u32 = 9;
 
 const MAGIC: [u8; 8] = *b"CANOPYBK";
 const HEAD: usize = 52;
@@ -167,6 +167,9 @@ impl Writer {
                     part.scale.iter().for_each(|scale| out.float(*scale));
                     out.count(part.bytes.len() as u32);
                     out.0.extend_from_slice(&part.bytes);
+                    out.float(part.scattered_scale);
+                    out.count(part.scattered.len() as u32);
+                    out.0.extend_from_slice(&part.scattered);
                 });
             }
         }
@@ -267,7 +270,11 @@ impl Reader<'_> {
             }
             let length = r.count()? as usize;
             let bytes = r.bytes(length)?.to_vec();
-            Some(PackedPart { sides, vertex_bytes: format.vertex_bytes(&settings, sides), scale, bytes })
+            let scattered_scale = r.float()?;
+            let length = r.count()? as usize;
+            let scattered = r.bytes(length)?.to_vec();
+            let vertex_bytes = format.vertex_bytes(&settings, sides);
+            Some(PackedPart { sides, vertex_bytes, scale, bytes, scattered_scale, scattered })
         })?;
         Some(PackedTransfer { settings, format, parts })
     }

@@ -86,7 +86,7 @@ impl Links {
 }
 
 /// Direct light and `bounces` bounces of it.
-pub(super) fn bounce(scene: &Scene, direct: Sides, links: &Links, bounces: u8) -> Sides {
+pub(super) fn bounce(scene: &Scene, direct: &Sides, links: &Links, bounces: u8) -> Sides {
     let count = scene.settings.coefficients();
     let channels = scene.settings.channels.count();
     let corners = scene.points.corners(scene.tracer.plant());

@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+use super::SCATTERED;
+
 /// Irradiance over pi, per channel, that `light` (coefficients of radiance, turned into the plant's yaw) brings to
 /// the side with the coefficients `side`, as [`super::TransferPart`] holds them: one channel or three, told apart by
 /// their number. The bands that both have count. Never negative: a sum of a few bands can be, where next to nothing
@@ -18,6 +20,15 @@ pub fn share(light: &[Vec3], side: &[f32]) -> Vec3 {
     };
     // `f32::max` also turns NaN into zero.
     Vec3::from(sum.to_array().map(|value| value.max(0.0)))
+}
+
+/// Irradiance over pi that light of 1 lux (on what faces it) from the unit vector `direction`, in the plant's frame, brings
+/// over other leaves to a vertex with the coefficients `scattered` ([`super::TransferPart::scattered`]); the same on both of
+/// its sides. Never negative.
+pub fn scattered_share(scattered: &[f32], direction: Vec3) -> f32 {
+    let basis = crate::light::sh::basis::<SCATTERED>(direction);
+    // `f32::max` also turns NaN into zero.
+    scattered.iter().zip(basis).map(|(value, basis)| value * basis).sum::<f32>().max(0.0)
 }
 
 /// Radiance that leaves the side `near`, diffusely reflected from it and transmitted from the side `far` (empty for

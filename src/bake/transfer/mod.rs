@@ -51,7 +51,7 @@ mod rays;
 
 use std::sync::Arc;
 
-pub use evaluate::{exitant_radiance, share};
+pub use evaluate::{exitant_radiance, scattered_share, share};
 pub use pack::{PackedPart, PackedTransfer, TransferFormat, code_words, mean_words};
 pub use rays::direction_set;
 
@@ -174,7 +174,14 @@ pub struct TransferPart {
     pub front: Vec<f32>,
     /// The same of the other side; empty for wood.
     pub back: Vec<f32>,
+    /// The part of it that came over other leaves and wood, in one channel, both sides in the mean: the first
+    /// [`SCATTERED`] coefficients of each vertex. The light of a sun whose direct part a shadow map knows
+    /// ([`scattered_share`]). Zeros with [`Interior::Straight`].
+    pub scattered: Vec<f32>,
 }
+
+/// Coefficients of light that comes over other leaves: two bands, as what comes from everywhere is smooth.
+pub const SCATTERED: usize = 4;
 
 impl TransferPart {
     /// The coefficients of one vertex's front; empty out of range.
@@ -200,12 +207,12 @@ pub fn bake_transfer(plant: &Arc<Plant>, settings: &TransferSettings) -> Transfe
     let points = Points::new(plant);
     let directions = Directions::new(&settings);
     let scene = Scene { tracer: &tracer, points: &points, settings };
-    let sides = match settings.interior {
-        Interior::Straight(leaves) => gather::straight(&scene, &directions, leaves).sides,
+    let (sides, direct) = match settings.interior {
+        Interior::Straight(leaves) => (gather::straight(&scene, &directions, leaves).sides, None),
         Interior::Diffuse(bounces) => {
             let direct = gather::straight(&scene, &directions, 0);
             let links = gather::links(&scene, &directions, &direct.hidden);
-            bounce::bounce(&scene, direct.sides, &links, bounces)
+            (bounce::bounce(&scene, &direct.sides, &links, bounces), Some(direct.sides))
         }
     };
     let count = settings.coefficients();
@@ -221,13 +228,32 @@ pub fn bake_transfer(plant: &Arc<Plant>, settings: &TransferSettings) -> Transfe
         }
         out
     };
+    let channels = settings.channels.count();
+    let scattered = |part: usize, both: bool| -> Vec<f32> {
+        let mut out = Vec::with_capacity(points.of_part(part).len() * SCATTERED);
+        for &slot in points.of_part(part) {
+            let first = slot as usize * count;
+            let of_side = |side: usize, index: usize| -> f32 {
+                let range = first + index * channels..first + (index + 1) * channels;
+                let sum = |all: &[f32]| all.get(range.clone()).map_or(0.0, |values| values.iter().sum::<f32>());
+                direct.as_ref().map_or(0.0, |direct| (sum(&sides[side]) - sum(&direct[side])) / channels as f32)
+            };
+            let mean = |index| if both { 0.5 * (of_side(0, index) + of_side(1, index)) } else { of_side(0, index) };
+            out.extend((0..SCATTERED).map(mean));
+        }
+        out
+    };
     let parts = plant
         .parts
         .iter()
         .enumerate()
-        .map(|(index, part)| TransferPart {
-            front: expand(0, index),
-            back: if part.kind == PartKind::Foliage { expand(1, index) } else { Vec::new() },
+        .map(|(index, part)| {
+            let foliage = part.kind == PartKind::Foliage;
+            TransferPart {
+                front: expand(0, index),
+                back: if foliage { expand(1, index) } else { Vec::new() },
+                scattered: scattered(index, foliage),
+            }
         })
         .collect();
     TransferBake { settings, parts }

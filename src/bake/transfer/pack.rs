@@ -21,7 +21,7 @@
 
 use half::f16;
 
-use super::{TransferBake, TransferPart, TransferSettings};
+use super::{SCATTERED, TransferBake, TransferPart, TransferSettings};
 use crate::light::sh::MAX_BANDS;
 
 /// How a coefficient is stored.
@@ -57,6 +57,10 @@ pub struct PackedPart {
     pub scale: [f32; MAX_BANDS],
     /// Vertex by vertex.
     pub bytes: Vec<u8>,
+    /// What 127 stands for in `scattered`.
+    pub scattered_scale: f32,
+    /// [`TransferPart::scattered`], a signed byte each, in any format.
+    pub scattered: Vec<u8>,
 }
 
 impl TransferFormat {
@@ -107,6 +111,9 @@ impl PackedTransfer {
                     self.decode(bytes, part, side, &mut target[start..]);
                 }
             }
+            let code = |code: &u8| f32::from((*code as i8).max(-127)) / 127.0 * part.scattered_scale;
+            out.scattered = part.scattered.iter().map(code).collect();
+            out.scattered.resize(vertices * SCATTERED, 0.0);
             out
         };
         TransferBake { settings: self.settings, parts: self.parts.iter().map(unpack).collect() }
@@ -169,7 +176,10 @@ fn pack_part(part: &TransferPart, settings: &TransferSettings, format: TransferF
         }
         bytes.resize((vertex + 1) * vertex_bytes, 0);
     }
-    PackedPart { sides, vertex_bytes, scale, bytes }
+    let greatest = part.scattered.iter().fold(0.0f32, |max, value| max.max(value.abs()));
+    let code = |value: &f32| ((127.0 * value / greatest).clamp(-127.0, 127.0).round() as i8) as u8;
+    let scattered = part.scattered.iter().map(code).collect();
+    PackedPart { sides, vertex_bytes, scale, bytes, scattered_scale: greatest, scattered }
 }
 
 /// Appends a vertex.

@@ -7,7 +7,10 @@ use bevy::render::{
 use glam::Vec3;
 
 use super::{
-    layouts::ForestLayouts, textures::TextureShelf, transfer::TransferLight, uniforms::part_uniform,
+    layouts::ForestLayouts,
+    textures::TextureShelf,
+    transfer::{TransferLight, scattered_tint},
+    uniforms::part_uniform,
     vertex::PlantVertex,
 };
 use crate::{
@@ -90,6 +93,7 @@ pub fn upload_parts(
     pipelines: &PipelineCache,
 ) -> Vec<GpuPart> {
     let layout = pipelines.get_bind_group_layout(&layouts.part);
+    let tint = scattered_tint(&plant.plant.leaf_colors());
     let mut parts = Vec::new();
     for (index, part) in plant.plant.parts.iter().enumerate() {
         let empty = PlantMesh::default();
@@ -113,7 +117,7 @@ pub fn upload_parts(
             proxy: upload_mesh(proxy, &vertices(proxy, &BakedLighting::Local, index), device),
             bind_group,
             light: PartLight::new(coefficients.map(|(settings, _)| settings), sun),
-            transfer: coefficients.map(|part| transfer.bind_group(part, sun, layouts, device, pipelines)),
+            transfer: coefficients.map(|part| transfer.bind_group(part, tint, sun, layouts, device, pipelines)),
         });
     }
     parts

@@ -17,7 +17,7 @@ use super::{
     layouts::ForestLayouts,
     parts::{PartLight, vertices},
     resources::GpuForest,
-    transfer::TransferLight,
+    transfer::{TransferLight, scattered_tint},
     uniforms::{PLANES, part_uniform, variants},
 };
 use crate::{
@@ -56,6 +56,7 @@ pub fn relight(
 ) {
     for (index, (old, new)) in known.plants.iter().zip(plants.iter()).enumerate() {
         if !Arc::ptr_eq(&old.lighting, &new.lighting) {
+            let tint = scattered_tint(&new.plant.leaf_colors());
             for (number, (gpu_part, part)) in known.parts[index].iter_mut().zip(&new.plant.parts).enumerate() {
                 let vertices = vertices(&part.mesh, &new.lighting, number);
                 let uniform = part_uniform(&part.material, &new.lighting);
@@ -64,7 +65,7 @@ pub fn relight(
                 let traced = new.lighting.transfer(number);
                 let sun = known.forest.suns.get(index).copied().unwrap_or_default();
                 gpu_part.light = PartLight::new(traced.map(|(settings, _)| settings), sun);
-                gpu_part.transfer = traced.map(|part| transfer.bind_group(part, sun, layouts, device, pipelines));
+                gpu_part.transfer = traced.map(|part| transfer.bind_group(part, tint, sun, layouts, device, pipelines));
             }
         }
         if !Arc::ptr_eq(&old.cross, &new.cross) {

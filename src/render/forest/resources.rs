@@ -26,9 +26,11 @@ use super::{
 };
 use crate::{
     bake::BakedPlant,
+    light::StandTrees,
     render::{components::Forest, cull::VariantSize, extract::ExtractedScene, gpu},
     scatter::{PackedStand, PackedTree},
 };
+use glam::Vec3;
 
 /// A forest's GPU side.
 pub struct GpuForest {
@@ -41,6 +43,8 @@ pub struct GpuForest {
     pub trees: Buffer,
     /// [`VariantUniform`](super::VariantUniform)s.
     pub variants: Buffer,
+    /// The leaves of all trees.
+    leaves: Leaves,
     /// Size of each variant, for culling.
     pub sizes: Vec<VariantSize>,
     /// Largest scale of any tree.
@@ -72,6 +76,11 @@ impl GpuForests {
     /// Forests in a fixed order.
     pub fn iter(&self) -> impl Iterator<Item = (Entity, &GpuForest)> {
         self.order.iter().filter_map(|entity| self.forests.get(entity).map(|forest| (*entity, forest)))
+    }
+
+    /// What the trees of all of them are to light, in the mean over the areas of their leaves.
+    pub fn trees(&self) -> StandTrees {
+        self.iter().map(|(_, forest)| forest.leaves).fold(Leaves::default(), Leaves::add).trees()
     }
 
     /// One forest.
@@ -145,6 +154,7 @@ fn upload(
         forest: forest.clone(),
         trees: gpu::buffer_with::<PackedTree>(device, "canopy_trees", storage, &forest.stand.trees),
         variants: gpu::buffer_with(device, "canopy_variants", storage, &variants),
+        leaves: Leaves::of(forest),
         sizes,
         max_scale: forest.stand.cells.iter().map(|cell| cell.max_scale).fold(0.0, f32::max),
         parts,
@@ -153,6 +163,63 @@ fn upload(
         cross_light: CrossLight::of(&forest.plants),
         cross_pictures: upload_cross_light(&forest.plants, layouts, device, queue, pipelines),
         generation,
+    }
+}
+
+/// Sums over leaves, each counted by its area.
+#[derive(Clone, Copy, Debug, Default)]
+struct Leaves {
+    area: f32,
+    reflected: Vec3,
+    transmitted: Vec3,
+    crown_width: f32,
+    crown_length: f32,
+}
+
+impl Leaves {
+    /// Of all trees of a stand.
+    fn of(forest: &Forest) -> Self {
+        let mut areas = vec![0.0; forest.plants.len()];
+        for tree in &forest.stand.trees {
+            if let Some(area) = areas.get_mut(usize::from(tree.variant())) {
+                *area += tree.scale().powi(2);
+            }
+        }
+        let of_plant = |(plant, scaled): (&BakedPlant, f32)| {
+            let colors = plant.plant.leaf_colors();
+            let area = colors.area * scaled;
+            Self {
+                area,
+                reflected: colors.reflected * area,
+                transmitted: colors.transmitted * area,
+                crown_width: plant.plant.crown_width() * area,
+                crown_length: plant.plant.crown_length() * area,
+            }
+        };
+        forest.plants.iter().zip(areas).map(of_plant).fold(Self::default(), Self::add)
+    }
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            area: self.area + other.area,
+            reflected: self.reflected + other.reflected,
+            transmitted: self.transmitted + other.transmitted,
+            crown_width: self.crown_width + other.crown_width,
+            crown_length: self.crown_length + other.crown_length,
+        }
+    }
+
+    fn trees(self) -> StandTrees {
+        if self.area > 0.0 && self.area.is_finite() {
+            StandTrees {
+                reflectance: self.reflected / self.area,
+                transmittance: self.transmitted / self.area,
+                crown_width: self.crown_width / self.area,
+                crown_length: self.crown_length / self.area,
+            }
+        } else {
+            StandTrees::BLACK
+        }
     }
 }
 

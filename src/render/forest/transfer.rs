@@ -27,8 +27,10 @@ use crate::{
     bake::transfer::{PackedPart, TransferSettings, code_words, mean_words},
     light::{
         LightState,
+        atmosphere::luminance,
         sh::{MAX_BANDS, basis_into, rotate_y},
     },
+    plant::LeafColors,
     render::{components::SunLight, extract::ExtractedScene, frame::PreparedFrame, gpu, report::FrameReport},
 };
 
@@ -47,18 +49,26 @@ const SET_BYTES: u64 = (YAWS * STRIDE * size_of::<[f32; 4]>()) as u64;
 pub struct TransferUniform {
     /// What 127 stands for in each coefficient after the first, relative to it, four a word of codes.
     pub scale: [[f32; 4]; WORDS],
-    /// Words from one vertex to the next, of its means, and of the codes of one side and channel; unused.
+    /// Words from one vertex to the next, of its means, and of the codes of one side and channel; where the codes of the key
+    /// light that leaves send each other begin.
     pub form: [u32; 4],
+    /// Colour of the key light that leaves send each other; w: what 127 stands for in its codes.
+    pub scattered: [f32; 4],
 }
 
 impl TransferUniform {
-    fn new(settings: &TransferSettings, part: &PackedPart) -> Self {
+    fn new(settings: &TransferSettings, part: &PackedPart, tint: Vec3) -> Self {
         let mut scale = [0.0; 4 * WORDS];
         for (i, scale) in scale.iter_mut().enumerate() {
             *scale = part.scale.get((i + 1).isqrt()).copied().unwrap_or(0.0);
         }
-        let form = [part.vertex_bytes / 4, mean_words(settings, part.sides), code_words(settings), 0];
-        Self { scale: bytemuck::cast(scale), form: form.map(|words| words as u32) }
+        let form =
+            [part.vertex_bytes / 4, mean_words(settings, part.sides), code_words(settings), part.bytes.len() / 4];
+        Self {
+            scale: bytemuck::cast(scale),
+            form: form.map(|words| words as u32),
+            scattered: tint.extend(part.scattered_scale).to_array(),
+        }
     }
 }
 
@@ -81,10 +91,11 @@ struct Wanted {
 }
 
 impl TransferLight {
-    /// Group 3 of a part.
+    /// Group 3 of a part; `tint`: the colour of light that leaves send each other ([`scattered_tint`]).
     pub fn bind_group(
         &mut self,
         (settings, part): (&TransferSettings, &PackedPart),
+        tint: Vec3,
         sun: SunLight,
         layouts: &ForestLayouts,
         device: &RenderDevice,
@@ -101,8 +112,9 @@ impl TransferLight {
                 mapped_at_creation: false,
             })
         });
-        let coefficients = gpu::buffer_with(device, "canopy_transfer", BufferUsages::STORAGE, &part.bytes);
-        let uniform = [TransferUniform::new(settings, part)];
+        let words = [part.bytes.as_slice(), part.scattered.as_slice()].concat();
+        let coefficients = gpu::buffer_with(device, "canopy_transfer", BufferUsages::STORAGE, &words);
+        let uniform = [TransferUniform::new(settings, part, tint)];
         let uniform = gpu::buffer_with(device, "canopy_transfer_layout", BufferUsages::STORAGE, &uniform);
         device.create_bind_group(
             "canopy_transfer",
@@ -151,6 +163,16 @@ pub fn prepare_transfer_light(
     transfer.known = Some((daylight.0.clone(), view.exposure, transfer.wanted));
     let of = if sun { "sky and sun, " } else { "" };
     report.ran("transfer light", format!("{of}{bands} bands turned into {YAWS} yaws"));
+}
+
+/// The colour that light takes on from a leaf, by its luminance; white where leaves are black.
+///
+/// With one channel a transfer holds what comes over other leaves by the luminance of their colours. That of the sky is a
+/// few percent of its light and stays without colour; that of the sun is most of what lights the shade inside a crown.
+pub fn scattered_tint(leaves: &LeafColors) -> Vec3 {
+    let color = leaves.reflected + leaves.transmitted;
+    let light = luminance(color);
+    if light > 1e-4 { color / light } else { Vec3::ONE }
 }
 
 /// Coefficients of light that comes from one direction (unit), `illuminance` lux on what faces it.

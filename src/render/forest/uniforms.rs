@@ -2,6 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use super::transfer::scattered_tint;
 use crate::{
     bake::{BakedPlant, billboard::SPREAD_LEVELS, lighting::BakedLighting},
     plant::PlantMaterial,
@@ -58,6 +59,10 @@ pub struct VariantUniform {
     /// Gloss of its leaves: reflectance, roughness, 1 where normals point out of the crown; w: first layer of its lighting
     /// pictures.
     pub gloss: [f32; 4],
+    /// Light of the key light that its leaves send each other, in the mean: colour, first coefficient.
+    pub scattered: [f32; 4],
+    /// Its second band's rise towards the zenith; unused, unused, unused.
+    pub scattered_rise: [f32; 4],
 }
 
 /// `Part` of `shaders/forest/model.wgsl`.
@@ -100,12 +105,15 @@ fn variant(index: usize, plant: &BakedPlant, size: &VariantSize, lit_layer: usiz
     }
     let traced = f32::from(u8::from(matches!(*plant.lighting, BakedLighting::Transfer(_))));
     let gloss = plant.plant.leaf_gloss();
+    let (mean, rise) = plant.lighting.scattered();
     VariantUniform {
         planes,
         size: [size.height, size.radius, (index * PLANES) as f32, 1.0],
         transmission: plant.cross.transmission.extend(traced).to_array(),
         spread: bytemuck::cast(plant.cross.spread),
         gloss: [gloss.reflectance, gloss.roughness, realigned(&plant.lighting), lit_layer as f32],
+        scattered: scattered_tint(&plant.plant.leaf_colors()).extend(mean).to_array(),
+        scattered_rise: [rise, 0.0, 0.0, 0.0],
     }
 }
 

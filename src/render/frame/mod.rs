@@ -4,6 +4,7 @@
 //! the camera's f64 position on the CPU. A scene a million metres from the origin draws as steadily as one at it.
 
 mod light;
+mod stand;
 pub mod uniforms;
 
 use bevy::{
@@ -37,6 +38,7 @@ use super::{
     components::CanopyCamera, cull::Frustum, extract::ExtractedScene, gpu, sky::SkyTexture, sun_shadow::ShadowMaps,
     terrain::GroundMap,
 };
+use stand::{StandTexture, upload_stand_light};
 use uniforms::{FrameUniform, LightUniform, NOISE_PERIOD, ShadowUniform};
 
 /// Layout of bind group 0.
@@ -59,6 +61,7 @@ impl FromWorld for FrameLayout {
                     sampler(SamplerBindingType::Filtering),
                     depth_array,
                     sampler(SamplerBindingType::Comparison),
+                    texture_2d(TextureSampleType::Float { filterable: true }),
                     texture_2d(TextureSampleType::Float { filterable: true }),
                 ),
             ),
@@ -150,12 +153,17 @@ impl Plugin for FramePlugin {
         render_app
             .init_gpu_resource::<FrameLayout>()
             .init_gpu_resource::<FrameBuffers>()
+            .init_gpu_resource::<StandTexture>()
             .init_resource::<PreparedFrame>()
             .init_resource::<FrameBindGroup>()
             .add_systems(
                 Render,
                 (
                     prepare_frame.in_set(RenderSystems::PrepareResources),
+                    upload_stand_light
+                        .in_set(RenderSystems::PrepareResources)
+                        .after(prepare_frame)
+                        .after(super::forest::prepare_forests),
                     prepare_bind_group.in_set(RenderSystems::PrepareBindGroups),
                 ),
             );
@@ -231,6 +239,7 @@ fn prepare_bind_group(
     sky: Res<SkyTexture>,
     shadows: Res<ShadowMaps>,
     ground: Res<GroundMap>,
+    stand: Res<StandTexture>,
     device: Res<RenderDevice>,
     queue: Res<RenderQueue>,
     pipelines: Res<PipelineCache>,
@@ -263,6 +272,7 @@ fn prepare_bind_group(
             &shadows.view,
             &buffers.shadow_sampler,
             &ground.view,
+            &stand.view,
         )),
     );
     group.0 = Some((view.entity, made));

@@ -20,9 +20,10 @@ use bevy::{
     app::{App, Plugin},
     core_pipeline::{Core3d, Core3dSystems},
     ecs::schedule::IntoScheduleConfigs,
-    render::{GpuResourceAppExt, Render, RenderApp, RenderSystems},
+    render::{GpuResourceAppExt, Render, RenderApp, RenderStartup, RenderSystems, init_gpu_resource},
 };
 
+use super::forest::ForestLayouts;
 pub use prepare::{CascadeViewUniform, ShadowMaps};
 
 /// Draws the sun's shadow maps.
@@ -34,8 +35,14 @@ impl Plugin for SunShadowPassPlugin {
         render_app
             .init_gpu_resource::<prepare::CasterLayouts>()
             .init_gpu_resource::<ShadowMaps>()
-            .init_gpu_resource::<prepare::CasterPipelines>()
             .init_gpu_resource::<meshes::MeshCasters>()
+            // Made from other resources: the order of `init_gpu_resource` is nobody's.
+            .add_systems(
+                RenderStartup,
+                init_gpu_resource::<prepare::CasterPipelines>
+                    .after(init_gpu_resource::<prepare::CasterLayouts>)
+                    .after(init_gpu_resource::<ForestLayouts>),
+            )
             .add_systems(
                 Render,
                 (meshes::prepare_mesh_casters, prepare::prepare_shadows)

@@ -34,7 +34,12 @@ const LONGEST_SIDE: f64 = 512.0;
 /// Metres towards the light within which relief can hide it.
 const HORIZON_DISTANCE: u32 = 12_000;
 
-/// Height in metres above the ground that the key light clears (R) and share of ground under crowns (G).
+/// Metres over which the cover counts that shades a tree: light that comes in askew passes over as much ground as trees are
+/// high.
+const SHADING_REACH: f64 = 32.0;
+
+/// Height in metres above the ground that the key light clears (R), share of ground under crowns (G), and that share in the
+/// surroundings (B).
 #[derive(Resource)]
 pub struct GroundMap {
     /// For sampling.
@@ -44,6 +49,8 @@ pub struct GroundMap {
     texture: Texture,
     size: (u32, u32),
     extent: DVec2,
+    /// The cover of the surroundings of each place.
+    wide: Option<CoverMap>,
     shows: Option<Shown>,
 }
 
@@ -66,7 +73,7 @@ fn create(device: &RenderDevice, size: (u32, u32)) -> (Texture, TextureView) {
         mip_level_count: 1,
         sample_count: 1,
         dimension: TextureDimension::D2,
-        format: TextureFormat::Rg16Float,
+        format: TextureFormat::Rgba16Float,
         usage: TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST,
         view_formats: &[],
     });
@@ -78,9 +85,9 @@ impl GroundMap {
     /// The map without a ground: nothing hides the light, and no crowns cover anything.
     fn empty(device: &RenderDevice, queue: &RenderQueue) -> Self {
         let (texture, view) = create(device, (1, 1));
-        let texel = [f16::from_f32(-6.0e4), f16::ZERO];
-        gpu::write_level(queue, &texture, 0, 0, 1, 1, 4, bytemuck::cast_slice(&[texel]));
-        Self { view, mean_cover: 0.0, texture, size: (1, 1), extent: DVec2::ONE, shows: None }
+        let texel = [f16::from_f32(-6.0e4), f16::ZERO, f16::ZERO, f16::ZERO];
+        gpu::write_level(queue, &texture, 0, 0, 1, 1, 8, bytemuck::cast_slice(&[texel]));
+        Self { view, mean_cover: 0.0, texture, size: (1, 1), extent: DVec2::ONE, wide: None, shows: None }
     }
 
     /// Camera-relative origin and inverse size of the map, for a camera at `camera` (scene metres).
@@ -135,18 +142,21 @@ pub fn prepare_ground_map(
             return;
         }
     };
-    let texels = texels(ground, &horizon, size);
+    if !same_ground {
+        map.wide = ground.cover.as_ref().map(|cover| cover.widened(SHADING_REACH));
+    }
+    let texels = texels(ground, map.wide.as_ref(), &horizon, size);
     if !same_ground {
         let sum: f32 = texels.iter().map(|texel| texel[1].to_f32()).sum();
         map.mean_cover = sum / texels.len().max(1) as f32;
     }
-    gpu::write_level(&queue, &map.texture, 0, 0, size.0, size.1, 4, bytemuck::cast_slice(&texels));
+    gpu::write_level(&queue, &map.texture, 0, 0, size.0, size.1, 8, bytemuck::cast_slice(&texels));
     report.ran("terrain shadow", format!("{} × {} cells", size.0, size.1));
     map.shows = Some(Shown { terrain: ground.terrain.clone(), cover: ground.cover.clone(), light });
 }
 
 /// One texel a cell, row by row from the north.
-fn texels(ground: &Ground, horizon: &[f32], size: (u32, u32)) -> Vec<[f16; 2]> {
+fn texels(ground: &Ground, wide: Option<&CoverMap>, horizon: &[f32], size: (u32, u32)) -> Vec<[f16; 4]> {
     let extent = ground.terrain.extent();
     let cell = extent / DVec2::new(f64::from(size.0), f64::from(size.1));
     (0..size.1)
@@ -156,7 +166,8 @@ fn texels(ground: &Ground, horizon: &[f32], size: (u32, u32)) -> Vec<[f16; 2]> {
             let height = ground.terrain.height(place.x, place.y) as f32;
             let clears = horizon.get((row * size.0 + column) as usize).map_or(0.0, |h| h - height);
             let cover = ground.cover.as_ref().map_or(0.0, |cover| cover.at(place));
-            [f16::from_f32(clears.clamp(-6.0e4, 6.0e4)), f16::from_f32(cover)]
+            let around = wide.map_or(0.0, |cover| cover.at(place));
+            [clears.clamp(-6.0e4, 6.0e4), cover, around, 0.0].map(f16::from_f32)
         })
         .collect()
 }

@@ -1,0 +1,149 @@
+//! What the leaves of a plant do to light in the mean.
+
+use glam::{Vec2, Vec3};
+
+use super::{PartKind, Plant, PlantMaterial, PlantMesh, texture::srgb_to_linear};
+
+/// Share of a crown's extents that counts as its width: single twigs reach farther.
+const CROWN_SHARE: f32 = 0.8;
+/// Texels along each side of a picture that are looked at, at most.
+const SAMPLES: u32 = 64;
+
+/// Shares of the light, per channel, in the mean over the area of all leaves.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LeafColors {
+    /// Reflected, 0..=1.
+    pub reflected: Vec3,
+    /// Transmitted, 0..=1.
+    pub transmitted: Vec3,
+    /// Area of the leaves in square metres, one side, holes of the alpha test counted as leaf.
+    pub area: f32,
+}
+
+impl Plant {
+    /// The colours of the leaves; black, without area, where there are none.
+    pub fn leaf_colors(&self) -> LeafColors {
+        let mut sum = LeafColors::default();
+        for part in self.parts.iter().filter(|part| part.kind == PartKind::Foliage) {
+            let areas = part.mesh.triangles.iter().map(|triangle| f64::from(area(&part.mesh, triangle)));
+            let area = areas.sum::<f64>().min(1e12) as f32;
+            let (reflected, transmitted) = mean(&part.material);
+            sum.reflected += area * reflected;
+            sum.transmitted += area * transmitted;
+            sum.area += area;
+        }
+        if sum.area > 0.0 {
+            LeafColors { reflected: sum.reflected / sum.area, transmitted: sum.transmitted / sum.area, ..sum }
+        } else {
+            LeafColors::default()
+        }
+    }
+}
+
+impl Plant {
+    /// Width of the crown over the plant's height: the mean of its extents along x and z, of which a crown fills four fifths.
+    /// 0 where there are no leaves or no height.
+    pub fn crown_width(&self) -> f32 {
+        let Some(crown) = self.bounds_of(|kind| kind == PartKind::Foliage) else { return 0.0 };
+        let (size, height) = (crown.size(), self.height());
+        if height > 0.0 { CROWN_SHARE * 0.5 * (size.x + size.z) / height } else { 0.0 }
+    }
+}
+
+impl Plant {
+    /// Length of the crown over the plant's height, 0..=1: that of a crown which is as full from its base to the top and has
+    /// its leaves, in the mean over their areas, at the same height. 0 where there are no leaves or no height.
+    pub fn crown_length(&self) -> f32 {
+        let (mut sum, mut areas) = (0.0, 0.0);
+        for mesh in self.parts.iter().filter(|part| part.kind == PartKind::Foliage).map(|part| &part.mesh) {
+            for triangle in &mesh.triangles {
+                let area = f64::from(area(mesh, triangle));
+                let height =
+                    triangle.iter().filter_map(|&corner| mesh.positions.get(corner as usize)).map(|p| p.y).sum::<f32>();
+                sum += area * f64::from(height / 3.0);
+                areas += area;
+            }
+        }
+        let height = f64::from(self.height());
+        if areas > 0.0 && height > 0.0 { (2.0 * (1.0 - sum / areas / height)).clamp(0.0, 1.0) as f32 } else { 0.0 }
+    }
+}
+
+/// Area of a triangle in square metres; 0 where a corner is missing or not finite.
+fn area(mesh: &PlantMesh, triangle: &[u32; 3]) -> f32 {
+    let corner = |index: u32| mesh.positions.get(index as usize).copied().unwrap_or(Vec3::NAN);
+    let [a, b, c] = triangle.map(corner);
+    let twice = (b - a).cross(c - a).length();
+    if twice.is_finite() { 0.5 * twice } else { 0.0 }
+}
+
+/// Mean reflected and transmitted light over the texels that pass the alpha test.
+fn mean(material: &PlantMaterial) -> (Vec3, Vec3) {
+    let both = |color: Vec3| {
+        let color = color.clamp(Vec3::ZERO, Vec3::ONE);
+        (color, material.transmitted(color))
+    };
+    let Some(image) = &material.base_color_texture else { return both(material.base_color) };
+    let (mut reflected, mut transmitted, mut count) = (Vec3::ZERO, Vec3::ZERO, 0.0);
+    let size = Vec2::new(image.width() as f32, image.height() as f32);
+    let (columns, rows) = (image.width().min(SAMPLES), image.height().min(SAMPLES));
+    for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+        let place = Vec2::new((column as f32 + 0.5) / columns as f32, (row as f32 + 0.5) / rows as f32) * size;
+        let Some(texel) = image.get_pixel_checked(place.x as u32, place.y as u32) else { continue };
+        let [r, g, b, a] = texel.0.map(|code| f32::from(code) / 255.0);
+        if a < material.alpha_cutoff {
+            continue;
+        }
+        let color = Vec3::new(srgb_to_linear(r), srgb_to_linear(g), srgb_to_linear(b)) * material.base_color;
+        let (near, far) = both(color);
+        reflected += near;
+        transmitted += far;
+        count += 1.0;
+    }
+    if count > 0.0 { (reflected / count, transmitted / count) } else { both(material.base_color) }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use image::{Rgba, RgbaImage};
+
+    use super::*;
+    use crate::plant::{Gloss, PlantPart};
+
+    fn square(side: f32) -> PlantMesh {
+        PlantMesh {
+            positions: vec![Vec3::ZERO, Vec3::X * side, Vec3::new(side, side, 0.0), Vec3::Y * side],
+            normals: vec![Vec3::Z; 4],
+            uvs: vec![Vec2::ZERO; 4],
+            triangles: vec![[0, 1, 2], [0, 2, 3], [0, 0, 1], [0, 1, 9]],
+        }
+    }
+
+    fn leaf(side: f32, color: Vec3, image: Option<RgbaImage>) -> PlantPart {
+        let material = PlantMaterial {
+            base_color: color,
+            base_color_texture: image.map(Arc::new),
+            transmission: Vec3::splat(0.5),
+            gloss: Gloss::MATT,
+            ..PlantMaterial::default()
+        };
+        PlantPart { kind: PartKind::Foliage, mesh: square(side), material }
+    }
+
+    #[test]
+    fn colours_are_weighted_by_area_and_holes_have_none() {
+        let wood = PlantPart { kind: PartKind::Wood, ..leaf(9.0, Vec3::ONE, None) };
+        let half =
+            RgbaImage::from_fn(128, 2, |x, _| if x < 64 { Rgba([255, 0, 255, 255]) } else { Rgba([0, 255, 0, 9]) });
+        let plant = |parts| Plant { name: "leaves".into(), parts };
+        let colors = plant(vec![wood.clone(), leaf(1.0, Vec3::splat(0.4), None)]).leaf_colors();
+        assert_eq!((colors.reflected, colors.area), (Vec3::splat(0.4), 1.0));
+        assert!((colors.transmitted - 0.2).abs().max_element() < 1e-6);
+        let colors = plant(vec![leaf(1.0, Vec3::ZERO, None), leaf(2.0, Vec3::ONE, Some(half))]).leaf_colors();
+        assert!((colors.reflected - Vec3::new(0.8, 0.0, 0.8)).abs().max_element() < 1e-6, "{colors:?}");
+        assert_eq!(plant(vec![wood]).leaf_colors(), LeafColors::default());
+        assert_eq!(Plant::default().leaf_colors(), LeafColors::default());
+    }
+}
