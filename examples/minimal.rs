@@ -3,18 +3,25 @@
 use bevy::prelude::*;
 use canopy::prelude::*;
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let stage = Stage::build("assets/scenes/inventory.ron".as_ref(), &Overrides::default(), &mut Silent)?;
+fn main() {
     App::new()
-        .add_plugins((DefaultPlugins, CanopyPlugins))
-        .insert_resource(stage.sky(stage.scene.place.time.utc()))
-        .insert_resource(stage.shadow())
-        .add_systems(Startup, move |mut commands: Commands| {
-            commands.spawn(stage.ground());
-            commands.spawn_batch(stage.forest());
-            let height = stage.terrain.height(0.0, 120.0) as f32 + 20.0;
-            commands.spawn((CanopyCamera, Transform::from_xyz(0.0, height, 120.0)));
-        })
+        .add_plugins((DefaultPlugins, CanopyPlugins, CanopyScenePlugin::new("assets/scenes/inventory.ron")))
+        .add_systems(Update, (tell, look))
         .run();
-    Ok(())
+}
+
+fn tell(progress: Res<SceneProgress>, mut window: Single<&mut Window>) {
+    if progress.is_changed() {
+        window.title = match progress.state {
+            SceneState::Building => format!("{}: {} of {}", progress.step, progress.done, progress.total),
+            state => format!("{state:?}"),
+        };
+    }
+}
+
+fn look(mut commands: Commands, mut ready: MessageReader<SceneReady>) {
+    for SceneReady { stage, .. } in ready.read() {
+        let height = stage.terrain.height(0.0, 120.0) as f32 + 20.0;
+        commands.spawn((CanopyCamera, Transform::from_xyz(0.0, height, 120.0)));
+    }
 }

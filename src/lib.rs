@@ -1,27 +1,38 @@
 //! Canopy: a real-time forest renderer and landscape simulator on Bevy.
 //!
-//! As a library, Canopy is a plugin group and a handful of components. A forest in any Bevy program:
+//! As a library, Canopy is a plugin group and a handful of components. A forest in any Bevy program, which bakes it beside
+//! the frames, with progress, and takes from the cache what it has:
 //!
 //! ```no_run
 //! use bevy::prelude::*;
 //! use canopy::prelude::*;
 //!
-//! fn main() -> Result<(), Box<dyn std::error::Error>> {
-//!     let stage = Stage::build("assets/scenes/demo.ron".as_ref(), &Overrides::default(), &mut Silent)?;
+//! fn main() {
 //!     App::new()
-//!         .add_plugins((DefaultPlugins, CanopyPlugins))
-//!         .insert_resource(stage.sky(stage.scene.place.time.utc()))
-//!         .insert_resource(stage.shadow())
-//!         .add_systems(Startup, move |mut commands: Commands| {
-//!             commands.spawn(stage.ground());
-//!             commands.spawn_batch(stage.forest());
-//!             let height = stage.terrain.height(0.0, 0.0) as f32 + 40.0;
-//!             commands.spawn((CanopyCamera, Transform::from_xyz(0.0, height, 0.0)));
-//!         })
+//!         .add_plugins((DefaultPlugins, CanopyPlugins, CanopyScenePlugin::new("assets/scenes/demo.ron")))
+//!         .add_systems(Update, (tell, look))
 //!         .run();
-//!     Ok(())
+//! }
+//!
+//! fn tell(progress: Res<SceneProgress>, mut failed: MessageReader<SceneFailed>) {
+//!     if progress.is_changed() && progress.state == SceneState::Building {
+//!         println!("{}: {} of {}", progress.step, progress.done, progress.total);
+//!     }
+//!     for failure in failed.read() {
+//!         println!("{failure}");
+//!     }
+//! }
+//!
+//! fn look(mut commands: Commands, mut ready: MessageReader<SceneReady>) {
+//!     for SceneReady { stage, .. } in ready.read() {
+//!         let height = stage.terrain.height(0.0, 0.0) as f32 + 40.0;
+//!         commands.spawn((CanopyCamera, Transform::from_xyz(0.0, height, 0.0)));
+//!     }
 //! }
 //! ```
+//!
+//! Another scene takes its place when a [`LoadScene`](app::LoadScene) asks for it. A program that would rather wait calls
+//! [`Stage::build`](app::Stage::build) itself, and [`Stage::show`](app::Stage::show).
 //!
 //! The rooms: [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`bake`], [`light`], [`lod`],
 //! [`trace`] and [`mod@reference`] know no App and no GPU; [`render`] draws what they make; [`app`] is the interactive
@@ -55,7 +66,7 @@ impl PluginGroup for CanopyPlugins {
 pub mod prelude {
     pub use crate::{
         CanopyPlugins,
-        app::Stage,
+        app::{CanopyScenePlugin, LoadScene, LoadedScene, SceneFailed, SceneProgress, SceneReady, SceneState, Stage},
         lod::FadeBand,
         render::{
             components::{

@@ -6,6 +6,7 @@ mod cli;
 mod grow;
 mod implicit;
 mod light;
+mod load;
 mod plant;
 mod reference;
 mod render;

@@ -101,6 +101,12 @@ pub enum AppError {
         /// The device's limit.
         limit: u32,
     },
+    /// A scene that nobody waits for any more.
+    #[error("the scene was given up before it was ready")]
+    Cancelled,
+    /// A scene that could not be built beside the program.
+    #[error("the scene could not be built: {0}")]
+    Background(String),
     /// Rendering failed.
     #[error("rendering failed: {0}")]
     Render(String),

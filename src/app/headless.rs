@@ -38,7 +38,6 @@ use crate::{
         readback::read_rgb,
         report::{FrameReport, PassOutcome},
     },
-    scatter::PackedTree,
     scene::{Progress, RenderOptions, RenderPlan, RenderReport, Scene, Viewpoint},
 };
 
@@ -58,7 +57,7 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
     let started = Instant::now();
     progress.begin("Renderer", 0);
     let mut renderer = Renderer::with_settings(settings, options.size, stage.scene.quality.msaa)?;
-    renderer.check_trees(&stage)?;
+    adapter::check_trees(renderer.app.world().resource::<RenderDevice>(), &stage)?;
     renderer.show(&stage);
     progress.end();
     progress.note(&format!("renderer: {:.2} s", started.elapsed().as_secs_f64()));
@@ -164,15 +163,6 @@ impl Renderer {
         Ok(Self { app, camera, target, size, warm: false, fault })
     }
 
-    /// Refuses a stand beyond the device's largest storage buffer, in which all trees lie.
-    fn check_trees(&self, stage: &Stage) -> Result<(), AppError> {
-        let limits = self.app.world().resource::<RenderDevice>().limits();
-        let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let limit = usize::try_from(bytes).unwrap_or(usize::MAX) / size_of::<PackedTree>();
-        let count = stage.stand.trees.len();
-        if count > limit { Err(AppError::TooManyTrees { count, limit }) } else { Ok(()) }
-    }
-
     /// Fails with the first error that the device reported since the last time.
     fn check_fault(&self) -> Result<(), AppError> {
         match self.fault.lock().ok().and_then(|mut fault| fault.take()) {
@@ -189,11 +179,8 @@ impl Renderer {
     /// Shows `stage`: its ground, its forest, its quality.
     pub fn show(&mut self, stage: &Stage) {
         let world = self.app.world_mut();
-        world.spawn(stage.ground());
-        if let Some(forest) = stage.forest() {
-            world.spawn(forest);
-        }
-        world.insert_resource(stage.shadow());
+        stage.show(&mut world.commands());
+        world.flush();
     }
 
     /// Sets the light's place and instant, as the scene has them.

@@ -2,6 +2,7 @@
 
 use std::{ops::Range, path::Path, sync::Arc, time::Instant};
 
+use bevy::ecs::{entity::Entity, system::Commands};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -46,11 +47,30 @@ pub struct Stage {
     pub scene: Scene,
 }
 
+/// Entities that show a stage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shown {
+    /// Its ground.
+    pub ground: Entity,
+    /// Its forest, where it has trees.
+    pub forest: Option<Entity>,
+}
+
+impl Shown {
+    /// Takes them out of the world, those that are still there.
+    pub fn despawn(self, commands: &mut Commands) {
+        for entity in self.forest.into_iter().chain([self.ground]) {
+            commands.entity(entity).try_despawn();
+        }
+    }
+}
+
 impl Stage {
     /// Builds the scene in `path`, with what `overrides` replace in it.
     ///
     /// # Errors
-    /// [`AppError`] for anything in the scene or its files that cannot be used.
+    /// [`AppError`] for anything in the scene or its files that cannot be used; [`AppError::Cancelled`] soon after `progress`
+    /// [is cancelled](Progress::is_cancelled), in the midst of the bakes after those of a few plants.
     pub fn build(path: &Path, overrides: &Overrides, progress: &mut dyn Progress) -> Result<Self, AppError> {
         let mut scene = Scene::read(path)?;
         overrides.apply(&mut scene);
@@ -60,6 +80,7 @@ impl Stage {
         progress.end();
         progress.note(&format!("terrain: {:.2} s", started.elapsed().as_secs_f64()));
         let observer = observer(&scene, &terrain, path)?;
+        check_wanted(progress)?;
 
         let has_trees = !matches!(scene.trees, scene::Trees::None);
         let mut species = if has_trees { plants::plan(&scene)? } else { plants::PlantPlan::default() };
@@ -69,6 +90,7 @@ impl Stage {
         progress.begin("Trees", 0);
         let mut stand = trees::build_stand(&scene, &species, &plants, &terrain, progress)?;
         progress.end();
+        check_wanted(progress)?;
         let plants = together::light_together(&scene, &mut species, plants, &mut stand, progress)?;
         let bounds: Vec<VariantBounds> = plants.iter().map(variant_bounds).collect();
         let packed = PackedStand::new(&stand, DEFAULT_CELL_SIZE, &bounds)?;
@@ -88,6 +110,15 @@ impl Stage {
         let suns = scene.species.iter().zip(&species.variants).flat_map(sun).collect();
         let (stand, plants, variants) = (Arc::new(packed), Arc::new(plants), species.variants);
         Ok(Self { terrain, stand, plants, variants, suns, cover, observer, scene })
+    }
+
+    /// Puts ground, forest and shadows into a world. The light is another matter, as time passes: see [`sky`](Self::sky).
+    pub fn show(&self, commands: &mut Commands) -> Shown {
+        commands.insert_resource(self.shadow());
+        Shown {
+            ground: commands.spawn(self.ground()).id(),
+            forest: self.forest().map(|forest| commands.spawn(forest).id()),
+        }
     }
 
     /// The forest of the scene, or `None` without trees.
@@ -142,6 +173,11 @@ impl Stage {
     }
 }
 
+/// Stops a build that nobody waits for any more.
+fn check_wanted(progress: &dyn Progress) -> Result<(), AppError> {
+    if progress.is_cancelled() { Err(AppError::Cancelled) } else { Ok(()) }
+}
+
 pub(super) fn observer(scene: &Scene, terrain: &Terrain, path: &Path) -> Result<Observer, AppError> {
     let known = terrain.reference().and_then(|reference| reference.latitude_longitude());
     let latitude = scene.place.latitude.or(known.map(|place| place.0));
@@ -182,6 +218,7 @@ fn bake(
     let mut fresh = 0;
     // A few at a time: in parallel, and still with progress.
     for group in species.individuals.chunks(rayon::current_num_threads().max(1)) {
+        check_wanted(progress)?;
         let results: Vec<_> = group
             .par_iter()
             .map(|individual| {

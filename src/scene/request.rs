@@ -173,6 +173,11 @@ pub trait Progress: Send {
 
     /// Something worth a line for who wants to know: what was loaded, from which cache, how long it took.
     fn note(&mut self, message: &str);
+
+    /// Whether nobody waits for the result any more. Work that takes long looks now and then, and gives up.
+    fn is_cancelled(&self) -> bool {
+        false
+    }
 }
 
 /// Hears nothing.

@@ -41,11 +41,7 @@ const PIXELS_A_NOTCH: f64 = 100.0;
 /// Puts the stage and the camera into the world.
 pub fn set_up(mut commands: Commands, session: Res<Session>) {
     let stage = &session.stage;
-    commands.spawn(stage.ground());
-    if let Some(forest) = stage.forest() {
-        commands.spawn(forest);
-    }
-    commands.insert_resource(stage.shadow());
+    stage.show(&mut commands);
     commands.spawn((
         Camera3d::default(),
         CanopyCamera,

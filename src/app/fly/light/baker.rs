@@ -16,6 +16,7 @@ use std::{
 };
 
 use crate::{
+    app::threads::spare_cores,
     bake::{
         billboard::{Cross, CrossSettings, bake_cross},
         implicit::{ImplicitParameters, ImplicitSettings, NoSurface, bake_implicit, implicit_parameters},
@@ -290,9 +291,8 @@ impl Baker {
             return;
         }
         if !std::mem::replace(&mut self.started, true) {
-            let others = thread::available_parallelism().map_or(1, |cores| cores.get().saturating_sub(1).max(1));
             self.start(Lane::Quick, 1);
-            self.start(Lane::Thorough, others);
+            self.start(Lane::Thorough, spare_cores());
         }
         let mut state = self.shared.state();
         state.orders += 1;
