@@ -831,6 +831,33 @@ fn cover_maps_refuse_what_they_cannot_hold() {
 }
 
 #[test]
+fn a_widened_cover_is_the_mean_of_the_surroundings() {
+    let mut cover = vec![0; 9 * 9];
+    cover[4 * 9 + 4] = 250;
+    let spot = CoverMap { origin: DVec2::new(-36.0, -36.0), texel: 8.0, columns: 9, rows: 9, cover };
+    let wide = spot.widened(32.0);
+    // A pyramid of nine by nine texels whose top is (5 / 25)².
+    assert_eq!((wide.columns, wide.rows, wide.origin), (17, 17, DVec2::new(-68.0, -68.0)));
+    assert_eq!(wide.at(DVec2::ZERO), 10.0 / 255.0);
+    assert_eq!(wide.at(DVec2::new(40.0, 0.0)), 0.0);
+    for (x, z) in [(8.0, 0.0), (0.0, 16.0), (24.0, 16.0)] {
+        let place = DVec2::new(x, z);
+        let [a, b, c] = [-place, DVec2::new(z, x), DVec2::new(-x, z)].map(|other| wide.at(other));
+        assert!(a == b && b == c && a == wide.at(place), "{place}");
+    }
+    // A closed stand stays closed but at its edge, where half of the surroundings are open.
+    let closed = CoverMap { columns: 40, rows: 40, cover: vec![255; 1600], ..spot.clone() };
+    let wide = closed.widened(32.0);
+    assert_eq!(wide.at(closed.origin + 160.0), 1.0);
+    assert!((0.55..0.65).contains(&wide.at(closed.origin + DVec2::new(4.0, 160.0))));
+    for reach in [0.0, f64::NAN, -3.0, 1e9] {
+        assert_eq!(spot.widened(reach), spot);
+    }
+    let empty = CoverMap { columns: 0, rows: 0, cover: Vec::new(), ..spot };
+    assert_eq!(empty.widened(32.0), empty);
+}
+
+#[test]
 fn a_smoothed_cover_spreads_evenly_and_keeps_its_sum() {
     let map =
         CoverMap { origin: DVec2::new(16.0, -8.0), texel: 8.0, columns: 3, rows: 2, cover: vec![0, 160, 0, 0, 0, 80] };

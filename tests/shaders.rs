@@ -210,9 +210,9 @@ fn gpu_structs_are_what_the_shaders_think() {
         ForestViewUniform { anchor_cell, anchor_offset, anchor_y, cell_size, fade_start, fade_end }
     );
     twin!(layouts, "Plane", PlaneUniform { center, u, v, normal });
-    twin!(layouts, "Variant", VariantUniform { planes, size, transmission, spread, gloss });
+    twin!(layouts, "Variant", VariantUniform { planes, size, transmission, spread, gloss, scattered, scattered_rise });
     twin!(layouts, "Part", PartUniform { base_color, transmission, gloss });
-    twin!(layouts, "Transfer", TransferUniform { scale, form });
+    twin!(layouts, "Transfer", TransferUniform { scale, form, scattered });
     twin!(layouts, "Tree", PackedTree { xz, y, cell, look });
     twin!(layouts, "Tile", GpuTile { origin, spacing, first, morph_start, morph_end, clearance, level });
     twin!(layouts, "TileVertex", GpuTileVertex { height, parent_height, normal, parent_normal });

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use canopy::bake::transfer::{
     Channels, Interior, Projection, TransferBake, TransferFormat, TransferSettings, bake_transfer, exitant_radiance,
-    share,
+    scattered_share, share,
 };
 use canopy::light::{Atmosphere, AtmosphereParams, LightSettings, LightState, SunPosition, sh};
 use canopy::plant::grow::{GrowParameters, grow};
@@ -214,6 +214,35 @@ fn the_light_is_turned_not_the_plant() {
         let still = share(&in_frame, a.parts[0].front_of(vertex, &settings)).x;
         let moved = share(&light, b.parts[0].front_of(vertex, &settings)).x;
         assert!((still - moved).abs() < 0.03, "{still} {moved}");
+    }
+}
+
+#[test]
+fn what_leaves_send_each_other_of_a_sun_is_told_apart() {
+    // A small leaf half a metre over a wide grey one: the sun reaches the underside of the upper over the lower alone.
+    let lower = foliage(sheet(Vec3::ZERO, 8.0, 32), Vec3::splat(0.5), Vec3::ZERO);
+    let upper = foliage(sheet(Vec3::Y * 0.5, 0.01, 1), Vec3::splat(0.5), Vec3::ZERO);
+    let tree = plant(vec![lower, upper]);
+    let bake = bake_transfer(&tree, &PROJECTION);
+    let part = &bake.parts[1];
+    assert_eq!(part.scattered.len(), 4 * 4);
+    for vertex in part.scattered.chunks_exact(4) {
+        // Two bands hold the clamped cosine c as 1/4 + c/2, and the upper side gets nothing: the mean is half of it.
+        for (sun, cosine) in [(Vec3::Y, 1.0), (Vec3::new(0.8, 0.6, 0.0), 0.6)] {
+            let expected = 0.5 * 0.5 / std::f32::consts::PI * (0.25 + 0.5 * cosine);
+            let found = scattered_share(vertex, sun);
+            assert!((found / expected - 1.0).abs() < 0.05, "{found} {expected}");
+        }
+        assert_eq!(scattered_share(vertex, Vec3::NEG_Y), 0.0);
+    }
+    assert_eq!(scattered_share(&[f32::NAN; 4], Vec3::Y), 0.0);
+    let straight = bake_transfer(&tree, &TransferSettings { interior: Interior::Straight(2), ..PROJECTION });
+    assert!(straight.parts[1].scattered.iter().all(|value| *value == 0.0));
+    for format in [TransferFormat::Float32, TransferFormat::Float16, TransferFormat::Snorm8] {
+        let packed = bake.pack(format).unpack();
+        let most = part.scattered.iter().fold(0.0f32, |most, value| most.max(value.abs()));
+        let off = part.scattered.iter().zip(&packed.parts[1].scattered).map(|(a, b)| (a - b).abs());
+        assert!(off.fold(0.0f32, f32::max) <= most / 253.0);
     }
 }
 

@@ -282,3 +282,114 @@ impl Streams {
         (a.0.lerp(b.0, t), a.1.lerp(b.1, t))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::light::{Atmosphere, AtmosphereParams, LightSettings, SunPosition};
+
+    fn light(elevation: f64) -> LightState {
+        let air = Atmosphere::new(AtmosphereParams::with_visibility_km(40.0)).unwrap();
+        let sun = SunPosition::from_degrees(200.0, elevation).unwrap();
+        LightState::new(&air, sun, None, &LightSettings::default()).unwrap()
+    }
+
+    fn leaves(reflected: f32, transmitted: f32) -> StandTrees {
+        StandTrees { reflectance: Vec3::splat(reflected), transmittance: Vec3::splat(transmitted), ..StandTrees::BLACK }
+    }
+
+    #[test]
+    fn without_cover_there_is_the_sky_and_the_open_ground() {
+        let light = light(35.0);
+        let stand = StandLight::new(&light, &leaves(0.1, 0.1));
+        for depth in [0.0, 0.4, 1.0] {
+            let place = stand.at(0.0, depth);
+            assert_eq!((place.sky, place.beam, place.down), (Vec3::ONE, 1.0, Vec3::ZERO));
+            let up = (place.up / light.ground_radiance - 1.0).abs().max_element();
+            // Sums over rings against a finer quadrature.
+            assert!(up < 0.01, "{up}");
+        }
+    }
+
+    #[test]
+    fn it_gets_darker_with_depth_and_cover() {
+        for elevation in [60.0, 8.0] {
+            let stand = StandLight::new(&light(elevation), &leaves(0.1, 0.1));
+            for cover in 0..10 {
+                let cover = cover as f32 / 10.0;
+                assert_eq!(stand.at(cover, 0.0).sky, Vec3::ONE, "the tops see all of the sky");
+                for depth in 0..10 {
+                    let depth = depth as f32 / 10.0;
+                    let (here, deeper, denser) =
+                        (stand.at(cover, depth), stand.at(cover, depth + 0.1), stand.at(cover + 0.1, depth));
+                    for other in [deeper, denser] {
+                        assert!((other.sky - here.sky).max_element() < 1e-6 && other.beam <= here.beam + 1e-6);
+                    }
+                }
+            }
+            let ground = &stand.places()[DEPTHS * COVERS..];
+            assert!(ground.windows(2).all(|pair| pair[1].beam < pair[0].beam && pair[1].sky.y < pair[0].sky.y));
+        }
+    }
+
+    #[test]
+    fn a_low_sky_glow_is_hidden_before_a_high_one() {
+        let trees = leaves(0.1, 0.1);
+        let layer = Layer::new(0.5, &trees);
+        let at = |elevation: f32| layer.left_by_neighbours(0.4, elevation.to_radians().sin());
+        assert!(at(5.0) < 0.7 * at(30.0) && at(30.0) < at(60.0));
+        assert_eq!(at(89.0), 1.0, "straight up there is the own crown alone");
+        // Broad crowns are met by their tops, slender ones by their sides too.
+        let slender = Layer::new(0.5, &StandTrees { crown_width: 0.2, ..trees });
+        assert!(slender.left(0.5, 0.3) < layer.left(0.5, 0.3));
+    }
+
+    #[test]
+    fn leaves_that_swallow_nothing_lose_no_light() {
+        let light = light(40.0);
+        let rings = rings(&light);
+        let sun = Sun { sine: light.key_direction.y, illuminance: light.key_illuminance };
+        let trees = leaves(0.5, 0.5);
+        let layer = Layer::new(0.4, &trees);
+        // A ground that swallows all: what comes in from above leaves upwards or arrives there.
+        let streams = Streams::new(&layer, &rings, &sun, &trees, Vec3::ZERO);
+        let first = |depth: f32| {
+            let ring = |(sine, radiance): &Ring| radiance.y * sine * layer.left(depth, *sine) * 2.0 * PI / RINGS as f32;
+            sun.illuminance.y * sun.sine * layer.left(depth, sun.sine) + rings.iter().map(ring).sum::<f32>()
+        };
+        let (_, out) = streams.at(0.0);
+        let (arrived, _) = streams.at(1.0);
+        let kept = PI * (out.y + arrived.y) + first(1.0);
+        assert!((kept / first(0.0) - 1.0).abs() < 0.01, "{}", kept / first(0.0));
+        // Black leaves over white ground send nothing back that they would have to scatter.
+        let dark = Streams::new(&layer, &rings, &sun, &StandTrees::BLACK, Vec3::ZERO);
+        assert!(dark.bounds.iter().all(|(down, up)| *down == Vec3::ZERO && *up == Vec3::ZERO));
+    }
+
+    #[test]
+    fn no_light_and_impossible_trees_leave_finite_numbers() {
+        let mut black = light(-40.0);
+        black.sky_view.texels.fill([0.0; 3]);
+        black.key_illuminance = Vec3::ZERO;
+        black.sky_illuminance = Vec3::ZERO;
+        black.ground_radiance = Vec3::ZERO;
+        let wild = StandTrees {
+            reflectance: Vec3::splat(f32::NAN),
+            transmittance: Vec3::splat(9.0),
+            crown_width: f32::NAN,
+            crown_length: -1.0,
+        };
+        for light in [black, light(-3.0), light(0.0), light(89.0)] {
+            for trees in [StandTrees::BLACK, leaves(0.5, 0.5), wild, StandTrees { crown_width: 1e9, ..wild }] {
+                let stand = StandLight::new(&light, &trees);
+                for place in stand.places() {
+                    let finite = place.sky.is_finite() && place.beam.is_finite();
+                    assert!(finite && place.down.is_finite() && place.up.is_finite(), "{place:?}");
+                    assert!(place.sky.min_element() >= 0.0 && place.down.min_element() >= 0.0);
+                    assert!(place.up.min_element() >= 0.0 && (0.0..=1.0).contains(&place.beam));
+                }
+                assert!(stand.at(f32::NAN, f32::INFINITY).up.is_finite());
+            }
+        }
+    }
+}

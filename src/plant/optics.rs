@@ -146,4 +146,17 @@ mod tests {
         assert_eq!(plant(vec![wood]).leaf_colors(), LeafColors::default());
         assert_eq!(Plant::default().leaf_colors(), LeafColors::default());
     }
+
+    #[test]
+    fn a_crown_is_measured_by_its_leaves() {
+        let mut crown = leaf(4.0, Vec3::ONE, None);
+        crown.mesh.positions.iter_mut().for_each(|position| position.y += 6.0);
+        let trunk = PlantPart { kind: PartKind::Wood, ..leaf(1.0, Vec3::ONE, None) };
+        let tree = Plant { name: "tree".into(), parts: vec![trunk.clone(), crown] };
+        // 4 m wide along x and flat along z, from 6 m to 10 m.
+        assert!((tree.crown_width() - 0.8 * 0.5 * 4.0 / 10.0).abs() < 1e-6);
+        assert!((tree.crown_length() - 0.4).abs() < 1e-6, "{}", tree.crown_length());
+        let bare = Plant { name: "bare".into(), parts: vec![trunk] };
+        assert_eq!((bare.crown_width(), bare.crown_length(), Plant::default().crown_length()), (0.0, 0.0, 0.0));
+    }
 }
