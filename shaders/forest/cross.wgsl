@@ -145,12 +145,20 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         // The crown's own shadow: its far side lies behind all of its leaves, of which the maps know one picture.
         let side = dot(normal, light.key_direction.xyz);
         let own = mix(1.0, smoothstep(-0.6, 0.3, side), foliage);
-        visibility *= mix(own, near.x * mix(0.75, 1.0, own), near.y);
+        visibility *= mix(own * mix(1.0, stand.beam, foliage), near.x * mix(0.75, 1.0, own), near.y);
     }
-    visibility *= select(mix(1.0, leaf_visibility(properties.b), foliage), 1.0, traced);
+    let among = select(leaf_visibility(properties.b), lit_and_seen(surface.viewer), traced);
+    visibility *= mix(1.0, among, foliage);
     var color = shade(surface, visibility, sky);
     color = mix(color, vec3(0.2, 0.35, 1.0) * dot(color, vec3(0.5)), 0.6 * frame.flags.y);
     return vec4(night_vision(apply_fog(color, in.relative)), coverage);
+}
+
+// Share of the leaves that a viewer sees of a crown which the light reaches between the others. What one sees from the
+// light's own side is lit [Kuusk 1991, the hot spot]; the farther apart both are, the more of it lies in shade. Fitted to
+// traced stands of oaks and of grown trees, seen with the light and against it (benches/README.md, crosses).
+fn lit_and_seen(viewer: vec3<f32>) -> f32 {
+    return 0.725 + 0.275 * dot(viewer, light.key_direction.xyz);
 }
 
 // How far the leaves that a texel stands for face everywhere.
