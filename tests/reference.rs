@@ -6,7 +6,7 @@ use std::sync::Arc;
 use canopy::light::moon::MoonSetting;
 use canopy::light::{Atmosphere, AtmosphereParams, LightSettings, LightState, Observer, SkyView, SunPosition};
 use canopy::plant::grow::{GrowParameters, grow};
-use canopy::plant::{PartKind, Plant, PlantMaterial, PlantMesh, PlantPart};
+use canopy::plant::{Gloss, PartKind, Plant, PlantMaterial, PlantMesh, PlantPart};
 use canopy::reference::{
     Camera, Development, Disc, Environment, Film, Fog, Ground, GroundColor, GroundShape, Instance, Light, Normals,
     PathTracer, ReferenceError, ReferenceScene, Shot, SurfaceSample, TraceSettings, WorldRay,
@@ -87,6 +87,13 @@ fn shot(position: DVec3, yaw: f64, pitch: f64, size: (u32, u32)) -> Shot {
     Shot { camera: Camera { view, size, near: 0.0 }, fog: None }
 }
 
+/// A single pixel's view of next to nothing.
+fn narrow(position: DVec3, pitch: f64) -> Shot {
+    let shot = shot(position, 0.0, pitch, (1, 1));
+    let view = Viewpoint { field_of_view: 1e-4, ..shot.camera.view };
+    Shot { camera: Camera { view, ..shot.camera }, fog: None }
+}
+
 fn film(tracer: &PathTracer, shot: &Shot, samples: u32) -> Film {
     let mut film = Film::new(shot).unwrap();
     tracer.render(shot, &mut film, samples, &mut |_| ControlFlow::Continue(())).unwrap();
@@ -137,6 +144,117 @@ fn white_furnace_leaves_that_absorb_nothing_vanish() {
         let scene = scene(&leaves(&heights, 1.5, 0.6, 0.4 / 0.6));
         let film = film(&PathTracer::new(&scene, &light, FLAT).unwrap(), &shot, samples);
         assert!(close(mean(&film), 1.0, bound), "{}", mean(&film));
+    }
+}
+
+/// The plant with leaves of this gloss.
+fn glossy(plant: &Arc<Plant>, reflectance: f32, roughness: f32) -> Arc<Plant> {
+    let mut plant = Plant::clone(plant);
+    plant.set_leaf_gloss(Gloss { reflectance, roughness });
+    Arc::new(plant)
+}
+
+#[test]
+fn white_furnace_gloss_loses_only_what_its_facets_shade() {
+    // One leaf of base colour 0.6 that transmits as much as the rest: it absorbs nothing but what its single scattering
+    // loses. Where the diffuse light leaves the lobe no more than its mean, a viewer in the plane of the leaf sets how bright
+    // it may be, and all others see less: of a gloss of some 0.045 at most the whole.
+    let light = Light::even(Vec3::ONE);
+    let shot = shot(DVec3::new(0.0, 4.0, 4.0), 0.0, -0.78, (12, 12));
+    for roughness in [0.0, 0.1, 0.4, 1.0] {
+        let scene = self::scene(&glossy(&leaves(&[0.0], 1.5, 0.6, 100.0), 0.045, roughness));
+        let film = film(&PathTracer::new(&scene, &light, FLAT).unwrap(), &shot, 256);
+        let mut pixels = film.radiance();
+        pixels.sort_by(|a, b| a.y.total_cmp(&b.y));
+        let darkest = pixels[0].y;
+        assert!(pixels.iter().all(|pixel| pixel.max_element() < 1.01) && darkest > 0.95, "{roughness}: {darkest}");
+        // A leaf that absorbs half has room for its whole gloss, and sends back its base colour in the mean of all views.
+        let half = self::scene(&glossy(&leaves(&[0.0], 1.5, 0.3, 0.0), 0.045, roughness));
+        let tracer = PathTracer::new(&half, &light, FLAT).unwrap();
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for step in 0..24 {
+            let height = (f64::from(step) + 0.5) / 24.0;
+            let from = DVec3::new(0.0, height, (1.0 - height * height).sqrt());
+            let narrow = narrow(from * 50.0, -height.asin());
+            sum += height * f64::from(mean(&self::film(&tracer, &narrow, 512)).y);
+            weights += height;
+        }
+        assert!((sum / weights / 0.3 - 1.0).abs() < 0.01, "{roughness}: {}", sum / weights);
+    }
+}
+
+#[test]
+fn a_smooth_leaf_mirrors_the_sun_and_a_rough_one_spreads_it() {
+    let direction = Vec3::new(0.0, 0.8, -0.6);
+    let key = Disc { direction, illuminance: Vec3::splat(1000.0), angular_radius: 0.0047 };
+    let light = Light { key: Some(key), ..Light::even(Vec3::ZERO) };
+    let views = |roughness: f32, turn: f32| {
+        let scene = scene(&glossy(&leaves(&[0.0], 1.5, 0.3, 0.0), 0.045, roughness));
+        let tracer = PathTracer::new(&scene, &light, FLAT).unwrap();
+        // 0: the mirror direction, on the other side of the vertical.
+        let view = |height: f64| {
+            let from = DVec3::new(0.0, height.sin(), height.cos()) * 50.0;
+            f64::from(mean(&film(&tracer, &narrow(from, -height), 64)).y)
+        };
+        view(0.8f64.asin() + f64::from(turn))
+    };
+    let matt = 0.3 / std::f64::consts::PI * 1000.0 * 0.8;
+    let found = [-0.6, -0.3, 0.0, 0.3, 0.6].map(|turn| views(0.1, turn));
+    assert!(found[2] > 10.0 * found[1].max(found[3]) && found[2] > 3.0 * matt, "{found:?}");
+    assert!(found.iter().all(|value| *value > 0.8 * matt), "{found:?}");
+    // The peak of the formula: strength · F · D · V at the facet that looks up, with the disc's own width smoothed out.
+    let (width, inside) = (0.1f64, (0.3f64.powi(2) + 0.045f64.powi(2)).sqrt() - 0.045);
+    let fresnel = 0.5 + 10.5 * 0.2f64.powi(5);
+    let masking = 0.5 / (2.0 * 0.64 * (1.0 - width) + 1.6 * width);
+    let peak = (0.3 - inside) * fresnel / (std::f64::consts::PI * width * width) * masking * 0.8 * 1000.0;
+    let shown = found[2] - inside / std::f64::consts::PI * 800.0;
+    // 0.757: what the formula carries of its strength at that width.
+    assert!((shown / (peak / 0.757) - 1.0).abs() < 0.02, "{shown} {peak}");
+    let rough = [-0.3, 0.0, 0.3].map(|turn| views(1.0, turn));
+    assert!(rough[1] < 1.4 * rough[0].min(rough[2]), "{rough:?}");
+}
+
+#[test]
+fn light_of_the_sky_is_the_same_however_it_is_found() {
+    // Directions by the sky's brightness and by the leaf's lobe, weighted against each other, and by the leaf alone.
+    let axis = Vec2::new(0.6, -0.8);
+    let mut view = SkyView { axis, texels: vec![[0.5; 3]; SkyView::WIDTH * SkyView::HEIGHT] };
+    let sun = view.direction(70.0, 30.0);
+    view.add(|d| Vec3::splat(60.0 * (30.0 * (d.dot(sun) - 1.0)).exp()));
+    let scene = scene(&glossy(&leaves(&[0.0], 1.5, 0.3, 0.8), 0.08, 0.15));
+    let light = Light { environment: Environment::Sky { view: view.clone(), below: None }, ..Light::even(Vec3::ZERO) };
+    let tracer = PathTracer::new(&scene, &light, FLAT).unwrap();
+    for (azimuth, height) in [(0.0, 0.4f64), (2.5, 0.9), (4.0, 0.2)] {
+        let from = DVec3::new(f64::sin(azimuth) * height.cos(), height.sin(), f64::cos(azimuth) * height.cos());
+        let shot = Shot {
+            camera: Camera {
+                view: Viewpoint { position: from * 50.0, yaw: azimuth, pitch: -height, field_of_view: 1e-4 },
+                ..narrow(from, 0.0).camera
+            },
+            fog: None,
+        };
+        let found = f64::from(mean(&film(&tracer, &shot, 4096)).y);
+        // The formula in f64 over an even net of the sphere.
+        let (width, c, s) = (0.15f64, 0.3f64, 0.08f64);
+        let inside = (c * c + s * s).sqrt() - s;
+        let (mut sum, net) = (0.0, 1000);
+        for (i, j) in (0..net).flat_map(|i| (0..net).map(move |j| (i, j))) {
+            let y = 2.0 * (f64::from(i) + 0.5) / f64::from(net) - 1.0;
+            let around = std::f64::consts::TAU * (f64::from(j) + 0.5) / f64::from(net);
+            let light = DVec3::new((1.0 - y * y).sqrt() * around.cos(), y, (1.0 - y * y).sqrt() * around.sin());
+            let radiance = f64::from(view.sample(light.as_vec3()).y);
+            let value = if y < 0.0 {
+                -y * 0.8 * inside / std::f64::consts::PI
+            } else {
+                let middle = (from + light).normalize();
+                let distribution = (width / (middle.y.powi(2) * (width * width - 1.0) + 1.0)).powi(2);
+                let masking = 0.5 / (2.0 * y * from.y * (1.0 - width) + (y + from.y) * width);
+                let fresnel = 0.5 + 10.5 * (1.0 - middle.dot(light)).powi(5);
+                y / std::f64::consts::PI * (inside + (c - inside) / 0.680 * fresnel * distribution * masking)
+            };
+            sum += radiance * value * 4.0 * std::f64::consts::PI / f64::from(net * net);
+        }
+        assert!((found / sum - 1.0).abs() < 0.02, "{height}: {found} {sum}");
     }
 }
 
@@ -210,11 +328,7 @@ fn a_sphere_under_half_a_sky_has_its_form_factor() {
     let key = Disc { direction, illuminance: Vec3::splat(1000.0), angular_radius: 0.0 };
     let light = Light { key: Some(key), ..Light::even(Vec3::ZERO) };
     let tracer = PathTracer::new(&ball, &light, FLAT).unwrap();
-    let shot = shot(DVec3::new(0.0, 1.0, 500.0), 0.0, 0.0, (1, 1));
-    let narrow = Shot {
-        camera: Camera { view: Viewpoint { field_of_view: 1e-4, ..shot.camera.view }, ..shot.camera },
-        fog: None,
-    };
+    let narrow = narrow(DVec3::new(0.0, 1.0, 500.0), 0.0);
     let expected = 0.7 / std::f32::consts::PI * 1000.0 * direction.z;
     assert!(close(mean(&film(&tracer, &narrow, 64)), expected, 0.05));
 }
@@ -359,11 +473,13 @@ fn checkpoints_that_are_stale_or_damaged_are_refused() {
     let state = daylight("2026-06-21T11:30:00Z");
     let moved = grove(&oak, DVec3::new(0.0, 0.5, 0.0));
     let replanted = grove(&other, DVec3::ZERO);
+    let shiny = grove(&glossy(&oak, Gloss::LEAF.reflectance, 0.2), DVec3::ZERO);
     let mut sun = sunny();
     sun.environment = Environment::Even(Vec3::splat(3000.0));
     let keys = [
         PathTracer::new(&moved, &sunny(), settings).unwrap().fingerprint(&shot),
         PathTracer::new(&replanted, &sunny(), settings).unwrap().fingerprint(&shot),
+        PathTracer::new(&shiny, &sunny(), settings).unwrap().fingerprint(&shot),
         PathTracer::new(&scene, &sun, settings).unwrap().fingerprint(&shot),
         PathTracer::new(&scene, &sunny(), TraceSettings { bounces: 3, ..settings }).unwrap().fingerprint(&shot),
         PathTracer::new(&scene, &sunny(), TraceSettings { seed: 2, ..settings }).unwrap().fingerprint(&shot),

@@ -45,6 +45,15 @@ impl Gloss {
         };
         Self { reflectance: within(self.reflectance, 0.0, 0.09, 0.0), roughness: within(self.roughness, 0.1, 1.0, 1.0) }
     }
+
+    /// The part of the linear colour `base_color` that has been inside the leaf, channel by channel; the rest of it is the
+    /// gloss. 0..1.
+    pub fn inside(&self, base_color: Vec3) -> Vec3 {
+        let c = base_color.clamp(Vec3::ZERO, Vec3::ONE);
+        let s = Vec3::splat(self.in_range().reflectance);
+        // sqrt(c² + s²) - s without cancellation.
+        c * c / ((c * c + s * s).map(f32::sqrt) + s).max(Vec3::splat(1e-6))
+    }
 }
 
 impl Plant {
@@ -73,10 +82,7 @@ impl PlantMaterial {
     /// `leaf_transmission` in `shaders/common/lighting.wgsl`, which gives it as a factor on the base colour.
     pub fn transmitted(&self, base_color: Vec3) -> Vec3 {
         let c = base_color.clamp(Vec3::ZERO, Vec3::ONE);
-        let s = Vec3::splat(self.gloss.in_range().reflectance);
-        // sqrt(c² + s²) - s without cancellation.
-        let inside = c * c / ((c * c + s * s).map(f32::sqrt) + s).max(Vec3::splat(1e-6));
-        (self.transmission * inside).clamp(Vec3::ZERO, Vec3::ONE - c)
+        (self.transmission * self.gloss.inside(c)).clamp(Vec3::ZERO, Vec3::ONE - c)
     }
 }
 

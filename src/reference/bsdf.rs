@@ -1,16 +1,54 @@
-//! The leaf, the bark and the ground as light sees them: diffuse reflection and diffuse transmission.
+//! The leaf, the bark and the ground as light sees them: diffuse reflection, diffuse transmission, and the gloss of leaves.
 //!
-//! The twin of `shade` in `shaders/common/lighting.wgsl`: a surface sends back `albedo / pi` of the light on the
-//! viewer's side, and `albedo * transmission / pi` of the light on the other [Franzke 2005, 4.2.2, the diffuse terms]. The
-//! light through a leaf has the colour that `plant/gloss.rs` derives, as in the shader. The gloss has no lobe here: as it is a
-//! part of the base colour, the same light leaves a surface in the mean over all directions.
+//! The twin of `shade` in `shaders/common/lighting.wgsl` [Franzke 2005, 4.2.2]: a surface sends back `reflected / pi` of the
+//! light on the viewer's side, and `transmitted / pi` of the light on the other. A leaf with gloss reflects diffusely what has
+//! been inside it alone, and the rest of its base colour around the mirror direction, on either side ([`Lobe`]). Which share
+//! is which, and the colour of the light through a leaf, `plant/gloss.rs` derives, as for the shader.
 //!
-//! Energy: both shares together may not exceed 1. A material that says otherwise is scaled down, channel by channel, to
-//! reflect and transmit 1 together in the ratio that it states.
+//! The shader takes the gloss out of the key light alone and has leaves smaller than a pixel reflect like a ball. Here the
+//! lobe is there for all light, and each leaf mirrors about its own normal.
+//!
+//! Energy: all shares together may not exceed 1. A material that says otherwise is scaled down, channel by channel, to
+//! reflect and transmit 1 together in the ratio that it states; the lobe fits itself into what they leave.
 
 use std::f32::consts::{PI, TAU};
 
 use glam::{Vec2, Vec3};
+
+use super::lobe::Lobe;
+use crate::plant::Gloss;
+
+/// What a material does with light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Shares {
+    /// Share that is reflected diffusely.
+    pub reflected: Vec3,
+    /// Share that is transmitted diffusely.
+    pub transmitted: Vec3,
+    /// What is reflected around the mirror direction.
+    pub lobe: Option<Lobe>,
+}
+
+impl Shares {
+    /// A surface without gloss, brought to at most 1.
+    pub fn matt(reflected: Vec3, transmitted: Vec3) -> Self {
+        let (reflected, transmitted) = (share(reflected), share(transmitted));
+        let scale = (reflected + transmitted).max(Vec3::ONE).recip();
+        Self { reflected: reflected * scale, transmitted: transmitted * scale, lobe: None }
+    }
+
+    /// A surface that reflects `reflected` in the mean over all directions, its gloss included.
+    pub fn glossy(reflected: Vec3, transmitted: Vec3, gloss: Gloss) -> Self {
+        let whole = Self::matt(reflected, transmitted);
+        let gloss = gloss.in_range();
+        if gloss.reflectance <= 0.0 {
+            return whole;
+        }
+        let inside = gloss.inside(whole.reflected);
+        let (sheen, room) = (whole.reflected - inside, Vec3::ONE - inside - whole.transmitted);
+        Self { reflected: inside, lobe: Lobe::new(sheen, room, gloss.roughness), ..whole }
+    }
+}
 
 /// A surface seen from one side.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,9 +57,11 @@ pub(crate) struct Bsdf {
     geometric: Vec3,
     /// Unit normal that the cosine counts from; within a right angle of `geometric`.
     shading: Vec3,
-    /// Shares of the light that are reflected and transmitted.
-    reflected: Vec3,
-    transmitted: Vec3,
+    /// Unit vector to the viewer.
+    to_viewer: Vec3,
+    shares: Shares,
+    /// About what the lobe returns to the viewer, summed over the channels; 0 without one.
+    gloss: f32,
 }
 
 /// A direction that the surface scatters light from.
@@ -41,62 +81,89 @@ fn share(value: Vec3) -> Vec3 {
 }
 
 impl Bsdf {
-    /// A surface that reflects and transmits these shares of the light, seen from the unit direction `to_viewer`.
-    /// `geometric` and `shading` are unit normals of either side.
-    pub fn new(geometric: Vec3, shading: Vec3, reflected: Vec3, transmitted: Vec3, to_viewer: Vec3) -> Self {
+    /// A surface of these shares, seen from the unit direction `to_viewer`. `geometric` and `shading` are unit normals of
+    /// either side.
+    pub fn new(geometric: Vec3, shading: Vec3, shares: Shares, to_viewer: Vec3) -> Self {
         let geometric = if geometric.dot(to_viewer) < 0.0 { -geometric } else { geometric };
         let shading = if shading.dot(geometric) < 0.0 { -shading } else { shading };
-        Self { geometric, shading, reflected, transmitted }
+        // A viewer behind the plane of an interpolated normal sees no facets; what they would send is lost.
+        let cosine = shading.dot(to_viewer);
+        let gloss = shares.lobe.filter(|_| cosine >= 0.0).map_or(0.0, |lobe| lobe.weight(cosine));
+        Self { geometric, shading, to_viewer, shares, gloss }
+    }
+
+    /// The lobe, where the viewer sees it.
+    fn lobe(&self) -> Option<&Lobe> {
+        self.shares.lobe.as_ref().filter(|_| self.gloss > 0.0)
     }
 
     /// The scattering function times the cosine for light from `direction`: what radiance per steradian counts.
     pub fn cosine_weighted(&self, direction: Vec3) -> Vec3 {
         let (flat, cosine) = (self.geometric.dot(direction), self.shading.dot(direction));
         if flat > 0.0 && cosine > 0.0 {
-            self.reflected * (cosine / PI)
+            let diffuse = self.shares.reflected * (cosine / PI);
+            let gloss = |lobe: &Lobe| lobe.cosine_weighted(self.shading, self.to_viewer, direction);
+            self.lobe().map_or(diffuse, |lobe| diffuse + gloss(lobe))
         } else if flat < 0.0 && cosine < 0.0 {
-            self.transmitted * (-cosine / PI)
+            self.shares.transmitted * (-cosine / PI)
         } else {
             Vec3::ZERO
         }
     }
 
-    /// The probability that [`Self::sample`] reflects; the rest transmits. `None` for a black surface.
-    fn reflection_probability(&self) -> Option<f32> {
-        let (reflected, transmitted) = (self.reflected.element_sum(), self.transmitted.element_sum());
-        let sum = reflected + transmitted;
-        (sum > 0.0).then(|| reflected / sum)
+    /// The probabilities that [`Self::sample`] reflects diffusely and by the lobe; the rest transmits. `None` for a black
+    /// surface.
+    fn probabilities(&self) -> Option<(f32, f32)> {
+        let (reflected, transmitted) = (self.shares.reflected.element_sum(), self.shares.transmitted.element_sum());
+        let sum = reflected + transmitted + self.gloss;
+        (sum > 0.0).then(|| (reflected / sum, self.gloss / sum))
     }
 
     /// Probability density with which [`Self::sample`] finds `direction`, 1/sr.
     pub fn density(&self, direction: Vec3) -> f32 {
         let cosine = self.shading.dot(direction);
-        let probability = self.reflection_probability().unwrap_or(0.0);
-        let side = if cosine > 0.0 { probability } else { 1.0 - probability };
-        side * cosine.abs() / PI
+        let (diffuse, gloss) = self.probabilities().unwrap_or_default();
+        if cosine > 0.0 {
+            let lobe = |lobe: &Lobe| gloss * lobe.density(self.shading, self.to_viewer, direction);
+            diffuse * cosine / PI + self.lobe().map_or(0.0, lobe)
+        } else {
+            (1.0 - diffuse - gloss) * -cosine / PI
+        }
     }
 
-    /// A direction by the cosine, `lobe` in 0..1 choosing the side. `None` where the surface is black or where the
-    /// direction lies between the two normals' planes, from which no light comes.
-    pub fn sample(&self, lobe: f32, point: Vec2) -> Option<Scattered> {
-        let probability = self.reflection_probability()?;
-        let reflects = lobe < probability;
-        let (side, probability, share) =
-            if reflects { (1.0, probability, self.reflected) } else { (-1.0, 1.0 - probability, self.transmitted) };
+    /// A direction by the cosine or by the lobe, `choice` in 0..1 choosing between them and the sides. `None` where the
+    /// surface is black or where no light comes from the direction: between the two normals' planes, and where a facet sends
+    /// it against another.
+    pub fn sample(&self, choice: f32, point: Vec2) -> Option<Scattered> {
+        let (diffuse, gloss) = self.probabilities()?;
+        if let Some(lobe) = self.lobe().filter(|_| (diffuse..diffuse + gloss).contains(&choice)) {
+            let direction = lobe.sample(self.shading, self.to_viewer, point);
+            return self.mixed(direction);
+        }
+        let (side, probability, share) = if choice < diffuse {
+            (1.0, diffuse, self.shares.reflected)
+        } else {
+            (-1.0, 1.0 - diffuse - gloss, self.shares.transmitted)
+        };
         let direction = cosine_hemisphere(self.shading * side, point);
         let cosine = side * self.shading.dot(direction);
         if cosine <= 0.0 || side * self.geometric.dot(direction) <= 0.0 || probability <= 0.0 {
             return None;
         }
+        if side > 0.0 && self.lobe().is_some() {
+            return self.mixed(direction);
+        }
         Some(Scattered { direction, weight: share / probability, density: probability * cosine / PI })
     }
-}
 
-/// Reflected and transmitted shares as a material states them, brought to at most 1 together.
-pub(crate) fn balanced(reflected: Vec3, transmitted: Vec3) -> (Vec3, Vec3) {
-    let (reflected, transmitted) = (share(reflected), share(transmitted));
-    let scale = (reflected + transmitted).max(Vec3::ONE).recip();
-    (reflected * scale, transmitted * scale)
+    /// A direction on the viewer's side that either the cosine or the lobe may have found.
+    fn mixed(&self, direction: Vec3) -> Option<Scattered> {
+        let value = self.cosine_weighted(direction);
+        let density = self.density(direction);
+        let before = self.geometric.dot(direction) > 0.0 && self.shading.dot(direction) > 0.0;
+        let weight = value / density;
+        (before && weight.is_finite()).then_some(Scattered { direction, weight, density })
+    }
 }
 
 /// A direction around the unit vector `axis`, by the cosine (Malley's method over concentric squares, Shirley & Chiu
@@ -138,8 +205,14 @@ mod tests {
     use super::*;
     use crate::reference::sampler::PathSampler;
 
-    fn leaf(shading: Vec3) -> Bsdf {
-        Bsdf::new(Vec3::Y, shading, Vec3::new(0.5, 0.3, 0.1), Vec3::new(0.4, 0.15, 0.02), Vec3::new(0.2, 0.9, 0.1))
+    const SHINY: Gloss = Gloss { reflectance: 0.09, roughness: 0.3 };
+
+    /// A matt leaf and a glossy one of the same colour.
+    fn leaves(shading: Vec3) -> [Bsdf; 2] {
+        [Gloss::MATT, SHINY].map(|gloss| {
+            let shares = Shares::glossy(Vec3::new(0.5, 0.3, 0.1), Vec3::new(0.4, 0.15, 0.02), gloss);
+            Bsdf::new(Vec3::Y, shading, shares, Vec3::new(0.2, 0.9, 0.1).normalize())
+        })
     }
 
     /// An even direction of the sphere.
@@ -150,54 +223,111 @@ mod tests {
     #[test]
     fn energy_is_conserved_whatever_the_material_says() {
         for (reflected, transmitted) in [(0.3, 0.5), (1.0, 1.0), (0.9, 0.4), (7.0, f32::NAN), (-1.0, 3.0)] {
-            let (reflected, transmitted) = balanced(Vec3::splat(reflected), Vec3::splat(transmitted));
-            assert!((reflected + transmitted).max_element() <= 1.0 + 1e-6);
-            assert!(reflected.min_element() >= 0.0 && transmitted.min_element() >= 0.0);
+            let shares = Shares::matt(Vec3::splat(reflected), Vec3::splat(transmitted));
+            assert!((shares.reflected + shares.transmitted).max_element() <= 1.0 + 1e-6);
+            assert!(shares.reflected.min_element() >= 0.0 && shares.transmitted.min_element() >= 0.0);
         }
-        assert_eq!(balanced(Vec3::splat(0.4), Vec3::splat(0.5)), (Vec3::splat(0.4), Vec3::splat(0.5)));
-        let (reflected, transmitted) = balanced(Vec3::ONE, Vec3::splat(0.25));
+        let whole = Shares::matt(Vec3::splat(0.4), Vec3::splat(0.5));
+        assert_eq!((whole.reflected, whole.transmitted), (Vec3::splat(0.4), Vec3::splat(0.5)));
+        let Shares { reflected, transmitted, .. } = Shares::matt(Vec3::ONE, Vec3::splat(0.25));
         assert!((reflected + transmitted - 1.0).abs().max_element() < 1e-6);
         assert!((transmitted / reflected - 0.25).abs().max_element() < 1e-6);
     }
 
     #[test]
+    fn no_direction_gets_more_than_there_is() {
+        for index in 0..256 {
+            let mut sampler = PathSampler::new(11, 0, index);
+            let (colors, gloss, view) = (sampler.pair(), sampler.pair(), sampler.pair());
+            let colors = [colors, sampler.pair(), sampler.pair()].map(|pair| pair * 1.2);
+            let reflected = Vec3::from(colors.map(|pair| pair.x));
+            let transmitted = Vec3::from(colors.map(|pair| pair.y));
+            let gloss = Gloss { reflectance: 0.1 * gloss.x, roughness: 1.1 * gloss.y };
+            let shares = Shares::glossy(reflected, transmitted, gloss);
+            // Every other viewer near the surface's plane.
+            let height = if index % 2 == 0 { view.x } else { view.x.powi(8) };
+            let level = (1.0 - height * height).sqrt();
+            let bsdf = Bsdf::new(Vec3::Y, Vec3::Y, shares, Vec3::new(level, height, 0.0));
+            let (mut sum, count) = (Vec3::ZERO, 1 << 14);
+            for index in 0..count {
+                let mut sampler = PathSampler::new(12, 0, index);
+                sum += bsdf.sample(sampler.pair().x, sampler.pair()).map_or(Vec3::ZERO, |scattered| scattered.weight);
+            }
+            let sum = sum / count as f32;
+            assert!(sum.is_finite() && sum.max_element() <= 1.02, "{shares:?} at {height}: {sum}");
+        }
+    }
+
+    #[test]
     fn integral_and_samples_agree_with_the_shares() {
         for shading in [Vec3::Y, Vec3::new(0.5, 1.0, -0.3).normalize()] {
-            let bsdf = leaf(shading);
-            let count = 1 << 14;
-            let (mut even, mut drawn, mut densities) = (Vec3::ZERO, Vec3::ZERO, 0.0);
-            for index in 0..count {
-                let mut sampler = PathSampler::new(1, 0, index);
-                let direction = sphere(sampler.pair());
-                even += bsdf.cosine_weighted(direction) * (4.0 * PI);
-                densities += bsdf.density(direction) * (4.0 * PI);
-                if let Some(scattered) = bsdf.sample(sampler.pair().x, sampler.pair()) {
-                    drawn += scattered.weight;
-                    let expected = bsdf.cosine_weighted(scattered.direction) / scattered.density;
-                    assert!((expected - scattered.weight).abs().max_element() < 1e-3, "{expected}");
-                    assert!((bsdf.density(scattered.direction) / scattered.density - 1.0).abs() < 1e-4);
+            for bsdf in leaves(shading) {
+                let count = 1 << 14;
+                let (mut even, mut drawn, mut densities, mut lost) = (Vec3::ZERO, Vec3::ZERO, 0.0, 0.0);
+                for index in 0..count {
+                    let mut sampler = PathSampler::new(1, 0, index);
+                    let direction = sphere(sampler.pair());
+                    even += bsdf.cosine_weighted(direction) * (4.0 * PI);
+                    densities += bsdf.density(direction) * (4.0 * PI);
+                    let (choice, point) = (sampler.pair().x, sampler.pair());
+                    if let Some(scattered) = bsdf.sample(choice, point) {
+                        drawn += scattered.weight;
+                        let expected = bsdf.cosine_weighted(scattered.direction) / scattered.density;
+                        assert!((expected - scattered.weight).abs().max_element() < 1e-3, "{expected}");
+                        assert!((bsdf.density(scattered.direction) / scattered.density - 1.0).abs() < 1e-4);
+                    } else if let Some((diffuse, gloss)) = bsdf.probabilities()
+                        && (diffuse..diffuse + gloss).contains(&choice)
+                    {
+                        let lobe = bsdf.lobe().unwrap();
+                        lost += f32::from(u8::from(lobe.sample(shading, bsdf.to_viewer, point).dot(shading) <= 0.0));
+                    }
                 }
+                let (even, drawn) = (even / count as f32, drawn / count as f32);
+                let all = bsdf.shares.reflected + bsdf.shares.transmitted;
+                assert!((even - drawn).abs().max_element() < 4e-3, "{even} {drawn}");
+                assert!(((densities + lost) / count as f32 - 1.0).abs() < 2e-3);
+                // Between the planes of two different normals nothing is scattered: energy is lost there, never made. Of a
+                // glossy leaf more comes to some viewers than in the mean, and less to others.
+                let most = if bsdf.lobe().is_some() { 0.8 * SHINY.reflectance } else { 0.0 };
+                assert!((drawn - all).max_element() < 2e-3 + most);
+                assert!(shading != Vec3::Y || (drawn - all).min_element() > -2e-3);
             }
-            let (even, drawn) = (even / count as f32, drawn / count as f32);
-            let all = bsdf.reflected + bsdf.transmitted;
-            assert!((even - drawn).abs().max_element() < 4e-3, "{even} {drawn}");
-            assert!((densities / count as f32 - 1.0).abs() < 2e-3);
-            // Between the planes of two different normals nothing is scattered: energy is lost there, never made.
-            assert!((drawn - all).max_element() < 2e-3);
-            assert!(shading != Vec3::Y || (drawn - all).abs().max_element() < 2e-3);
         }
     }
 
     #[test]
     fn the_scattering_function_is_reciprocal() {
-        let (reflected, transmitted) = (Vec3::new(0.5, 0.3, 0.1), Vec3::splat(0.3));
-        for index in 0..256 {
+        for gloss in [Gloss::MATT, SHINY, Gloss::LEAF] {
+            let shares = Shares::glossy(Vec3::new(0.5, 0.3, 0.1), Vec3::splat(0.3), gloss);
+            for index in 0..256 {
+                let mut sampler = PathSampler::new(3, 1, index);
+                let (from, to) = (sphere(sampler.pair()), sphere(sampler.pair()));
+                let value = |viewer: Vec3, light: Vec3| {
+                    Bsdf::new(Vec3::Y, Vec3::Y, shares, viewer).cosine_weighted(light) / light.y.abs()
+                };
+                let (there, back) = (value(from, to), value(to, from));
+                assert!((there - back).abs().max_element() <= 1e-6 + 1e-4 * there.max_element(), "{there} {back}");
+            }
+        }
+    }
+
+    #[test]
+    fn no_light_leaks_where_the_normals_differ() {
+        let shading = Vec3::new(0.9, 0.5, 0.0).normalize();
+        let shares = Shares::glossy(Vec3::splat(0.4), Vec3::splat(0.3), SHINY);
+        for index in 0..4096 {
             let mut sampler = PathSampler::new(3, 1, index);
-            let (from, to) = (sphere(sampler.pair()), sphere(sampler.pair()));
-            let value = |viewer: Vec3, light: Vec3| {
-                Bsdf::new(Vec3::Y, Vec3::Y, reflected, transmitted, viewer).cosine_weighted(light) / light.y.abs()
-            };
-            assert!((value(from, to) - value(to, from)).abs().max_element() < 1e-6);
+            let (viewer, light) = (sphere(sampler.pair()), sphere(sampler.pair()));
+            let bsdf = Bsdf::new(Vec3::Y, shading, shares, viewer);
+            let value = bsdf.cosine_weighted(light);
+            assert!(value.is_finite() && value.min_element() >= 0.0);
+            let (flat, round) = (light.y * bsdf.geometric.y, bsdf.shading.dot(light));
+            assert!(value == Vec3::ZERO || flat * round > 0.0);
+            assert!(bsdf.shading.dot(viewer) >= 0.0 || bsdf.lobe().is_none());
+            if let Some(scattered) = bsdf.sample(sampler.pair().x, sampler.pair()) {
+                let (flat, round) = (bsdf.geometric.dot(scattered.direction), bsdf.shading.dot(scattered.direction));
+                assert!(flat * round > 0.0 && scattered.weight.is_finite() && scattered.density > 0.0);
+            }
         }
     }
 

@@ -14,6 +14,8 @@ use crate::light::atmosphere::luminance;
 
 /// Pixels along a tile's side: what one task renders.
 const TILE: u32 = 16;
+/// Raised when the same scene is traced otherwise than before, so that no older film is gone on with.
+const MODEL: u32 = 2;
 
 /// Sums of radiance over the samples done so far.
 #[derive(Clone, Debug, PartialEq)]
@@ -164,6 +166,7 @@ impl PathTracer<'_> {
     /// A hash of everything that a pixel of `shot` depends on: scene, light, settings, camera and fog.
     pub fn fingerprint(&self, shot: &Shot) -> [u8; 32] {
         let mut hasher = blake3::Hasher::new();
+        hasher.update(&MODEL.to_le_bytes());
         self.scene().feed(&mut hasher);
         self.light().feed(&mut hasher);
         let settings = self.settings();

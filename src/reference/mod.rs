@@ -15,7 +15,8 @@
 //! # How true it is
 //! - Unbiased for what it models, up to rounding, as long as `limit` and `bounces` are left alone; noise falls with the
 //!   root of the samples or faster.
-//! - Surfaces are diffuse: no gloss of leaves or bark, no normal maps. Light passes a leaf where it hits it.
+//! - Surfaces are diffuse, and leaves glossy on both sides: for all light, about each leaf's own normal. No gloss of bark, no
+//!   normal maps. Light passes a leaf where it hits it.
 //! - Interpolated normals of wood lose a little light (see [`Normals`]).
 //! - The ground is met as the smooth surface, where the renderer draws triangles of it; detail in its normal is left
 //!   out. Rays look for it to a set distance and see the sky's picture beyond.
@@ -30,6 +31,7 @@ mod film;
 mod fog;
 mod ground;
 mod light;
+mod lobe;
 mod path;
 mod picture;
 mod points;

@@ -1,8 +1,12 @@
 //! Exitant radiance of single points: what a bake of radiance transfer is measured against.
+//!
+//! A point has no viewer, so it sends all that it reflects evenly to its side, its gloss too, as a bake has it; the surfaces
+//! that its light comes from have their lobes.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::bsdf::Shares;
 use super::error::ReferenceError;
 use super::path::PathTracer;
 use super::sampler::PathSampler;
@@ -88,7 +92,7 @@ impl PathTracer<'_> {
         }
         let side = |index: usize, side: u64, point: &SurfaceSample| {
             let normal = if side == 0 { point.normal } else { -point.normal };
-            let shares = (point.reflected, point.transmitted);
+            let shares = Shares { reflected: point.reflected, transmitted: point.transmitted, lobe: None };
             let receiver = self.scene().receiver(instance, point.position, normal, shares);
             let Some(receiver) = receiver.filter(|_| point.position.is_finite() && point.normal.is_normalized()) else {
                 return Vec3::ZERO;

@@ -6,12 +6,12 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::boxes::{BoxTree, MOST_ITEMS, WorldBox};
-use super::bsdf::{Bsdf, balanced};
+use super::bsdf::{Bsdf, Shares};
 use super::camera::WorldRay;
 use super::error::ReferenceError;
 use super::ground::{Crossing, GroundShape};
 use super::soil::Soil;
-use crate::plant::{PartKind, Plant};
+use crate::plant::{Gloss, PartKind, Plant};
 use crate::scatter::PackedStand;
 use crate::trace::{Hit, PlantTracer, Ray, SurfacePoint, offset_origin};
 
@@ -300,15 +300,16 @@ impl ReferenceScene {
                     GroundColor::Even(albedo) => *albedo,
                     GroundColor::Soil(soil) => soil.albedo(position, normal),
                 };
-                let bsdf = Bsdf::new(normal, normal, balanced(albedo, Vec3::ZERO).0, Vec3::ZERO, normal);
+                let bsdf = Bsdf::new(normal, normal, Shares::matt(albedo, Vec3::ZERO), normal);
                 Some(Surface { position, bsdf, anchor: Anchor::Ground })
             }
             Found::Plant { instance, hit } => {
-                let point = self.tracer(instance)?.point(&hit);
+                let tracer = self.tracer(instance)?;
+                let point = tracer.point(&hit);
+                let gloss = tracer.plant().parts.get(hit.part as usize)?.material.gloss;
                 let to_viewer = -direction.as_vec3();
                 Some(self.on_plant(instance, &point, normals, |placed, geometric, shading| {
-                    let (reflected, transmitted) = placed.shares(&point);
-                    Bsdf::new(geometric, shading, reflected, transmitted, to_viewer)
+                    Bsdf::new(geometric, shading, placed.shares(&point, gloss), to_viewer)
                 }))
             }
         }
@@ -344,13 +345,13 @@ impl ReferenceScene {
         instance: usize,
         position: Vec3,
         normal: Vec3,
-        shares: (Vec3, Vec3),
+        shares: Shares,
     ) -> Option<Surface> {
         let placed = self.instances.get(instance)?;
         let turned = placed.into_scene(normal.as_dvec3()).as_vec3();
         Some(Surface {
             position: placed.position + placed.into_scene(position.as_dvec3()) * placed.scale,
-            bsdf: Bsdf::new(turned, turned, shares.0, shares.1, turned),
+            bsdf: Bsdf::new(turned, turned, shares, turned),
             anchor: Anchor::Plant { instance, position, normal },
         })
     }
@@ -375,6 +376,10 @@ impl ReferenceScene {
         for tracer in &self.tracers {
             let key = crate::bake::cache::CacheKey::new(tracer.plant(), &crate::bake::BakeSettings::default());
             hasher.update(key.to_hex().as_bytes());
+            // What no bake reads.
+            for part in &tracer.plant().parts {
+                hasher.update(&part.material.gloss.roughness.to_le_bytes());
+            }
         }
         for placed in &self.instances {
             let numbers = [placed.position.x, placed.position.y, placed.position.z, placed.turn.0, placed.turn.1];
@@ -404,12 +409,12 @@ impl ReferenceScene {
 
 impl Placed {
     /// What the point reflects and transmits: the twin of `tint_foliage` in `shaders/forest/instance.wgsl`.
-    fn shares(&self, point: &SurfacePoint) -> (Vec3, Vec3) {
+    fn shares(&self, point: &SurfacePoint, gloss: Gloss) -> Shares {
         let tint = match point.kind {
             PartKind::Wood => Vec3::ONE,
             PartKind::Foliage => Vec3::ONE + self.tint * Vec3::new(0.18, 0.07, -0.05),
         };
-        balanced(point.base_color * tint, point.transmission * tint)
+        Shares::glossy(point.base_color * tint, point.transmission * tint, gloss)
     }
 }
 
