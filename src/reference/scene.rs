@@ -340,13 +340,7 @@ impl ReferenceScene {
     }
 
     /// A point of an instance whose light is asked for, seen from the side of `normal` (plant frame).
-    pub(crate) fn receiver(
-        &self,
-        instance: usize,
-        position: Vec3,
-        normal: Vec3,
-        shares: Shares,
-    ) -> Option<Surface> {
+    pub(crate) fn receiver(&self, instance: usize, position: Vec3, normal: Vec3, shares: Shares) -> Option<Surface> {
         let placed = self.instances.get(instance)?;
         let turned = placed.into_scene(normal.as_dvec3()).as_vec3();
         Some(Surface {
