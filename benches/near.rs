@@ -7,6 +7,10 @@
 //!
 //! `harmonics` is `transfer` with the sun through the transfer too, as published.
 //!
+//! The second table is of dense stands seen from above, with the light and against it, drawn as full models and as crosses,
+//! by the default light: what neighbours do to a tree's light, which no bake of a single tree knows. Nothing of it is fitted
+//! but the share of a crosses' leaves that is both lit and seen.
+//!
 //! With `--out` the pictures stay, and each row of the table is one more picture: local, expressive, transfer, traced.
 
 use std::path::{Path, PathBuf};
@@ -31,6 +35,9 @@ struct Arguments {
     /// Samples a pixel of the traced pictures.
     #[arg(long, default_value_t = 128)]
     spp: u32,
+    /// Which tables.
+    #[arg(long, value_delimiter = ',', default_value = "near,stands")]
+    only: Vec<String>,
     /// Folder for the pictures.
     #[arg(long)]
     out: Option<PathBuf>,
@@ -52,6 +59,16 @@ fn main() -> anyhow::Result<()> {
     let temporary = tempfile::tempdir()?;
     let folder = arguments.out.clone().unwrap_or_else(|| temporary.path().to_owned());
     std::fs::create_dir_all(&folder)?;
+    if arguments.only.iter().any(|table| table == "near") {
+        near(&arguments, &folder)?;
+    }
+    if arguments.only.iter().any(|table| table == "stands") {
+        stands(&arguments, &folder)?;
+    }
+    Ok(())
+}
+
+fn near(arguments: &Arguments, folder: &Path) -> anyhow::Result<()> {
     println!(
         "| scene | hour | light | mean FLIP | relative RMSE of the trees | light of the trees |\n|---|---|---|--:|--:|--:|"
     );
@@ -60,11 +77,11 @@ fn main() -> anyhow::Result<()> {
         for (hour, at) in HOURS {
             let at: LocalTime = at.parse()?;
             let name = |what: &str| folder.join(format!("{scene}-{}-{what}.png", hour.replace(' ', "-")));
-            let traced = trace(&arguments, &path, at, &name("traced"))?;
-            let bare = draw(&arguments, &path, None, at)?;
+            let traced = trace(arguments, &path, at, &name("traced"))?;
+            let bare = draw(arguments, &path, None, at)?;
             let mut row = Vec::new();
             for light in LIGHTS {
-                let drawn = draw(&arguments, &path, Some(light), at)?;
+                let drawn = draw(arguments, &path, Some(light), at)?;
                 let (flip, relative, share) = compare(&traced, &drawn, &bare);
                 println!("| {scene} | {hour} | {light} | {flip:.4} | {relative:.3} | {share:.2} |");
                 drawn.save(&name(light), &[])?;
@@ -73,6 +90,57 @@ fn main() -> anyhow::Result<()> {
             row.truncate(SHOWN);
             row.push(traced);
             beside(&row).save(&name("all"), &[])?;
+        }
+    }
+    Ok(())
+}
+
+/// Views of a stand of 120 m by 120 m: name, camera (x, height, z), yaw.
+const VIEWS: [(&str, &str, u32); 2] = [("looking north", "(0, 32, 10)", 0), ("looking south", "(0, 32, -140)", 180)];
+/// Hours of the stands: the sun 64 degrees high in the south, 9 degrees in the north-west, and 3 degrees under the horizon.
+const STAND_HOURS: [(&str, &str); 3] =
+    [("noon", "2026-06-21T11:30+00:00"), ("low sun", "2026-06-21T18:15+00:00"), ("dusk", "2026-06-21T19:50+00:00")];
+
+fn stands(arguments: &Arguments, folder: &Path) -> anyhow::Result<()> {
+    println!(
+        "\n| stand | view | hour | drawn as | light of the trees | relative RMSE | mean FLIP |\n|---|---|---|---|--:|--:|--:|"
+    );
+    let grown = "(name: \"broadleaf\", weight: 3, height: (15, 20), plant: Grown(form: Broadleaf, individuals: 2, \
+                 triangles: 12000, seed: 1)), (name: \"conifer\", height: (15, 22), plant: Grown(form: Conifer, \
+                 individuals: 1, triangles: 12000, seed: 11))";
+    let mut kinds = vec![("grown", grown.to_owned(), 500)];
+    let oak = std::env::var_os("CANOPY_DATA").map(|data| PathBuf::from(data).join("trees/oak-medium.glb"));
+    if let Some(oak) = oak.filter(|oak| oak.exists()) {
+        let species =
+            format!("(name: \"oak\", height: (17, 19), plant: Gltf(files: [{:?}]))", oak.display().to_string());
+        kinds.push(("oak", species, 282));
+    }
+    for (kind, species, stems) in kinds {
+        for (view, position, yaw) in VIEWS {
+            let write = |drawn: &str, distance: u32| -> anyhow::Result<PathBuf> {
+                let path = folder.join(format!("{kind}-{drawn}.ron"));
+                let scene = format!(
+                    "(terrain: Flat(size: 400), species: [{species}], trees: Scattered(stems_per_hectare: {stems}, \
+                     min_distance: 2, area: (west: -60, south: 10, east: 60, north: 130)), place: (latitude: 48, longitude: \
+                     11, time: \"2026-06-21T11:30+00:00\"), camera: (start: (position: {position}, yaw: {yaw}, pitch: -14)), \
+                     quality: (near_distance: {distance}, shadow_distance: 400))"
+                );
+                std::fs::write(&path, scene)?;
+                Ok(path)
+            };
+            let forms = [("models", write("models", 2000)?), ("crosses", write("crosses", 1)?)];
+            for (hour, at) in STAND_HOURS {
+                let at: LocalTime = at.parse()?;
+                let name = |what: &str| folder.join(format!("{kind}-{view}-{hour}-{what}.png").replace(' ', "-"));
+                let traced = trace(arguments, &forms[0].1, at, &name("traced"))?;
+                let bare = draw(arguments, &forms[0].1, None, at)?;
+                for (form, scene) in &forms {
+                    let drawn = draw(arguments, scene, Some("transfer"), at)?;
+                    let (flip, relative, share) = compare(&traced, &drawn, &bare);
+                    println!("| {kind} | {view} | {hour} | {form} | {share:.2} | {relative:.3} | {flip:.4} |");
+                    drawn.save(&name(form), &[])?;
+                }
+            }
         }
     }
     Ok(())
