@@ -79,6 +79,22 @@ impl GrowingBuffer {
     }
 }
 
+/// A table of `size` half-float texels that shaders sample and each new light fills.
+pub fn table(device: &RenderDevice, label: &str, size: (u32, u32)) -> (Texture, TextureView) {
+    let texture = device.create_texture(&TextureDescriptor {
+        label: Some(label),
+        size: Extent3d { width: size.0, height: size.1, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: TextureDimension::D2,
+        format: TextureFormat::Rgba16Float,
+        usage: TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST,
+        view_formats: &[],
+    });
+    let view = texture.create_view(&TextureViewDescriptor::default());
+    (texture, view)
+}
+
 /// Smallest mip of an alpha-tested texture, texels along a side. In a single texel the alpha test is all or nothing: leaves
 /// that cover less than half of their picture would vanish with the distance.
 pub const SMALLEST_TESTED_MIP: u32 = 8;

@@ -9,10 +9,7 @@ use bevy::{
         world::{FromWorld, World},
     },
     render::{
-        render_resource::{
-            Extent3d, Texture, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages, TextureView,
-            TextureViewDescriptor,
-        },
+        render_resource::{Texture, TextureView},
         renderer::{RenderDevice, RenderQueue},
     },
 };
@@ -45,17 +42,9 @@ pub struct StandTexture {
 
 impl FromWorld for StandTexture {
     fn from_world(world: &mut World) -> Self {
-        let texture = world.resource::<RenderDevice>().create_texture(&TextureDescriptor {
-            label: Some("canopy_stand_light"),
-            size: Extent3d { width: COVERS as u32, height: (BLOCKS * (DEPTHS + 1)) as u32, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: TextureDimension::D2,
-            format: TextureFormat::Rgba16Float,
-            usage: TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST,
-            view_formats: &[],
-        });
-        Self { view: texture.create_view(&TextureViewDescriptor::default()), texture, shows: None }
+        let size = (COVERS as u32, (BLOCKS * (DEPTHS + 1)) as u32);
+        let (texture, view) = gpu::table(world.resource::<RenderDevice>(), "canopy_stand_light", size);
+        Self { texture, view, shows: None }
     }
 }
 

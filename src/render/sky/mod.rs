@@ -25,9 +25,8 @@ use bevy::{
         diagnostic::RecordDiagnostics,
         render_resource::{
             CachedRenderPipelineId, ColorTargetState, ColorWrites, CompareFunction, DepthBiasState, DepthStencilState,
-            Extent3d, FragmentState, MultisampleState, PipelineCache, RenderPassDescriptor, RenderPipelineDescriptor,
-            StencilState, StoreOp, Texture, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages,
-            TextureView, TextureViewDescriptor, VertexState,
+            FragmentState, MultisampleState, PipelineCache, RenderPassDescriptor, RenderPipelineDescriptor,
+            StencilState, StoreOp, Texture, TextureFormat, TextureView, VertexState,
         },
         renderer::{RenderContext, RenderDevice, RenderQueue, ViewQuery},
         view::{ViewDepthTexture, ViewTarget},
@@ -55,17 +54,9 @@ pub struct SkyTexture {
 
 impl FromWorld for SkyTexture {
     fn from_world(world: &mut World) -> Self {
-        let texture = world.resource::<RenderDevice>().create_texture(&TextureDescriptor {
-            label: Some("canopy_sky"),
-            size: Extent3d { width: SkyView::WIDTH as u32, height: SkyView::HEIGHT as u32, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: TextureDimension::D2,
-            format: TextureFormat::Rgba16Float,
-            usage: TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST,
-            view_formats: &[],
-        });
-        Self { view: texture.create_view(&TextureViewDescriptor::default()), texture, shows: None }
+        let size = (SkyView::WIDTH as u32, SkyView::HEIGHT as u32);
+        let (texture, view) = gpu::table(world.resource::<RenderDevice>(), "canopy_sky", size);
+        Self { texture, view, shows: None }
     }
 }
 

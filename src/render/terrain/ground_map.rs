@@ -10,10 +10,7 @@ use bevy::{
     },
     log::error_once,
     render::{
-        render_resource::{
-            Extent3d, Texture, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages, TextureView,
-            TextureViewDescriptor,
-        },
+        render_resource::{Texture, TextureView},
         renderer::{RenderDevice, RenderQueue},
     },
 };
@@ -66,25 +63,10 @@ impl FromWorld for GroundMap {
     }
 }
 
-fn create(device: &RenderDevice, size: (u32, u32)) -> (Texture, TextureView) {
-    let texture = device.create_texture(&TextureDescriptor {
-        label: Some("canopy_ground_map"),
-        size: Extent3d { width: size.0, height: size.1, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: TextureDimension::D2,
-        format: TextureFormat::Rgba16Float,
-        usage: TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST,
-        view_formats: &[],
-    });
-    let view = texture.create_view(&TextureViewDescriptor::default());
-    (texture, view)
-}
-
 impl GroundMap {
     /// The map without a ground: nothing hides the light, and no crowns cover anything.
     fn empty(device: &RenderDevice, queue: &RenderQueue) -> Self {
-        let (texture, view) = create(device, (1, 1));
+        let (texture, view) = gpu::table(device, "canopy_ground_map", (1, 1));
         let texel = [f16::from_f32(-6.0e4), f16::ZERO, f16::ZERO, f16::ZERO];
         gpu::write_level(queue, &texture, 0, 0, 1, 1, 8, bytemuck::cast_slice(&[texel]));
         Self { view, mean_cover: 0.0, texture, size: (1, 1), extent: DVec2::ONE, wide: None, shows: None }
@@ -130,7 +112,7 @@ pub fn prepare_ground_map(
     let texel = extent.max_element() / LONGEST_SIDE;
     let size = ((extent.x / texel).ceil().max(1.0) as u32, (extent.y / texel).ceil().max(1.0) as u32);
     if size != map.size {
-        (map.texture, map.view) = create(&device, size);
+        (map.texture, map.view) = gpu::table(&device, "canopy_ground_map", size);
         map.size = size;
     }
     map.extent = extent;
