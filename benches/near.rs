@@ -82,7 +82,7 @@ fn near(arguments: &Arguments, folder: &Path) -> anyhow::Result<()> {
             let mut row = Vec::new();
             for light in LIGHTS {
                 let drawn = draw(arguments, &path, Some(light), at)?;
-                let (flip, relative, share) = compare(&traced, &drawn, &bare);
+                let (flip, relative, share) = compare(&traced, &drawn, |index| of_tree(&traced, &bare, index));
                 println!("| {scene} | {hour} | {light} | {flip:.4} | {relative:.3} | {share:.2} |");
                 drawn.save(&name(light), &[])?;
                 row.push(drawn);
@@ -133,10 +133,11 @@ fn stands(arguments: &Arguments, folder: &Path) -> anyhow::Result<()> {
                 let at: LocalTime = at.parse()?;
                 let name = |what: &str| folder.join(format!("{kind}-{view}-{hour}-{what}.png").replace(' ', "-"));
                 let traced = trace(arguments, &forms[0].1, at, &name("traced"))?;
-                let bare = draw(arguments, &forms[0].1, None, at)?;
+                // The lower part of the pictures is all trees.
+                let canopy = |index: usize| index / traced.width as usize >= traced.height as usize * 5 / 12;
                 for (form, scene) in &forms {
                     let drawn = draw(arguments, scene, Some("transfer"), at)?;
-                    let (flip, relative, share) = compare(&traced, &drawn, &bare);
+                    let (flip, relative, share) = compare(&traced, &drawn, canopy);
                     println!("| {kind} | {view} | {hour} | {form} | {share:.2} | {relative:.3} | {flip:.4} |");
                     drawn.save(&name(form), &[])?;
                 }
@@ -182,17 +183,20 @@ fn trace(arguments: &Arguments, scene: &Path, at: LocalTime, out: &Path) -> anyh
     Ok(Picture { width: image.width(), height: image.height(), pixels: image.into_raw() })
 }
 
-/// Mean FLIP; where `bare` differs from `truth`: relative RMSE, and light as a share of the truth's.
-fn compare(truth: &Picture, drawn: &Picture, bare: &Picture) -> (f32, f64, f64) {
+/// Whether a tree stands in pixel `index`: where the picture without trees differs from the traced one.
+fn of_tree(truth: &Picture, bare: &Picture, index: usize) -> bool {
+    let pixel = |picture: &Picture| [0, 1, 2].map(|c| picture.pixels[3 * index + c]);
+    pixel(truth).iter().zip(pixel(bare)).any(|(a, b)| a.abs_diff(b) >= 40)
+}
+
+/// Mean FLIP; in the pixels that are `counted`, by their index: relative RMSE, and light as a share of the truth's.
+fn compare(truth: &Picture, drawn: &Picture, counted: impl Fn(usize) -> bool) -> (f32, f64, f64) {
     let flip_image = |picture: &Picture| FlipImageRgb8::with_data(picture.width, picture.height, &picture.pixels);
     let mean = FlipPool::from_image(&flip(flip_image(truth), flip_image(drawn), PIXELS_PER_DEGREE)).mean();
     let linear = |code: u8| f64::from(srgb_to_linear(f32::from(code) / 255.0));
     let (mut squared, mut square, mut sum, mut of) = (0.0, 0.0, 0.0, 0.0);
-    let pixels = truth.pixels.chunks_exact(3).zip(drawn.pixels.chunks_exact(3)).zip(bare.pixels.chunks_exact(3));
-    for ((truth, drawn), bare) in pixels {
-        if truth.iter().zip(bare).all(|(a, b)| a.abs_diff(*b) < 40) {
-            continue;
-        }
+    let pixels = truth.pixels.chunks_exact(3).zip(drawn.pixels.chunks_exact(3));
+    for (_, (truth, drawn)) in pixels.enumerate().filter(|(index, _)| counted(*index)) {
         for (a, b) in truth.iter().zip(drawn) {
             let (a, b) = (linear(*a), linear(*b));
             squared += (a - b).powi(2);

@@ -147,7 +147,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         let own = mix(1.0, smoothstep(-0.6, 0.3, side), foliage);
         visibility *= mix(own * mix(1.0, stand.beam, foliage), near.x * mix(0.75, 1.0, own), near.y);
     }
-    let among = select(leaf_visibility(properties.b), lit_and_seen(surface.viewer), traced);
+    let among = select(leaf_visibility(properties.b), mix(1.0, lit_and_seen(surface.viewer), smoothstep(0.25, 0.85, map.z)), traced);
     visibility *= mix(1.0, among, foliage);
     var color = shade(surface, visibility, sky);
     color = mix(color, vec3(0.2, 0.35, 1.0) * dot(color, vec3(0.5)), 0.6 * frame.flags.y);
@@ -156,7 +156,8 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
 
 // Share of the leaves that a viewer sees of a crown which the light reaches between the others. What one sees from the
 // light's own side is lit [Kuusk 1991, the hot spot]; the farther apart both are, the more of it lies in shade. Fitted to
-// traced stands of oaks and of grown trees, seen with the light and against it (benches/README.md, crosses).
+// traced dense stands of oaks and of grown trees, seen with the light and against it (benches/README.md, dense stands); a tree
+// that stands alone is right without it, so it counts by the cover.
 fn lit_and_seen(viewer: vec3<f32>) -> f32 {
     return 0.725 + 0.275 * dot(viewer, light.key_direction.xyz);
 }
