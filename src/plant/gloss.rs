@@ -14,7 +14,8 @@
 //! has no colour is confirmed by [Bousquet et al. 2005]. Light from behind holds the former alone, so it is yellower and
 //! more saturated. `inside` is `c - s` where a leaf is bright and falls with the square of `c` where it is dark, so that no
 //! channel is cut off. What is left, `c - inside(c)`, is the gloss: the shader spreads it over a lobe for the light of the
-//! sun, and leaves it with the base colour for that of the sky. In the mean over all directions nothing is added or lost.
+//! sun, and leaves it with the base colour for that of the sky; the path tracer has the lobe for all light. A smooth leaf
+//! loses nothing in the mean over all directions; the shader's lobe loses what rough facets shade (`reference/lobe.rs`).
 
 use glam::Vec3;
 
