@@ -82,7 +82,7 @@ impl TransferLighting {
         /// The first coefficient of a side in the open.
         const OPEN: f32 = 0.282_094_79;
         let baked = packed.unpack();
-        let count = baked.settings.coefficients();
+        let count = baked.settings.coefficients().max(1);
         let channels = baked.settings.channels.count();
         let mean = |side: &[f32]| side.iter().take(channels).sum::<f32>() / channels as f32;
         let ambient = baked.parts.iter().map(|part| {

@@ -36,7 +36,7 @@ pub(super) type Sides = [Vec4; 2];
 pub(super) fn vertex_sides(lighting: &BakedLighting) -> Option<Vec<Vec<Sides>>> {
     let BakedLighting::Transfer(transfer) = lighting else { return None };
     let baked = transfer.packed.unpack();
-    let (count, channels) = (baked.settings.coefficients(), baked.settings.channels.count());
+    let (count, channels) = (baked.settings.coefficients().max(1), baked.settings.channels.count());
     let side = |coefficients: &[f32]| {
         let mean = |index: usize| -> f32 {
             let of = coefficients.get(index * channels..(index + 1) * channels).unwrap_or(&[]);

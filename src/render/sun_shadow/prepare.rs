@@ -203,7 +203,7 @@ impl ShadowMaps {
 
     fn resize(&mut self, device: &RenderDevice, settings: &SunShadowSettings) {
         let limit = device.limits().max_texture_dimension_2d;
-        let size = settings.map_size.clamp(16, limit.min(8192));
+        let size = settings.map_size.max(16).min(limit.min(8192));
         let count = settings.cascades.min(MAX_CASCADES);
         if count > 0 && (size != self.map_size || count != self.layers.len()) {
             (self.view, self.layers) = create_maps(device, size, count);

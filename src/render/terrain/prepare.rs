@@ -160,7 +160,7 @@ impl TileCache {
     fn reserve(&mut self, device: &RenderDevice, wanted: usize) {
         let limit = device.limits().max_storage_buffer_binding_size as usize;
         let most = limit / (TILE_VERTICES * size_of::<GpuTileVertex>());
-        let capacity = wanted.next_power_of_two().clamp(FIRST_SLOTS, most);
+        let capacity = wanted.next_power_of_two().max(FIRST_SLOTS).min(most);
         if capacity > self.capacity {
             self.clear(device, capacity);
         }
