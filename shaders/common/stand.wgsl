@@ -42,6 +42,12 @@ fn ground_light(cover: f32) -> StandLight {
     return look_up(cover, DEPTHS);
 }
 
+// Share of a beam that is brought by two bands of scattered light: the first coefficient, and the second band's vector times
+// the beam's direction.
+fn two_bands(first: f32, band: f32) -> f32 {
+    return max(0.28209479 * first + 0.48860251 * band, 0.0);
+}
+
 // Irradiance over pi on what faces the height `y` of a unit normal and would have `open` of the surroundings alone.
 fn in_stand(open: vec3<f32>, y: f32, stand: StandLight) -> vec3<f32> {
     return max(stand.sky * open + 0.5 * ((1.0 + y) * stand.down + (1.0 - y) * stand.up), vec3(0.0));

@@ -3,7 +3,7 @@
 #import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, cross_threshold, tint_foliage, scattered, leaf_visibility}
 #import canopy::lighting::{Surface, shade, even_sky, leaf_transmission}
 #import canopy::sky::{apply_fog, night_vision, sky_transfer}
-#import canopy::stand::{stand_light, in_stand_by_transfer}
+#import canopy::stand::{stand_light, in_stand_by_transfer, two_bands}
 #import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
 
 @group(2) @binding(0) var color_pictures: texture_2d_array<f32>;
@@ -126,7 +126,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let around = in_stand_by_transfer(open, vec3(stored.w), vec3(side.y / max(stored.w, 1e-3)), stand);
     let lit_leaves = variants[in.layer / PLANES].scattered;
     let rise = variants[in.layer / PLANES].scattered_rise.x * light.key_direction.y;
-    let share = max(0.28209479 * lit_leaves.w + 0.48860251 * rise, 0.0) * stand.beam * visibility;
+    let share = two_bands(lit_leaves.w, rise) * stand.beam * visibility;
     let scattered_sun = light.key_illuminance.rgb * lit_leaves.rgb * share;
     var sky = (1.0 + surface.transmission) * (around + scattered_sun);
 #ifdef PLAIN_TOO

@@ -3,7 +3,7 @@
 #define_import_path canopy::transfer
 
 #import canopy::frame::light
-#import canopy::stand::{StandLight, in_stand_by_transfer}
+#import canopy::stand::{StandLight, in_stand_by_transfer, two_bands}
 
 struct Transfer {
     // What 127 stands for in each coefficient after the first, relative to it, four a word of codes.
@@ -102,8 +102,7 @@ fn light_in_stand(vertex: u32, yaw: u32, stand: StandLight) -> Sides {
 fn scattered_sun(vertex: u32, to_light: vec3<f32>) -> vec3<f32> {
     let codes = unpack4x8snorm(coefficients[transfer.form.w + vertex]) * transfer.scattered.w;
     let band = codes.z * to_light.y - codes.y * to_light.x - codes.w * to_light.z;
-    let share = max(0.28209479 * codes.x + 0.48860251 * band, 0.0);
-    return light.key_illuminance.rgb * transfer.scattered.rgb * share;
+    return light.key_illuminance.rgb * transfer.scattered.rgb * two_bands(codes.x, band);
 }
 
 // Irradiance over pi that the light of a row brings to the sides of a vertex. The row is the tree's yaw for the

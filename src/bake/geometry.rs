@@ -22,9 +22,7 @@ pub(crate) fn triangles(mesh: &PlantMesh) -> impl Iterator<Item = (u32, [usize; 
 
 /// Area of one side of a triangle, square metres; 0 where it overflows.
 pub(crate) fn area(mesh: &PlantMesh, corners: [usize; 3]) -> f32 {
-    let [a, b, c] = corners.map(|i| mesh.positions[i]);
-    let area = 0.5 * (b - a).cross(c - a).length();
-    if area.is_finite() { area } else { 0.0 }
+    mesh.area(corners.map(|corner| corner as u32))
 }
 
 /// Triangles of a mesh that hang together: a leaf card, a twig, a trunk.

@@ -60,6 +60,15 @@ pub struct PlantMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
+impl PlantMesh {
+    /// Area of one side of a triangle, square metres; 0 where it overflows or a corner is missing.
+    pub fn area(&self, triangle: [u32; 3]) -> f32 {
+        let [a, b, c] = triangle.map(|corner| self.positions.get(corner as usize).copied().unwrap_or(Vec3::NAN));
+        let area = 0.5 * (b - a).cross(c - a).length();
+        if area.is_finite() { area } else { 0.0 }
+    }
+}
+
 /// The material of one part.
 #[derive(Clone, Debug)]
 pub struct PlantMaterial {

@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::{PartKind, Plant, PlantMaterial, PlantMesh, texture::srgb_to_linear};
+use super::{PartKind, Plant, PlantMaterial, texture::srgb_to_linear};
 
 /// Share of a crown's extents that counts as its width: single twigs reach farther.
 const CROWN_SHARE: f32 = 0.8;
@@ -25,7 +25,7 @@ impl Plant {
     pub fn leaf_colors(&self) -> LeafColors {
         let mut sum = LeafColors::default();
         for part in self.parts.iter().filter(|part| part.kind == PartKind::Foliage) {
-            let areas = part.mesh.triangles.iter().map(|triangle| f64::from(area(&part.mesh, triangle)));
+            let areas = part.mesh.triangles.iter().map(|triangle| f64::from(part.mesh.area(*triangle)));
             let area = areas.sum::<f64>().min(1e12) as f32;
             let (reflected, transmitted) = mean(&part.material);
             sum.reflected += area * reflected;
@@ -38,9 +38,7 @@ impl Plant {
             LeafColors::default()
         }
     }
-}
 
-impl Plant {
     /// Width of the crown over the plant's height: the mean of its extents along x and z, of which a crown fills four fifths.
     /// 0 where there are no leaves or no height.
     pub fn crown_width(&self) -> f32 {
@@ -48,16 +46,14 @@ impl Plant {
         let (size, height) = (crown.size(), self.height());
         if height > 0.0 { CROWN_SHARE * 0.5 * (size.x + size.z) / height } else { 0.0 }
     }
-}
 
-impl Plant {
     /// Length of the crown over the plant's height, 0..=1: that of a crown which is as full from its base to the top and has
     /// its leaves, in the mean over their areas, at the same height. 0 where there are no leaves or no height.
     pub fn crown_length(&self) -> f32 {
         let (mut sum, mut areas) = (0.0, 0.0);
         for mesh in self.parts.iter().filter(|part| part.kind == PartKind::Foliage).map(|part| &part.mesh) {
             for triangle in &mesh.triangles {
-                let area = f64::from(area(mesh, triangle));
+                let area = f64::from(mesh.area(*triangle));
                 let height =
                     triangle.iter().filter_map(|&corner| mesh.positions.get(corner as usize)).map(|p| p.y).sum::<f32>();
                 sum += area * f64::from(height / 3.0);
@@ -67,14 +63,6 @@ impl Plant {
         let height = f64::from(self.height());
         if areas > 0.0 && height > 0.0 { (2.0 * (1.0 - sum / areas / height)).clamp(0.0, 1.0) as f32 } else { 0.0 }
     }
-}
-
-/// Area of a triangle in square metres; 0 where a corner is missing or not finite.
-fn area(mesh: &PlantMesh, triangle: &[u32; 3]) -> f32 {
-    let corner = |index: u32| mesh.positions.get(index as usize).copied().unwrap_or(Vec3::NAN);
-    let [a, b, c] = triangle.map(corner);
-    let twice = (b - a).cross(c - a).length();
-    if twice.is_finite() { 0.5 * twice } else { 0.0 }
 }
 
 /// Mean reflected and transmitted light over the texels that pass the alpha test.
@@ -110,7 +98,7 @@ mod tests {
     use image::{Rgba, RgbaImage};
 
     use super::*;
-    use crate::plant::{Gloss, PlantPart};
+    use crate::plant::{Gloss, PlantMesh, PlantPart};
 
     fn square(side: f32) -> PlantMesh {
         PlantMesh {

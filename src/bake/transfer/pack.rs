@@ -85,7 +85,7 @@ pub fn mean_words(settings: &TransferSettings, sides: usize) -> usize {
 
 /// [`TransferFormat::Snorm8`]: words of 4 bytes that the codes of one side and channel take.
 pub fn code_words(settings: &TransferSettings) -> usize {
-    (settings.coefficients() / settings.channels.count() - 1).div_ceil(4)
+    (settings.coefficients() / settings.channels.count()).saturating_sub(1).div_ceil(4)
 }
 
 impl TransferBake {
