@@ -40,6 +40,7 @@
 
 pub mod app;
 pub mod bake;
+pub mod cull;
 mod files;
 pub mod light;
 pub mod lod;
@@ -67,7 +68,7 @@ pub mod prelude {
     pub use crate::{
         CanopyPlugins,
         app::{CanopyScenePlugin, LoadScene, LoadedScene, SceneFailed, SceneProgress, SceneReady, SceneState, Stage},
-        lod::FadeBand,
+        lod::{FadeBand, Levels, Representation},
         render::{
             components::{
                 CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, SunShadowSettings, ViewOptions,

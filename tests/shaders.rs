@@ -12,10 +12,11 @@ use canopy::{
     bake::billboard::LIGHT_SCALE,
     light::atmosphere::SkyView,
     render::{
+        bindings::uniforms::{
+            CascadeUniform, CascadeViewUniform, FrameUniform, LightUniform, MAX_CASCADES, NOISE_PERIOD, ShadowUniform,
+        },
         forest::{ForestViewUniform, PartUniform, PlaneUniform, PlantVertex, TransferUniform, VariantUniform},
-        frame::uniforms::{CascadeUniform, FrameUniform, LightUniform, MAX_CASCADES, NOISE_PERIOD, ShadowUniform},
         shaders::SOURCES,
-        sun_shadow::CascadeViewUniform,
         terrain::{GpuTile, GpuTileVertex},
     },
     scatter::PackedTree,
@@ -207,7 +208,7 @@ fn gpu_structs_are_what_the_shaders_think() {
     twin!(
         layouts,
         "ForestView",
-        ForestViewUniform { anchor_cell, anchor_offset, anchor_y, cell_size, fade_start, fade_end }
+        ForestViewUniform { anchor_cell, anchor_offset, anchor_y, cell_size, fade_in, fade_out, unused, tint }
     );
     twin!(layouts, "Plane", PlaneUniform { center, u, v, normal });
     twin!(layouts, "Variant", VariantUniform { planes, size, transmission, spread, gloss, scattered, scattered_rise });

@@ -6,11 +6,7 @@ use canopy::{
     bake::BakedPlant,
     light::sun::SunPosition,
     plant::texture::srgb_to_linear,
-    render::{
-        components::SunShadowSettings,
-        daylight::SkySettings,
-        sun_shadow::cascades::{CascadeBox, cascade_radii},
-    },
+    render::{components::SunShadowSettings, daylight::SkySettings},
 };
 use chrono::TimeDelta;
 use glam::DVec3;

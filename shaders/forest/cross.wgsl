@@ -1,6 +1,6 @@
 // Crossed billboards [Franzke 2005, 4.3]: two upright planes and a level one, eighteen pulled vertices a tree.
 #import canopy::frame::{frame, light}
-#import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, cross_threshold, tint_foliage, scattered, leaf_visibility}
+#import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, level_threshold, tint_foliage, tint_level, scattered, leaf_visibility}
 #import canopy::lighting::{Surface, shade, even_sky, leaf_transmission}
 #import canopy::sky::{apply_fog, night_vision, sky_transfer}
 #import canopy::stand::{stand_light, in_stand_by_transfer, two_bands}
@@ -55,7 +55,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     // when looked down on; from the side it would be a shelf in the crown.
     let level = plane_index == 2u;
     let edge = 0.5 + 0.51 * (1.0 - smoothstep(select(0.10, 0.42, level), select(0.34, 0.72, level), abs(toward)));
-    let threshold = max(cross_threshold(length(tree.position.xz)), edge);
+    let threshold = max(level_threshold(length(tree.position.xz)), edge);
 
     var out: Varying;
     let local = turn(plane.center.xyz + corner.x * plane.u.xyz + corner.y * plane.v.xyz, tree.yaw) * tree.scale;
@@ -150,7 +150,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let among = select(leaf_visibility(properties.b), mix(1.0, lit_and_seen(surface.viewer), smoothstep(0.25, 0.85, map.z)), traced);
     visibility *= mix(1.0, among, foliage);
     var color = shade(surface, visibility, sky);
-    color = mix(color, vec3(0.2, 0.35, 1.0) * dot(color, vec3(0.5)), 0.6 * frame.flags.y);
+    color = tint_level(color);
     return vec4(night_vision(apply_fog(color, in.relative)), coverage);
 }
 

@@ -16,9 +16,12 @@ struct ForestView {
     // Anchor's height over the stand's datum in metres.
     anchor_y: f32,
     cell_size: f32,
-    // Distance in metres where the full model begins to give way, and where it is gone.
-    fade_start: f32,
-    fade_end: f32,
+    // Distances in metres over which the level comes in and goes out.
+    fade_in: vec2<f32>,
+    fade_out: vec2<f32>,
+    unused: vec2<f32>,
+    // The level's tint, and how much of it is mixed in.
+    tint: vec4<f32>,
 }
 
 struct Plane {
@@ -84,15 +87,19 @@ fn turn(v: vec3<f32>, yaw: vec2<f32>) -> vec3<f32> {
     return vec3(yaw.x * v.x + yaw.y * v.z, v.y, -yaw.y * v.x + yaw.x * v.z);
 }
 
-// Thresholds of the alpha test over the distance: the CPU twin is src/lod/mod.rs.
-fn model_threshold(distance: f32) -> f32 {
-    let middle = 0.5 * (view.fade_start + view.fade_end);
-    return 0.5 + 0.51 * clamp((distance - middle) / max(view.fade_end - middle, 1e-3), 0.0, 1.0);
+// Threshold of the alpha test of this level at a distance: the CPU twin is src/lod.
+fn level_threshold(distance: f32) -> f32 {
+    let coming = 0.5 * (view.fade_in.x + view.fade_in.y);
+    let going = 0.5 * (view.fade_out.x + view.fade_out.y);
+    return max(
+        0.5 + 0.51 * clamp((coming - distance) / max(coming - view.fade_in.x, 1e-3), 0.0, 1.0),
+        0.5 + 0.51 * clamp((distance - going) / max(view.fade_out.y - going, 1e-3), 0.0, 1.0),
+    );
 }
 
-fn cross_threshold(distance: f32) -> f32 {
-    let middle = 0.5 * (view.fade_start + view.fade_end);
-    return 0.5 + 0.51 * clamp((middle - distance) / max(middle - view.fade_start, 1e-3), 0.0, 1.0);
+// Mixes in the level's tint.
+fn tint_level(color: vec3<f32>) -> vec3<f32> {
+    return mix(color, view.tint.rgb * dot(color, vec3(0.5)), view.tint.w);
 }
 
 // Individual shift of the foliage's hue and brightness.

@@ -1,6 +1,6 @@
 // The full model of a tree, near the camera.
 #import canopy::frame::{frame, light}
-#import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, model_threshold, tint_foliage, scattered, leaf_visibility}
+#import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, level_threshold, tint_foliage, tint_level, scattered, leaf_visibility}
 #import canopy::lighting::{Surface, shade, exitant, even_sky, leaf_transmission}
 #import canopy::sky::{apply_fog, night_vision}
 #import canopy::stand::stand_light
@@ -77,7 +77,7 @@ fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index
     out.uv = in.uv;
     let height = max(variants[tree.variant].size.x * tree.scale, 0.01);
     out.look = vec4(ambient, local.y, local.y / height, tree.tint);
-    out.threshold = model_threshold(length(tree.position.xz));
+    out.threshold = level_threshold(length(tree.position.xz));
 #ifdef TRANSFER
     let map = ground_map(relative);
     let stand = stand_light(map.z, 1.0 - out.look.z);
@@ -199,6 +199,6 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
 #else
     var color = shade(surface, visibility, sky);
 #endif
-    color = mix(color, vec3(0.15, 0.9, 0.2) * dot(color, vec3(0.5)), 0.6 * frame.flags.y);
+    color = tint_level(color);
     return vec4(night_vision(apply_fog(color, in.relative)), coverage);
 }

@@ -10,7 +10,7 @@ use super::{error::AppError, ground, plants, together, trees};
 use crate::{
     bake::{BakeSource, BakedPlant, bake_plant, cache::Cache},
     light::{MoonSetting, sun::Observer},
-    lod::FadeBand,
+    lod::{FadeBand, Levels},
     render::{
         components::{Forest, Ground, SunLight, SunShadowSettings},
         daylight::SkySettings,
@@ -129,7 +129,7 @@ impl Stage {
             plants: self.plants.clone(),
             suns: self.suns.clone(),
             origin: DVec3::ZERO,
-            fade: FadeBand::new(quality.near_distance as f32, quality.fade_band as f32),
+            levels: Levels::model_and_cross(FadeBand::new(quality.near_distance as f32, quality.fade_band as f32)),
             view_distance: quality.view_distance as f32,
         })
     }

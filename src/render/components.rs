@@ -13,7 +13,7 @@ use glam::DVec3;
 use crate::{
     bake::BakedPlant,
     light::LightState,
-    lod::FadeBand,
+    lod::Levels,
     scatter::{CoverMap, PackedStand},
     terrain::Terrain,
 };
@@ -41,8 +41,8 @@ pub struct Forest {
     pub suns: Arc<[SunLight]>,
     /// Scene position in metres of the stand's own origin.
     pub origin: DVec3,
-    /// Where full models give way to billboards.
-    pub fade: FadeBand,
+    /// The representations of the trees, from near to far.
+    pub levels: Levels,
     /// Metres beyond which trees are not drawn.
     pub view_distance: f32,
 }

@@ -3,7 +3,7 @@
 //! The way of a frame:
 //!
 //! ```text
-//! extract ── frame (camera in f64, group 0) ── cull (lists of trees)
+//! extract ── view (camera in f64) ── cull (lists of trees) ── bindings (group 0)
 //!              │
 //!              ├─ sun_shadow   only the cascades that changed        before Core3dSystems::MainPass
 //!              ├─ (Bevy's own opaque meshes)
@@ -11,20 +11,25 @@
 //!              ├─ terrain      tiles                                 after forest
 //!              └─ sky          what is left                          before main_transparent_pass_3d
 //! ```
+//!
+//! The order is that of the public system [`sets`]. What one pass has for the others it writes into
+//! [`bindings::SharedTextures`]; no pass names another one's systems.
 
+pub mod bindings;
 pub mod components;
-pub mod cull;
 pub mod daylight;
-mod extract;
+pub mod extract;
 pub mod forest;
-pub mod frame;
-mod gpu;
+pub mod gpu;
 pub mod readback;
 pub mod report;
+pub mod sets;
 pub mod shaders;
 pub mod sky;
+pub mod stand_light;
 pub mod sun_shadow;
 pub mod terrain;
+pub mod view;
 
 use bevy::{
     app::{App, Plugin},
@@ -42,6 +47,7 @@ impl Plugin for CanopyRenderPlugin {
         let report = report::FrameReport::default();
         app.insert_resource(report.clone()).add_plugins(components::ComponentsPlugin);
         if let Some(render_app) = app.get_sub_app_mut(RenderApp) {
+            sets::configure(render_app);
             render_app
                 .insert_resource(report)
                 .init_resource::<extract::ExtractedScene>()
@@ -49,7 +55,9 @@ impl Plugin for CanopyRenderPlugin {
                 .add_systems(Render, report::finish_report.in_set(RenderSystems::Cleanup));
         }
         app.add_plugins((
-            frame::FramePlugin,
+            view::ViewPlugin,
+            bindings::BindingsPlugin,
+            stand_light::StandLightPlugin,
             sky::SkyPassPlugin,
             sun_shadow::SunShadowPassPlugin,
             terrain::TerrainPassPlugin,

@@ -95,7 +95,9 @@ pub(super) fn small(text: impl Into<String>) -> RichText {
 
 fn numbers(ui: &mut Ui, session: &Session, frames: &FrameTimes, sun: Option<f32>) {
     let milliseconds = |share| frames.percentile(share).map_or("-".to_owned(), |s| format!("{:.1}", s * 1e3));
-    let (forest, terrain) = (frames.forest, frames.terrain);
+    let (forest, terrain) = (&frames.forest, frames.terrain);
+    let levels: Vec<String> =
+        forest.levels.iter().map(|level| format!("{} {}", grouped(level.trees), level.label)).collect();
     let clock = match session.clock.rate() {
         _ if session.paused => "paused".to_owned(),
         0.0 => "stands".to_owned(),
@@ -112,8 +114,8 @@ fn numbers(ui: &mut Ui, session: &Session, frames: &FrameTimes, sun: Option<f32>
             format!("p50 {} ms, p95 {} ms of {} frames", milliseconds(0.5), milliseconds(0.95), frames.frames()),
             FRAME_TIME,
         ),
-        ("trees", format!("{} models, {} crosses", grouped(forest.models), grouped(forest.crosses)), TREES),
-        ("triangles", grouped(forest.triangles + terrain.triangles), TRIANGLES),
+        ("trees", levels.join(", "), TREES),
+        ("triangles", grouped(forest.triangles() + terrain.triangles), TRIANGLES),
         ("ground", format!("{} tiles", grouped(terrain.tiles)), "Terrain tiles that the view draws."),
         (
             "time",

@@ -2,11 +2,18 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::transfer::scattered_tint;
+use glam::Vec3;
+
 use crate::{
-    bake::{BakedPlant, billboard::SPREAD_LEVELS, lighting::BakedLighting},
-    plant::PlantMaterial,
-    render::cull::VariantSize,
+    bake::{
+        BakedPlant,
+        billboard::SPREAD_LEVELS,
+        lighting::BakedLighting,
+        transfer::{PackedPart, TransferSettings, code_words, mean_words},
+    },
+    cull::VariantSize,
+    light::{atmosphere::luminance, sh::MAX_BANDS},
+    plant::{LeafColors, PlantMaterial},
 };
 
 /// `ForestView` of `shaders/forest/instance.wgsl`.
@@ -21,10 +28,14 @@ pub struct ForestViewUniform {
     pub anchor_y: f32,
     /// Metres along a cell's side.
     pub cell_size: f32,
-    /// Where the full model begins to give way, metres.
-    pub fade_start: f32,
-    /// Where it is gone, metres.
-    pub fade_end: f32,
+    /// Distances in metres over which the level comes in.
+    pub fade_in: [f32; 2],
+    /// Distances in metres over which it goes out.
+    pub fade_out: [f32; 2],
+    /// Up to the next 16 bytes.
+    pub unused: [f32; 2],
+    /// Linear colour of the level's tint and how much of it is mixed in.
+    pub tint: [f32; 4],
 }
 
 /// `Plane` of `shaders/forest/instance.wgsl`.
@@ -75,6 +86,49 @@ pub struct PartUniform {
     pub transmission: [f32; 4],
     /// Gloss: reflectance, roughness; unused, unused.
     pub gloss: [f32; 4],
+}
+
+/// Words of four coefficients after the first, of all bands.
+pub const WORDS: usize = (MAX_BANDS * MAX_BANDS - 1).div_ceil(4);
+
+/// `Transfer` of `shaders/forest/transfer.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct TransferUniform {
+    /// What 127 stands for in each coefficient after the first, relative to it, four a word of codes.
+    pub scale: [[f32; 4]; WORDS],
+    /// Words from one vertex to the next, of its means, and of the codes of one side and channel; where the codes of the key
+    /// light that leaves send each other begin.
+    pub form: [u32; 4],
+    /// Colour of the key light that leaves send each other; w: what 127 stands for in its codes.
+    pub scattered: [f32; 4],
+}
+
+impl TransferUniform {
+    /// That of one part of a plant.
+    pub fn new(settings: &TransferSettings, part: &PackedPart, tint: Vec3) -> Self {
+        let mut scale = [0.0; 4 * WORDS];
+        for (i, scale) in scale.iter_mut().enumerate() {
+            *scale = part.scale.get((i + 1).isqrt()).copied().unwrap_or(0.0);
+        }
+        let form =
+            [part.vertex_bytes / 4, mean_words(settings, part.sides), code_words(settings), part.bytes.len() / 4];
+        Self {
+            scale: bytemuck::cast(scale),
+            form: form.map(|words| words as u32),
+            scattered: tint.extend(part.scattered_scale).to_array(),
+        }
+    }
+}
+
+/// The colour that light takes on from a leaf, by its luminance; white where leaves are black.
+///
+/// With one channel a transfer holds what comes over other leaves by the luminance of their colours. That of the sky is a
+/// few percent of its light and stays without colour; that of the sun is most of what lights the shade inside a crown.
+pub fn scattered_tint(leaves: &LeafColors) -> Vec3 {
+    let color = leaves.reflected + leaves.transmitted;
+    let light = luminance(color);
+    if light > 1e-4 { color / light } else { Vec3::ONE }
 }
 
 /// What the shaders know of each plant.

@@ -75,3 +75,13 @@ pub struct ShadowUniform {
     /// Ground map: camera-relative origin (x, z) and inverse size.
     pub ground: [f32; 4],
 }
+
+/// `CascadeView` of `shaders/sun_shadow/caster.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct CascadeViewUniform {
+    /// Metres relative to the box's centre to the map's clip space.
+    pub clip_from_anchor: [[f32; 4]; 4],
+    /// To the light.
+    pub direction: [f32; 4],
+}

@@ -1,14 +1,18 @@
-//! The light inside a stand, as a texture of bind group 0.
+//! The light inside a stand, as a texture of bind group 0: what neighbouring crowns let through of sky and sun, and what
+//! they scatter ([`crate::light::stand`]). Cost: nothing while light, exposure and trees stay the same.
 
 use std::sync::Arc;
 
 use bevy::{
+    app::{App, Plugin},
     ecs::{
         resource::Resource,
+        schedule::IntoScheduleConfigs,
         system::{Res, ResMut},
         world::{FromWorld, World},
     },
     render::{
+        GpuResourceAppExt, Render, RenderApp,
         render_resource::{Texture, TextureView},
         renderer::{RenderDevice, RenderQueue},
     },
@@ -16,13 +20,15 @@ use bevy::{
 use glam::{Vec3, Vec4};
 use half::f16;
 
-use super::PreparedFrame;
 use crate::{
     light::{
         LightState, StandLight, StandTrees,
         stand::{COVERS, DEPTHS},
     },
-    render::{extract::ExtractedScene, forest::GpuForests, gpu, report::FrameReport},
+    render::{
+        bindings::SharedTextures, extract::ExtractedScene, forest::GpuForests, gpu, report::FrameReport,
+        sets::CanopyRenderSystems, view::PreparedFrame,
+    },
 };
 
 /// What is kept of a place: sky and beam, down, up; below each other in the texture.
@@ -32,10 +38,9 @@ const BRIGHTEST: f32 = 6.0e4;
 
 /// The table of [`StandLight`] on the GPU, exposed.
 #[derive(Resource)]
-pub struct StandTexture {
+struct StandTexture {
     texture: Texture,
-    /// What shaders sample.
-    pub view: TextureView,
+    view: TextureView,
     /// What it holds.
     shows: Option<(Arc<LightState>, f32, StandTrees)>,
 }
@@ -48,15 +53,29 @@ impl FromWorld for StandTexture {
     }
 }
 
+/// Keeps the light inside stands.
+pub struct StandLightPlugin;
+
+impl Plugin for StandLightPlugin {
+    fn build(&self, app: &mut App) {
+        let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
+        render_app
+            .init_gpu_resource::<StandTexture>()
+            .add_systems(Render, upload_stand_light.in_set(CanopyRenderSystems::Light));
+    }
+}
+
 /// Computes and uploads the table where light, exposure or the trees have changed.
-pub fn upload_stand_light(
+fn upload_stand_light(
     scene: Res<ExtractedScene>,
     frame: Res<PreparedFrame>,
     forests: Res<GpuForests>,
     queue: Res<RenderQueue>,
     report: Res<FrameReport>,
     mut stand: ResMut<StandTexture>,
+    mut shared: ResMut<SharedTextures>,
 ) {
+    shared.stand_light = stand.view.clone();
     let (Some(view), Some(daylight)) = (&frame.view, &scene.daylight) else { return };
     let trees = forests.trees();
     let same = |(light, exposure, known): &(Arc<LightState>, f32, StandTrees)| {
