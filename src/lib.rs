@@ -34,7 +34,7 @@
 //! Another scene takes its place when a [`LoadScene`](app::LoadScene) asks for it. A program that would rather wait calls
 //! [`Stage::build`](app::Stage::build) itself, and [`Stage::show`](app::Stage::show).
 //!
-//! The rooms: [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`bake`], [`light`], [`lod`],
+//! The rooms: [`math`], [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`bake`], [`light`], [`lod`],
 //! [`trace`] and [`mod@reference`] know no App and no GPU; [`render`] draws what they make; [`app`] is the interactive
 //! program. ARCHITECTURE.md in the repository shows how a tree gets from a file to a pixel.
 
@@ -43,6 +43,7 @@ pub mod bake;
 mod files;
 pub mod light;
 pub mod lod;
+pub mod math;
 pub mod plant;
 pub mod reference;
 pub mod render;

@@ -7,6 +7,7 @@ mod grow;
 mod implicit;
 mod light;
 mod load;
+mod math;
 mod plant;
 mod reference;
 mod render;

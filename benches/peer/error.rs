@@ -5,7 +5,7 @@ use std::{fmt::Write, path::Path, sync::Arc};
 use canopy::{
     bake::BakedPlant,
     light::sun::SunPosition,
-    plant::texture::srgb_to_linear,
+    math::srgb_to_linear,
     render::{
         components::SunShadowSettings,
         daylight::SkySettings,

@@ -39,10 +39,11 @@ use bevy::{
 };
 use canopy::{
     bake::billboard::Cross,
-    light::{LightState, atmosphere::luminance},
+    light::LightState,
+    math::{MipChain, luminance},
     plant::{
         PartKind, PlantMaterial, PlantMesh,
-        texture::{MipChain, color_mips, leaf_mips},
+        texture::{color_mips, leaf_mips},
     },
     render::readback::read_rgb,
     scene::Viewpoint,

@@ -6,7 +6,7 @@ use std::time::Instant;
 use canopy::bake::transfer::{
     Channels, Interior, TransferBake, TransferFormat, TransferSettings, bake_transfer, share,
 };
-use canopy::light::atmosphere::luminance;
+use canopy::math::luminance;
 use canopy::plant::Plant;
 
 use crate::DAY;

@@ -2,7 +2,7 @@
 
 use canopy::bake::transfer::{TransferBake, exitant_radiance, share};
 use canopy::light::LightState;
-use canopy::light::atmosphere::luminance;
+use canopy::math::luminance;
 use glam::Vec3;
 
 use crate::truth::Truth;

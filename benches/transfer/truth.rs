@@ -2,9 +2,9 @@
 
 use canopy::bake::transfer::{Projection, direction_set};
 use canopy::light::LightState;
-use canopy::light::atmosphere::luminance;
+use canopy::math::hash::mix64;
+use canopy::math::luminance;
 use canopy::plant::PartKind;
-use canopy::scatter::hash::mix64;
 use canopy::trace::{PlantTracer, Ray, SurfacePoint};
 use glam::Vec3;
 

@@ -16,6 +16,7 @@ use glam::Vec3;
 
 use super::geometry::{self, Element};
 use super::rasterize::{View, projected_area};
+use crate::math::hash::mix32;
 use crate::plant::{PartKind, Plant, PlantMesh, PlantPart};
 
 /// A lighter model that casts the near sun shadow: the meshes of [`simplify_foliage`], one a part in the plant's
@@ -134,7 +135,7 @@ fn evenly_chosen(elements: &[Element], origin: Vec3, extent: f32, target: usize)
         .map(|(index, element)| {
             let cell = ((element.center - origin) / extent * CELLS).clamp(Vec3::ZERO, Vec3::splat(CELLS - 1.0));
             let cell = cell.as_uvec3();
-            (interleave(cell.x) | interleave(cell.y) << 1 | interleave(cell.z) << 2, hash(index as u32), index as u32)
+            (interleave(cell.x) | interleave(cell.y) << 1 | interleave(cell.z) << 2, mix32(index as u32), index as u32)
         })
         .collect();
     curve.sort_unstable();
@@ -201,15 +202,6 @@ fn interleave(bits: u32) -> u32 {
     x = (x | x << 8) & 0x0300_f00f;
     x = (x | x << 4) & 0x030c_30c3;
     (x | x << 2) & 0x0924_9249
-}
-
-/// Integer hash with full avalanche [Wellons 2018, "Prospecting for Hash Functions": lowbias32].
-fn hash(mut x: u32) -> u32 {
-    x ^= x >> 16;
-    x = x.wrapping_mul(0x7feb_352d);
-    x ^= x >> 15;
-    x = x.wrapping_mul(0x846c_a68b);
-    x ^ x >> 16
 }
 
 #[cfg(test)]

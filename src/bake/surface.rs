@@ -5,21 +5,11 @@ use std::sync::{Arc, LazyLock};
 use glam::{Vec2, Vec3};
 use image::RgbaImage;
 
-use crate::plant::texture::{linear_to_srgb, srgb_to_linear};
+use crate::math::srgb_to_linear;
 use crate::plant::{PartKind, PlantPart};
 
 /// Linear values of the 256 sRGB codes.
 static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|code| srgb_to_linear(code as f32 / 255.0)));
-
-/// sRGB code of a linear value; below 0 and NaN give 0, above 1 gives 255.
-pub(crate) fn srgb_code(linear: f32) -> u8 {
-    unit_code(linear_to_srgb(linear))
-}
-
-/// Code of a value in 0..1; below 0 and NaN give 0, above 1 gives 255.
-pub(crate) fn unit_code(value: f32) -> u8 {
-    (value * 255.0 + 0.5) as u8
-}
 
 /// The four texels around a texture coordinate, upper row first, and its place between them, 0..1.
 struct Footprint {
@@ -171,12 +161,6 @@ mod tests {
     fn part(kind: PartKind, image: RgbaImage) -> PlantPart {
         let material = PlantMaterial { base_color_texture: Some(Arc::new(image)), ..Default::default() };
         PlantPart { kind, mesh: PlantMesh::default(), material }
-    }
-
-    #[test]
-    fn srgb_goes_there_and_back() {
-        assert!((0..=255u8).all(|code| srgb_code(LINEAR[usize::from(code)]) == code));
-        assert_eq!((srgb_code(f32::NAN), srgb_code(-1.0), srgb_code(9.0)), (0, 0, 255));
     }
 
     #[test]

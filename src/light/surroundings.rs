@@ -5,8 +5,8 @@ use std::f32::consts::PI;
 use glam::Vec3;
 
 use super::atmosphere::SkyView;
-use super::quadrature::SphereQuadrature;
 use super::sh;
+use crate::math::SphereQuadrature;
 
 /// Rings a hemisphere and azimuths with which the surroundings are projected onto spherical harmonics.
 const SH_RINGS: usize = 24;

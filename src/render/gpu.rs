@@ -10,7 +10,7 @@ use bevy::render::{
 };
 use bytemuck::Pod;
 
-use crate::plant::texture::MipChain;
+use crate::math::MipChain;
 
 /// Bytes between dynamic offsets of uniform buffers that every device allows.
 pub const UNIFORM_STRIDE: u64 = 256;

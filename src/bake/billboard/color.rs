@@ -4,8 +4,11 @@ use image::RgbaImage;
 use rayon::prelude::*;
 
 use super::Texel;
-use crate::bake::surface::{srgb_code, unit_code};
-use crate::plant::texture::{MipChain, alpha_tested_mips, dilate_colors, fade_alpha};
+use crate::math::{
+    MipChain,
+    color::{srgb8, unorm8},
+};
+use crate::plant::texture::{alpha_tested_mips, dilate_colors, fade_alpha};
 
 /// Colour mips of a picture of `resolution`² texels. Alpha is the coverage, restructured by [`fade_alpha`] with the
 /// cutoff for which the area inside the outline is the sum of the coverages: a thin crown is full of texels that are
@@ -14,8 +17,8 @@ pub(super) fn mips(texels: &[Texel], resolution: usize) -> MipChain {
     let mut image = RgbaImage::new(resolution as u32, resolution as u32);
     for (out, texel) in image.pixels_mut().zip(texels) {
         if texel.coverage > 0.0 {
-            let color = (texel.color / texel.coverage).to_array().map(srgb_code);
-            out.0 = [color[0], color[1], color[2], unit_code(texel.coverage).max(1)];
+            let color = (texel.color / texel.coverage).to_array().map(srgb8);
+            out.0 = [color[0], color[1], color[2], unorm8(texel.coverage).max(1)];
         }
     }
     let coverage: f64 = texels.iter().map(|texel| f64::from(texel.coverage)).sum::<f64>() / texels.len().max(1) as f64;

@@ -24,7 +24,7 @@ use glam::{Mat3, Vec3, Vec4};
 
 use super::Texel;
 use crate::bake::lighting::BakedLighting;
-use crate::plant::texture::MipChain;
+use crate::math::MipChain;
 
 /// What a code of 127 stands for. A free side has a first coefficient of 0.282 and a vector 0.326 long.
 pub const LIGHT_SCALE: f32 = 0.4;
@@ -108,8 +108,8 @@ mod tests {
     use super::*;
     use crate::bake::lighting::LightingSettings;
     use crate::bake::transfer::{TransferSettings, share};
-    use crate::light::atmosphere::luminance;
     use crate::light::{Atmosphere, AtmosphereParams, LightSettings, LightState, SunPosition, sh};
+    use crate::math::luminance;
     use crate::plant::grow::{GrowParameters, grow};
 
     /// The texture is nearer to the light of the model's vertices in the same picture than k_a with the mean normal.

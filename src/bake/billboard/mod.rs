@@ -26,8 +26,7 @@ use self::properties::SpreadSum;
 use super::geometry;
 use super::lighting::BakedLighting;
 use super::rasterize::{Hit, Raster, View};
-use crate::light::atmosphere::luminance;
-use crate::plant::texture::MipChain;
+use crate::math::{MipChain, luminance};
 use crate::plant::{Bounds, PartKind, Plant};
 
 /// Crossed billboards of one plant.

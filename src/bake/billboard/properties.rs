@@ -1,11 +1,10 @@
 //! The property texture of a cross: normal, ambient visibility, share of foliage.
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::Texel;
-use crate::bake::surface::unit_code;
-use crate::plant::texture::MipChain;
+use crate::math::{MipChain, color::unorm8, octahedral};
 
 /// What a texel of any level holds, weighted with its coverage.
 #[derive(Clone, Copy, Debug, Default)]
@@ -22,9 +21,10 @@ impl Sum {
     const OPEN: Self = Self { normal: Vec3::Z, ambient: 1.0, foliage: 1.0, coverage: 1.0 };
 
     fn code(&self) -> [u8; 4] {
-        let [x, y] = octahedral(self.normal.try_normalize().unwrap_or(Vec3::Z)).to_array();
-        let mean = |value: f32| unit_code(value / self.coverage);
-        [unit_code(x), unit_code(y), mean(self.ambient), mean(self.foliage)]
+        let normal = octahedral::encode_z(self.normal.try_normalize().unwrap_or(Vec3::Z));
+        let [x, y] = (0.5 + 0.5 * normal).to_array();
+        let mean = |value: f32| unorm8(value / self.coverage);
+        [unorm8(x), unorm8(y), mean(self.ambient), mean(self.foliage)]
     }
 }
 
@@ -143,24 +143,14 @@ fn smoothed(texels: &[Texel], resolution: usize, deviation: f32) -> Vec<Vec3> {
     pass(&pass(&normals)).into_iter().map(mean).collect()
 }
 
-/// Octahedral encoding of a unit vector into 0..1 x 0..1, +Z in the middle [Cigolle et al. 2014, "A Survey of
-/// Efficient Representations for Independent Unit Vectors", 3.1].
-fn octahedral(unit: Vec3) -> Vec2 {
-    let flat = unit.truncate() / unit.abs().element_sum();
-    let sign = |value: f32| if value < 0.0 { -1.0 } else { 1.0 };
-    let folded = Vec2::new((1.0 - flat.y.abs()) * sign(flat.x), (1.0 - flat.x.abs()) * sign(flat.y));
-    0.5 + 0.5 * if unit.z < 0.0 { folded } else { flat }
-}
-
 #[cfg(test)]
 mod tests {
+    use glam::Vec2;
+
     use super::*;
 
     fn decode(code: [u8; 4]) -> Vec3 {
-        let f = Vec2::new(f32::from(code[0]), f32::from(code[1])) / 255.0 * 2.0 - 1.0;
-        let z = 1.0 - f.x.abs() - f.y.abs();
-        let t = (-z).max(0.0);
-        Vec3::new(f.x - t * f.x.signum(), f.y - t * f.y.signum(), z).normalize()
+        octahedral::decode_z(Vec2::new(f32::from(code[0]), f32::from(code[1])) / 255.0 * 2.0 - 1.0)
     }
 
     #[test]
@@ -191,8 +181,8 @@ mod tests {
         let mean = Vec3::new(-0.6 + 0.3, 0.0, 0.8 + 0.4).normalize();
         for level in 1..7 {
             assert!(decode(texel(level, 0)).angle_between(mean) < 0.015, "level {level}");
-            assert_eq!(texel(level, 0)[2], unit_code(0.6 / 1.5));
-            assert_eq!(texel(level, 0)[3], unit_code(1.0 / 1.5));
+            assert_eq!(texel(level, 0)[2], unorm8(0.6 / 1.5));
+            assert_eq!(texel(level, 0)[3], unorm8(1.0 / 1.5));
         }
         // Level 0 has one direction a texel, the others two that disagree; wood has no say.
         assert!(spreads[0].spread.abs() < 1e-5 && spreads[0].weight == 64.0);

@@ -22,7 +22,7 @@ use crate::bake::transfer::{
     Channels, Interior, PackedPart, PackedTransfer, Projection, TransferFormat, TransferSettings,
 };
 use crate::light::sh::MAX_BANDS;
-use crate::plant::texture::MipChain;
+use crate::math::MipChain;
 use crate::plant::{Plant, PlantMesh};
 
 /// Version of the format *and* of the bakes: to be raised whenever either gives other bytes for the same input.

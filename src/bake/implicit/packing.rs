@@ -51,7 +51,7 @@ pub fn decode(stored: u32) -> (Vec3, f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::light::quadrature::SphereQuadrature;
+    use crate::math::SphereQuadrature;
 
     /// Angle in degrees, good for small ones.
     fn degrees(a: Vec3, b: Vec3) -> f32 {

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::bounce::{Link, Links, Scene};
 use super::points::Point;
 use super::rays::Directions;
-use crate::light::atmosphere::luminance;
+use crate::math::luminance;
 use crate::plant::PartKind;
 use crate::trace::{LineCrossing, ParallelTracer};
 

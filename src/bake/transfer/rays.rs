@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use super::fit::Fit;
 use super::{Projection, TransferSettings};
 use crate::light::sh;
-use crate::scatter::sequence::hammersley;
+use crate::math::hammersley;
 
 /// Lines that are followed to what they meet, at least, for light that bounces, where there are as many: such light
 /// varies less from direction to direction than what hides it.

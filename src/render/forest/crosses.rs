@@ -6,7 +6,7 @@ use bevy::render::{
 };
 
 use super::layouts::ForestLayouts;
-use crate::{bake::BakedPlant, plant::texture::MipChain, render::gpu};
+use crate::{bake::BakedPlant, math::MipChain, render::gpu};
 
 /// How the sky's light reaches the crosses of a forest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

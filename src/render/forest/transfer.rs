@@ -27,9 +27,9 @@ use crate::{
     bake::transfer::{PackedPart, TransferSettings, code_words, mean_words},
     light::{
         LightState,
-        atmosphere::luminance,
         sh::{MAX_BANDS, basis_into, rotate_y},
     },
+    math::luminance,
     plant::LeafColors,
     render::{components::SunLight, extract::ExtractedScene, frame::PreparedFrame, gpu, report::FrameReport},
 };

@@ -1,4 +1,4 @@
-//! Filtering in linear light with colours weighted by alpha.
+//! Filtering of images in linear light with colours weighted by alpha.
 //!
 //! Texels are kept straight (not premultiplied) and each pass computes the premultiplied average and divides it
 //! out again: `a = sum(w a_i)`, `c = sum(w a_i c_i) / a`. Passes may be chained (columns after rows, mip after mip)
@@ -7,10 +7,14 @@
 use image::{Rgba, RgbaImage};
 use rayon::prelude::*;
 
+use super::color::{srgb_to_linear, srgb8, unorm8};
+
 /// An image of straight-alpha texels in linear light, row by row.
 #[derive(Clone, Debug)]
-pub(super) struct Layer {
+pub(crate) struct Layer {
+    /// Texels in a row.
     pub width: usize,
+    /// Rows.
     pub height: usize,
     /// Linear red, green, blue and alpha, 0..1.
     pub texels: Vec<[f32; 4]>,
@@ -19,23 +23,6 @@ pub(super) struct Layer {
 /// Below this weight a group of texels counts as invisible: half of the smallest alpha of 8 bits, spread over
 /// four million texels.
 const INVISIBLE: f32 = 0.5 / 255.0 / 4_194_304.0;
-
-/// Decodes an sRGB value (0..1) to linear light (0..1), IEC 61966-2-1.
-pub fn srgb_to_linear(encoded: f32) -> f32 {
-    let encoded = encoded.clamp(0.0, 1.0);
-    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
-}
-
-/// Encodes linear light (clamped to 0..1) as sRGB (0..1), IEC 61966-2-1.
-pub fn linear_to_srgb(linear: f32) -> f32 {
-    let linear = linear.clamp(0.0, 1.0);
-    if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
-}
-
-/// Rounds a value of 0..1 to 8 bits.
-pub(super) fn to_byte(value: f32) -> u8 {
-    (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
-}
 
 impl Layer {
     /// Decodes an sRGB image with straight linear alpha.
@@ -56,8 +43,8 @@ impl Layer {
             .texels
             .par_iter()
             .map(|t| {
-                let channel = |value: f32| to_byte(linear_to_srgb(value));
-                [channel(t[0]), channel(t[1]), channel(t[2]), to_byte(t[3])]
+                let channel = |value: f32| srgb8(value);
+                [channel(t[0]), channel(t[1]), channel(t[2]), unorm8(t[3])]
             })
             .collect();
         encoded.into_flattened()

@@ -12,7 +12,7 @@
 //! entries of two bytes, so three look-ups serve every index of 32 bits), after the digit blocks of
 //! [Kollig & Keller 2002] and [Struckmeier 1995].
 
-use super::ScatterError;
+use super::MathError;
 
 /// 2⁻⁵³, the step of all results.
 const STEP: f64 = 1.0 / (1u64 << 53) as f64;
@@ -126,10 +126,10 @@ fn mirrored_digits(base: u32, mut i: u64) -> f64 {
 /// For many indices in a base above 3 a [`RadicalInverse`] is faster.
 ///
 /// # Errors
-/// [`ScatterError::Base`] for bases 0 and 1.
-pub fn radical_inverse(base: u32, i: u64) -> Result<f64, ScatterError> {
+/// [`MathError::Base`] for bases 0 and 1.
+pub fn radical_inverse(base: u32, i: u64) -> Result<f64, MathError> {
     match base {
-        0 | 1 => Err(ScatterError::Base { base }),
+        0 | 1 => Err(MathError::Base { base }),
         2 => Ok(radical_inverse_2(i)),
         3 => Ok(radical_inverse_3(i)),
         _ => Ok(mirrored_digits(base, i)),
@@ -153,10 +153,10 @@ impl RadicalInverse {
     /// Builds the table (at most 4096 entries).
     ///
     /// # Errors
-    /// [`ScatterError::Base`] for bases 0 and 1.
-    pub fn new(base: u32) -> Result<Self, ScatterError> {
+    /// [`MathError::Base`] for bases 0 and 1.
+    pub fn new(base: u32) -> Result<Self, MathError> {
         if base < 2 {
-            return Err(ScatterError::Base { base });
+            return Err(MathError::Base { base });
         }
         let (mut block, mut digits) = (base, 1);
         while let Some(next) = block.checked_mul(base).filter(|&next| next <= MAX_BLOCK) {
@@ -223,7 +223,7 @@ mod tests {
     #[test]
     fn bases_without_digits_are_refused() {
         for base in [0, 1] {
-            assert!(matches!(radical_inverse(base, 5), Err(ScatterError::Base { .. })));
+            assert!(matches!(radical_inverse(base, 5), Err(MathError::Base { .. })));
             assert!(RadicalInverse::new(base).is_err());
         }
     }

@@ -6,7 +6,7 @@
 
 use glam::DVec2;
 
-use super::ScatterError;
+use super::MathError;
 
 /// The star discrepancy of `points`, which are in [0, 1]²; 1 for no points (the whole square is missed).
 ///
@@ -17,11 +17,11 @@ use super::ScatterError;
 /// Time O(n²) with an O(n) inner loop over contiguous memory (4,000 points: some 50 ms), memory O(n).
 ///
 /// # Errors
-/// [`ScatterError::OutsideUnitSquare`] for a point outside or not a number.
-pub fn star_discrepancy(points: &[DVec2]) -> Result<f64, ScatterError> {
+/// [`MathError::OutsideUnitSquare`] for a point outside or not a number.
+pub fn star_discrepancy(points: &[DVec2]) -> Result<f64, MathError> {
     let inside = |p: &DVec2| (0.0..=1.0).contains(&p.x) && (0.0..=1.0).contains(&p.y);
     if let Some(index) = points.iter().position(|p| !inside(p)) {
-        return Err(ScatterError::OutsideUnitSquare { index, x: points[index].x, y: points[index].y });
+        return Err(MathError::OutsideUnitSquare { index, x: points[index].x, y: points[index].y });
     }
     let mut sorted = points.to_vec();
     sorted.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
@@ -63,7 +63,7 @@ mod tests {
     fn points_outside_are_named() {
         for bad in [DVec2::new(1.5, 0.5), DVec2::new(0.5, f64::NAN), DVec2::new(-0.1, 0.0)] {
             let error = star_discrepancy(&[DVec2::ZERO, bad]).unwrap_err();
-            assert!(matches!(error, ScatterError::OutsideUnitSquare { index: 1, .. }));
+            assert!(matches!(error, MathError::OutsideUnitSquare { index: 1, .. }));
         }
     }
 }

@@ -1,14 +1,12 @@
-//! Point sets in the unit square: Halton, Hammersley, random (Franzke 2005, figure 4.17).
+//! Point sets in the unit square: Halton, Hammersley (Franzke 2005, figure 4.17).
 //!
 //! - Halton ([Halton 1964]): (Φ₂(i), Φ₃(i)), a sequence: any beginning of it is even, so a stand can grow.
 //! - Hammersley ([Hammersley & Handscomb 1964]): (i/n, Φ₂(i)), a set: more even than Halton, but `n` is fixed.
-//! - random: independent uniform points; the yardstick.
 //!
 //! Star discrepancies are in `benches/sequences.rs`.
 
 use glam::DVec2;
 
-use super::hash::{Stream, unit_f64};
 use super::radical_inverse::{
     TERNARY_BLOCK, TERNARY_BLOCK_2, TERNARY_BLOCK_3, radical_inverse_2, radical_inverse_3, ternary_mirror,
     ternary_quotient,
@@ -31,12 +29,6 @@ pub fn hammersley(i: u64, n: u64) -> DVec2 {
         Some(i) => DVec2::new((i as f64 / n as f64).min(BELOW_ONE), radical_inverse_2(i)),
         None => DVec2::ZERO,
     }
-}
-
-/// The i-th random point of `seed`; both coordinates uniform in [0, 1).
-#[inline]
-pub fn random(i: u64, seed: u64) -> DVec2 {
-    DVec2::new(unit_f64(seed, i, Stream::PointX), unit_f64(seed, i, Stream::PointZ))
 }
 
 /// The Halton sequence in order, from any index: the same points as [`halton`], bit for bit.
