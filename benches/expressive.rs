@@ -16,8 +16,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use canopy::bake::implicit::{ImplicitBake, ImplicitSettings, NormalSource, bake_implicit};
-use canopy::bake::transfer::direction_set;
+use canopy::bake::lighting::implicit::{ImplicitBake, ImplicitSettings, NormalSource, bake_implicit};
+use canopy::bake::lighting::transfer::direction_set;
 use canopy::light::{Atmosphere, AtmosphereParams, LightSettings, LightState, SunPosition, sh};
 use canopy::math::luminance;
 use canopy::plant::gltf::{GltfOptions, load_plant};

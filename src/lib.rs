@@ -45,6 +45,7 @@ pub mod light;
 pub mod lod;
 pub mod math;
 pub mod plant;
+mod plugin;
 pub mod reference;
 pub mod render;
 pub mod scatter;
@@ -52,16 +53,7 @@ pub mod scene;
 pub mod terrain;
 pub mod trace;
 
-use bevy::app::{PluginGroup, PluginGroupBuilder};
-
-/// All of Canopy for a Bevy program that has its `DefaultPlugins`.
-pub struct CanopyPlugins;
-
-impl PluginGroup for CanopyPlugins {
-    fn build(self) -> PluginGroupBuilder {
-        PluginGroupBuilder::start::<Self>().add(render::daylight::DaylightPlugin).add(render::CanopyRenderPlugin)
-    }
-}
+pub use plugin::CanopyPlugins;
 
 /// What most programs need.
 pub mod prelude {

@@ -38,7 +38,7 @@ use bevy::{
     winit::WinitPlugin,
 };
 use canopy::{
-    bake::billboard::Cross,
+    bake::levels::cross::Cross,
     light::LightState,
     math::{MipChain, luminance},
     plant::{

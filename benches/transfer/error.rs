@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use canopy::bake::transfer::{
+use canopy::bake::lighting::transfer::{
     Channels, Interior, TransferBake, TransferFormat, TransferSettings, bake_transfer, share,
 };
 use canopy::math::luminance;

@@ -1,6 +1,6 @@
 //! How wrong a transfer is.
 
-use canopy::bake::transfer::{TransferBake, exitant_radiance, share};
+use canopy::bake::lighting::transfer::{TransferBake, exitant_radiance, share};
 use canopy::light::LightState;
 use canopy::math::luminance;
 use glam::Vec3;

@@ -1,6 +1,6 @@
 //! What vertices truly send out: paths from each vertex, with the same number of bounces as the bake.
 
-use canopy::bake::transfer::{Projection, direction_set};
+use canopy::bake::lighting::transfer::{Projection, direction_set};
 use canopy::light::LightState;
 use canopy::math::hash::mix64;
 use canopy::math::luminance;

@@ -14,13 +14,13 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
-use crate::bake::BakedPlant;
-use crate::bake::billboard::{Cross, CrossPlane, CrossTextures, SPREAD_LEVELS};
-use crate::bake::implicit::NoSurface;
-use crate::bake::lighting::{BakedLighting, ExpressiveLighting, TransferLighting};
-use crate::bake::transfer::{
+use crate::bake::baked::BakedPlant;
+use crate::bake::levels::cross::{Cross, CrossPlane, CrossTextures, SPREAD_LEVELS};
+use crate::bake::lighting::implicit::NoSurface;
+use crate::bake::lighting::transfer::{
     Channels, Interior, PackedPart, PackedTransfer, Projection, TransferFormat, TransferSettings,
 };
+use crate::bake::lighting::{BakedLighting, ExpressiveLighting, TransferLighting};
 use crate::light::sh::MAX_BANDS;
 use crate::math::MipChain;
 use crate::plant::{Plant, PlantMesh};

@@ -16,8 +16,10 @@ use super::{
 use crate::{
     bake::{
         BakedPlant,
-        lighting::BakedLighting,
-        transfer::{Channels, TransferSettings},
+        lighting::{
+            BakedLighting,
+            transfer::{Channels, TransferSettings},
+        },
     },
     plant::{PartKind, PlantMesh},
     render::{components::SunLight, gpu},

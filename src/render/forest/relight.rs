@@ -21,7 +21,7 @@ use super::{
     uniforms::{PLANES, part_uniform, variants},
 };
 use crate::{
-    bake::{BakedPlant, billboard::Cross},
+    bake::{BakedPlant, levels::cross::Cross},
     render::gpu,
 };
 
@@ -92,7 +92,10 @@ pub fn relight(
 mod tests {
     use super::*;
     use crate::{
-        bake::{BakeSettings, bake_plant, implicit::ImplicitSettings, lighting::LightingSettings},
+        bake::{
+            BakeSettings, bake_plant,
+            lighting::{LightingSettings, implicit::ImplicitSettings},
+        },
         plant::grow::{GrowParameters, grow},
     };
 

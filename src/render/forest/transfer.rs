@@ -24,7 +24,7 @@ use glam::Vec3;
 
 use super::{layouts::ForestLayouts, resources::GpuForests};
 use crate::{
-    bake::transfer::{PackedPart, TransferSettings, code_words, mean_words},
+    bake::lighting::transfer::{PackedPart, TransferSettings, code_words, mean_words},
     light::{
         LightState,
         sh::{MAX_BANDS, basis_into, rotate_y},

@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::transfer::scattered_tint;
 use crate::{
-    bake::{BakedPlant, billboard::SPREAD_LEVELS, lighting::BakedLighting},
+    bake::{BakedPlant, levels::cross::SPREAD_LEVELS, lighting::BakedLighting},
     plant::PlantMaterial,
     render::cull::VariantSize,
 };

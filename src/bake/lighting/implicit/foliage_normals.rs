@@ -125,8 +125,8 @@ pub fn blend(own: Vec3, realigned: Option<Vec3>, own_share: f32) -> Vec3 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::generators::{Generator, Weighting};
     use super::*;
-    use crate::bake::implicit::generators::{Generator, Weighting};
 
     /// Points that fill the unit cube evenly: multiples of powers of the plastic number's kin [Roberts 2018, R3].
     fn scattered(count: u32, seed: u32) -> Vec<Vec3> {

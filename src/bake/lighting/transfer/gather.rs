@@ -7,29 +7,14 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::bounce::{Link, Links, Scene};
 use super::points::Point;
 use super::rays::Directions;
-use crate::math::luminance;
+use super::scene::{Link, Links, Scene, Sides};
 use crate::plant::PartKind;
 use crate::trace::{LineCrossing, ParallelTracer};
 
 /// Lines whose answers are kept until they are summed up: 36 MB for 70,000 points in one channel.
 const BLOCK: usize = 64;
-
-/// Front and back, slot by slot.
-pub(super) type Sides = [Vec<f32>; 2];
-
-impl Scene<'_> {
-    /// A colour in as many channels as are baked.
-    pub fn in_channels(&self, color: Vec3) -> [f32; 3] {
-        if self.settings.channels.count() == 1 { [luminance(color), 0.0, 0.0] } else { color.to_array() }
-    }
-
-    fn lines(&self) -> ParallelTracer<'_> {
-        self.tracer.parallel(self.points.list.iter().map(|point| point.position))
-    }
-}
 
 /// Which of a line's two rays, 0 along it or 1 against it, reaches each side of `point`, front first, and at which
 /// cosine; `None` where none counts.

@@ -1,13 +1,13 @@
-//! Triangles of a plant as the bakes read them: checked corners, areas and connected elements.
+//! Triangles of a plant as bakes and tracers read them: checked corners, areas and connected elements.
 //!
-//! Every bake walks a mesh through [`triangles`], so a mesh that breaks its own rules (an index out of range, a
+//! All of them walk a mesh through [`triangles`], so a mesh that breaks its own rules (an index out of range, a
 //! position that is not finite) loses those triangles and nothing else.
 
 use std::collections::HashMap;
 
 use glam::Vec3;
 
-use crate::plant::PlantMesh;
+use super::PlantMesh;
 
 /// The valid triangles of `mesh` with their place in `mesh.triangles`: all three indices in range of positions,
 /// normals and texture coordinates, all three positions finite.

@@ -1,7 +1,7 @@
 //! Lighting textures of crosses: how the sky's light reaches a texel's leaves [Franzke 2005, 4.3.3, "Spherical Harmonics
 //! Beleuchtungstextur"].
 //!
-//! The transfer of the vertices ([`crate::bake::transfer`]) is rasterised like their colour. Of its coefficients the first two
+//! The transfer of the vertices ([`crate::bake::lighting::transfer`]) is rasterised like their colour. Of its coefficients the first two
 //! bands are kept: what comes in the mean over all directions, and a vector, in the plane's frame as the normals are, so that a
 //! plane seen from behind is mirrored by turning its third component. A leaf shows the light of the side that faces the viewer
 //! and, times its transmission `t`, that of the other; one texture holds the sum of both over `1 + t`, with the luminance of
@@ -107,7 +107,7 @@ mod tests {
     use super::super::{CrossSettings, picture, planes};
     use super::*;
     use crate::bake::lighting::LightingSettings;
-    use crate::bake::transfer::{TransferSettings, share};
+    use crate::bake::lighting::transfer::{TransferSettings, share};
     use crate::light::{Atmosphere, AtmosphereParams, LightSettings, LightState, SunPosition, sh};
     use crate::math::luminance;
     use crate::plant::grow::{GrowParameters, grow};

@@ -48,6 +48,7 @@ mod gather;
 mod pack;
 mod points;
 mod rays;
+mod scene;
 
 use std::sync::Arc;
 
@@ -58,9 +59,9 @@ pub use rays::direction_set;
 use crate::light::sh::MAX_BANDS;
 use crate::plant::{PartKind, Plant};
 use crate::trace::PlantTracer;
-use bounce::Scene;
 use points::Points;
 use rays::Directions;
+use scene::Scene;
 
 /// How many coefficients a vertex and side have, and whether they have a colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

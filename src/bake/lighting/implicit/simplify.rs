@@ -215,8 +215,8 @@ impl Mesh {
 
 #[cfg(test)]
 mod tests {
+    use super::super::isosurface::tests::{ball, is_closed};
     use super::*;
-    use crate::bake::implicit::isosurface::tests::{ball, is_closed};
 
     #[test]
     fn a_ball_stays_closed_and_round_with_a_tenth_of_its_triangles() {

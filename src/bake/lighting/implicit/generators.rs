@@ -9,9 +9,7 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::partition;
-use crate::bake::geometry;
-use crate::bake::surface::Surface;
-use crate::plant::{PartKind, PlantMesh, PlantPart};
+use crate::plant::{PartKind, PlantMesh, PlantPart, geometry, surface::Surface};
 
 /// A generator point.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -11,9 +11,7 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::geometry;
-use super::surface::Surface;
-use crate::plant::{Bounds, Plant, PlantPart};
+use crate::plant::{Bounds, Plant, PlantPart, geometry, surface::Surface};
 
 /// An orthographic view: a rectangle that is looked at from afar.
 #[derive(Clone, Copy, Debug, PartialEq)]

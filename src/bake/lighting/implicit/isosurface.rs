@@ -178,11 +178,11 @@ fn nodes_of(cells: &[u64]) -> Vec<u64> {
 pub(super) mod tests {
     use std::collections::HashMap;
 
+    use super::super::generators::{Generator, Weighting};
     use super::*;
-    use crate::bake::implicit::generators::{Generator, Weighting};
 
     /// Whether each edge has two triangles that run along it in opposite directions, and every vertex is used.
-    pub(in crate::bake::implicit) fn is_closed(triangles: &[[u32; 3]], vertices: usize) -> bool {
+    pub(in crate::bake::lighting::implicit) fn is_closed(triangles: &[[u32; 3]], vertices: usize) -> bool {
         let mut edges: HashMap<(u32, u32), u32> = HashMap::new();
         let mut used = vec![false; vertices];
         for &[a, b, c] in triangles {
@@ -205,7 +205,7 @@ pub(super) mod tests {
     }
 
     /// A ball about the origin, and its radius.
-    pub(in crate::bake::implicit) fn ball() -> (Extracted, f32) {
+    pub(in crate::bake::lighting::implicit) fn ball() -> (Extracted, f32) {
         let threshold = 0.3f32;
         (surface(&[Vec3::ZERO], 1.0, threshold, 0.1), (1.0 - threshold.sqrt()).sqrt())
     }

@@ -23,11 +23,10 @@ use glam::{Mat3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use self::properties::SpreadSum;
-use super::geometry;
-use super::lighting::BakedLighting;
 use super::rasterize::{Hit, Raster, View};
+use crate::bake::lighting::BakedLighting;
 use crate::math::{MipChain, luminance};
-use crate::plant::{Bounds, PartKind, Plant};
+use crate::plant::{Bounds, PartKind, Plant, geometry};
 
 /// Crossed billboards of one plant.
 #[derive(Clone, Debug, PartialEq)]

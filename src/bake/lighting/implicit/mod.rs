@@ -47,8 +47,7 @@ use std::borrow::Cow;
 
 use glam::Vec3;
 
-use crate::bake::geometry;
-use crate::plant::{PartKind, Plant, PlantMesh, PlantPart};
+use crate::plant::{PartKind, Plant, PlantMesh, PlantPart, geometry};
 use ambient_term::ambient_term;
 use density::{DensityField, FieldSample};
 use depth_field::DepthField;

@@ -5,8 +5,8 @@ use std::sync::{Arc, LazyLock};
 use glam::{Vec2, Vec3};
 use image::RgbaImage;
 
+use super::{PartKind, PlantPart};
 use crate::math::srgb_to_linear;
-use crate::plant::{PartKind, PlantPart};
 
 /// Linear values of the 256 sRGB codes.
 static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|code| srgb_to_linear(code as f32 / 255.0)));

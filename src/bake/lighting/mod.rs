@@ -3,18 +3,21 @@
 //! | model | baked | vertex bytes beyond position, normal, texture coordinates |
 //! |---|---|--:|
 //! | [`LightingSettings::Local`] | nothing | 0 |
-//! | [`LightingSettings::Expressive`] | realigned normals, k_a ([`super::implicit`]) | 0: k_a is the normal's length |
-//! | [`LightingSettings::Transfer`] | how the sky reaches each side of each vertex ([`super::transfer`]) | see there; 40 for foliage with 4 bands |
+//! | [`LightingSettings::Expressive`] | realigned normals, k_a ([`implicit`]) | 0: k_a is the normal's length |
+//! | [`LightingSettings::Transfer`] | how the sky reaches each side of each vertex ([`transfer`]) | see there; 40 for foliage with 4 bands |
 //!
 //! The models are alternatives: what a plant does not use is neither baked, nor kept, nor uploaded.
+
+pub mod implicit;
+pub mod transfer;
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::implicit::{ImplicitSettings, NoSurface, bake_implicit};
-use super::transfer::{PackedPart, PackedTransfer, SCATTERED, TransferFormat, TransferSettings, bake_transfer};
 use crate::plant::Plant;
+use implicit::{ImplicitSettings, NoSurface, bake_implicit};
+use transfer::{PackedPart, PackedTransfer, SCATTERED, TransferFormat, TransferSettings, bake_transfer};
 
 /// Which light a plant gets.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -140,7 +143,7 @@ impl BakedLighting {
     }
 
     /// Light of a sun that leaves send each other, in the mean over the foliage's vertices: the first coefficient and the rise
-    /// of the second band towards the zenith ([`super::transfer::TransferPart::scattered`]); zeros where it was not baked.
+    /// of the second band towards the zenith ([`transfer::TransferPart::scattered`]); zeros where it was not baked.
     pub fn scattered(&self) -> (f32, f32) {
         let Self::Transfer(TransferLighting { packed, .. }) = self else { return (0.0, 0.0) };
         let (mut mean, mut rise, mut count) = (0.0, 0.0, 0.0);

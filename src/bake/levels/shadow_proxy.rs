@@ -14,9 +14,9 @@
 
 use glam::Vec3;
 
-use super::geometry::{self, Element};
 use super::rasterize::{View, projected_area};
 use crate::math::hash::mix32;
+use crate::plant::geometry::{self, Element};
 use crate::plant::{PartKind, Plant, PlantMesh, PlantPart};
 
 /// A lighter model that casts the near sun shadow: the meshes of [`simplify_foliage`], one a part in the plant's

@@ -4,8 +4,7 @@ use std::collections::HashMap;
 
 use glam::Vec3;
 
-use crate::bake::geometry;
-use crate::plant::{PartKind, Plant, PlantMesh};
+use crate::plant::{PartKind, Plant, PlantMesh, geometry};
 
 /// Rays start this share of the plant's longest extent away from their vertex, so that they meet neither the
 /// triangles that meet there nor what touches them: 0.3 mm for a tree of 20 m.
