@@ -5,6 +5,7 @@ mod bake;
 mod cli;
 mod grow;
 mod implicit;
+mod layering;
 mod light;
 mod load;
 mod math;
