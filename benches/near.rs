@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use canopy::{
     app::{Picture, Renderer, Stage, reference},
-    plant::texture::srgb_to_linear,
+    math::srgb_to_linear,
     render::components::Ground,
     scene::{LightGroup, LocalTime, Overrides, ReferenceOptions, Silent, View, parse_lighting, parse_size},
 };

@@ -11,11 +11,12 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use canopy::scatter::hash::{Stream, unit_f32};
-use canopy::scatter::radical_inverse::{radical_inverse_2, radical_inverse_3};
+use canopy::math::hash::unit_f32;
+use canopy::math::radical_inverse::{radical_inverse_2, radical_inverse_3};
+use canopy::math::{HaltonSequence, RadicalInverse, halton, hammersley, star_discrepancy};
 use canopy::scatter::{
-    Area, ClearingNoise, Ground, HaltonSequence, PackedStand, PlacementRules, RadicalInverse, Sequence, SizeRule,
-    SpeciesRule, VariantBounds, cover_map, halton, hammersley, place, random, star_discrepancy,
+    Area, ClearingNoise, Ground, PackedStand, PlacementRules, Sequence, SizeRule, SpeciesRule, Stream, VariantBounds,
+    cover_map, place, random,
 };
 use glam::{DVec2, DVec3};
 

@@ -34,7 +34,7 @@
 //! Another scene takes its place when a [`LoadScene`](app::LoadScene) asks for it. A program that would rather wait calls
 //! [`Stage::build`](app::Stage::build) itself, and [`Stage::show`](app::Stage::show).
 //!
-//! The rooms: [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`bake`], [`light`], [`lod`],
+//! The rooms: [`math`], [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`bake`], [`light`], [`lod`],
 //! [`trace`] and [`mod@reference`] know no App and no GPU; [`render`] draws what they make; [`app`] is the interactive
 //! program. ARCHITECTURE.md in the repository shows how a tree gets from a file to a pixel.
 
@@ -44,7 +44,9 @@ pub mod cull;
 mod files;
 pub mod light;
 pub mod lod;
+pub mod math;
 pub mod plant;
+mod plugin;
 pub mod reference;
 pub mod render;
 pub mod scatter;
@@ -52,16 +54,7 @@ pub mod scene;
 pub mod terrain;
 pub mod trace;
 
-use bevy::app::{PluginGroup, PluginGroupBuilder};
-
-/// All of Canopy for a Bevy program that has its `DefaultPlugins`.
-pub struct CanopyPlugins;
-
-impl PluginGroup for CanopyPlugins {
-    fn build(self) -> PluginGroupBuilder {
-        PluginGroupBuilder::start::<Self>().add(render::daylight::DaylightPlugin).add(render::CanopyRenderPlugin)
-    }
-}
+pub use plugin::CanopyPlugins;
 
 /// What most programs need.
 pub mod prelude {

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use canopy::bake::billboard::{Cross, CrossSettings, bake_cross};
 use canopy::bake::cache::{Cache, CacheKey};
-use canopy::bake::implicit::{ImplicitSettings, NoSurface};
+use canopy::bake::levels::cross::{Cross, CrossSettings, bake_cross};
+use canopy::bake::levels::rasterize::{View, projected_area};
+use canopy::bake::levels::shadow_proxy::{shadow_proxy, simplify_foliage};
+use canopy::bake::lighting::implicit::{ImplicitSettings, NoSurface};
 use canopy::bake::lighting::{BakedLighting, ExpressiveLighting, LightingSettings};
-use canopy::bake::rasterize::{View, projected_area};
-use canopy::bake::shadow_proxy::{shadow_proxy, simplify_foliage};
 use canopy::bake::{BakeError, BakeSettings, BakeSource, BakedPlant, bake_plant};
 use canopy::plant::{PartKind, Plant, PlantMaterial, PlantMesh, PlantPart};
 use glam::{Mat3, Quat, Vec2, Vec3};

@@ -9,7 +9,7 @@ use std::{
 };
 
 use canopy::{
-    bake::billboard::LIGHT_SCALE,
+    bake::levels::cross::LIGHT_SCALE,
     light::atmosphere::SkyView,
     render::{
         bindings::uniforms::{

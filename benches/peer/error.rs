@@ -4,8 +4,9 @@ use std::{fmt::Write, path::Path, sync::Arc};
 
 use canopy::{
     bake::BakedPlant,
+    cull::cascades::{CascadeBox, cascade_radii},
     light::sun::SunPosition,
-    plant::texture::srgb_to_linear,
+    math::srgb_to_linear,
     render::{components::SunShadowSettings, daylight::SkySettings},
 };
 use chrono::TimeDelta;

@@ -32,7 +32,7 @@ use chrono::{DateTime, Utc};
 
 use super::{adapter, camera, error::AppError, notes::notes, picture::Picture, stage::Stage};
 use crate::{
-    CanopyPlugins,
+    plugin::CanopyPlugins,
     render::{
         components::CanopyCamera,
         readback::read_rgb,

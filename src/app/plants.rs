@@ -6,10 +6,12 @@ use super::error::AppError;
 use crate::{
     bake::{
         BakeSettings,
-        billboard::CrossSettings,
-        implicit::{AmbientField, ImplicitSettings, NormalSource},
-        lighting::LightingSettings,
-        transfer::{Channels, Interior, TransferSettings},
+        levels::cross::CrossSettings,
+        lighting::{
+            LightingSettings,
+            implicit::{AmbientField, ImplicitSettings, NormalSource},
+            transfer::{Channels, Interior, TransferSettings},
+        },
     },
     plant::{
         Gloss, Plant,

@@ -13,9 +13,11 @@ use super::{error::AppError, plants::PlantPlan, plants::bake_settings};
 use crate::{
     bake::{
         BakedPlant,
-        billboard::bake_cross,
-        implicit::{StandPlant, bake_implicit_stand},
-        lighting::{BakedLighting, ExpressiveLighting, LightingSettings},
+        levels::cross::bake_cross,
+        lighting::{
+            BakedLighting, ExpressiveLighting, LightingSettings,
+            implicit::{StandPlant, bake_implicit_stand},
+        },
     },
     scatter::{Stand, packed::MAX_VARIANTS},
     scene::{Progress, Scene, Species},

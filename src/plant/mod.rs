@@ -3,10 +3,12 @@
 //! A [`Plant`] comes from a glTF file ([`gltf`]) or is grown by rule ([`grow`]). It stands with its trunk's
 //! foot at the origin, Y up, in metres. Everything downstream (bakes, levels of detail, passes) reads this type.
 
+pub(crate) mod geometry;
 mod gloss;
 pub mod gltf;
 pub mod grow;
 mod optics;
+pub(crate) mod surface;
 pub mod texture;
 
 use std::sync::Arc;

@@ -15,7 +15,7 @@ use bevy::{
 };
 use bytemuck::Pod;
 
-use crate::plant::texture::MipChain;
+use crate::math::MipChain;
 
 /// The device, and what makes bind groups on it.
 #[derive(SystemParam)]

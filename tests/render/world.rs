@@ -12,8 +12,9 @@ use bevy::{
 use canopy::{
     app::{Picture, Renderer, Stage},
     bake::{
-        BakeSettings, BakedPlant, bake_plant, billboard::CrossSettings, implicit::ImplicitSettings,
-        lighting::LightingSettings,
+        BakeSettings, BakedPlant, bake_plant,
+        levels::cross::CrossSettings,
+        lighting::{LightingSettings, implicit::ImplicitSettings},
     },
     render::{
         components::{CanopyCamera, CastsCanopyShadow, Forest, SunShadowSettings},

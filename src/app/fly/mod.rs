@@ -33,7 +33,7 @@ use bevy_egui::{EguiPlugin, EguiPostUpdateSet, EguiPrimaryContextPass};
 
 use super::{adapter, error::AppError, stage::Stage};
 use crate::{
-    CanopyPlugins,
+    plugin::CanopyPlugins,
     scene::{FlyOptions, Progress},
 };
 use session::Session;

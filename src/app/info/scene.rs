@@ -13,7 +13,7 @@ use crate::{
     app::{AppError, ground::build_terrain, plants, stage, trees},
     bake::{
         BakedPlant,
-        billboard::{Cross, CrossTextures, SPREAD_LEVELS},
+        levels::cross::{Cross, CrossTextures, SPREAD_LEVELS},
         lighting::BakedLighting,
     },
     light::sun::{Observer, SunPosition},

@@ -14,15 +14,15 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
-use crate::bake::BakedPlant;
-use crate::bake::billboard::{Cross, CrossPlane, CrossTextures, SPREAD_LEVELS};
-use crate::bake::implicit::NoSurface;
-use crate::bake::lighting::{BakedLighting, ExpressiveLighting, TransferLighting};
-use crate::bake::transfer::{
+use crate::bake::baked::BakedPlant;
+use crate::bake::levels::cross::{Cross, CrossPlane, CrossTextures, SPREAD_LEVELS};
+use crate::bake::lighting::implicit::NoSurface;
+use crate::bake::lighting::transfer::{
     Channels, Interior, PackedPart, PackedTransfer, Projection, TransferFormat, TransferSettings,
 };
+use crate::bake::lighting::{BakedLighting, ExpressiveLighting, TransferLighting};
 use crate::light::sh::MAX_BANDS;
-use crate::plant::texture::MipChain;
+use crate::math::MipChain;
 use crate::plant::{Plant, PlantMesh};
 
 /// Version of the format *and* of the bakes: to be raised whenever either gives other bytes for the same input.

@@ -15,7 +15,8 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::{BakeError, BakeSettings, BakedPlant};
+use super::baked::{BakeSettings, BakedPlant};
+use super::error::BakeError;
 use crate::plant::{PartKind, Plant};
 
 /// What identifies a baked plant: a hash of all inputs of the bake.
@@ -136,9 +137,9 @@ fn default_folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bake::{
+    use crate::bake::lighting::{
+        LightingSettings,
         implicit::{ImplicitSettings, NormalSource},
-        lighting::LightingSettings,
     };
 
     #[test]

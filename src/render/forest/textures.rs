@@ -11,9 +11,10 @@ use bevy::{
 };
 
 use crate::{
+    math::MipChain,
     plant::{
         PartKind, PlantMaterial,
-        texture::{MipChain, color_mips, leaf_mips, normal_mips},
+        texture::{color_mips, leaf_mips, normal_mips},
     },
     render::gpu,
 };

@@ -20,7 +20,7 @@ use glam::Vec3;
 
 use super::uniforms::{TransferUniform, WORDS};
 use crate::{
-    bake::transfer::{PackedPart, TransferSettings},
+    bake::lighting::transfer::{PackedPart, TransferSettings},
     light::{
         LightState,
         sh::{basis_into, rotate_y},

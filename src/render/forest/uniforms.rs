@@ -7,12 +7,15 @@ use glam::Vec3;
 use crate::{
     bake::{
         BakedPlant,
-        billboard::SPREAD_LEVELS,
-        lighting::BakedLighting,
-        transfer::{PackedPart, TransferSettings, code_words, mean_words},
+        levels::cross::SPREAD_LEVELS,
+        lighting::{
+            BakedLighting,
+            transfer::{PackedPart, TransferSettings, code_words, mean_words},
+        },
     },
     cull::VariantSize,
-    light::{atmosphere::luminance, sh::MAX_BANDS},
+    light::sh::MAX_BANDS,
+    math::luminance,
     plant::{LeafColors, PlantMaterial},
 };
 

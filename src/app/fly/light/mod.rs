@@ -19,7 +19,11 @@ use bevy::ecs::{
 use super::{controls::Turn, session::Session};
 use crate::{
     app::{plants, stage::Stage},
-    bake::{BakedPlant, billboard::CrossSettings, implicit::ImplicitParameters, lighting::LightingSettings},
+    bake::{
+        BakedPlant,
+        levels::cross::CrossSettings,
+        lighting::{LightingSettings, implicit::ImplicitParameters},
+    },
     render::components::Forest,
     scene::{Lighting, Transfer},
 };

@@ -6,7 +6,7 @@
 use std::ops::RangeInclusive;
 
 use crate::{
-    bake::implicit::ImplicitParameters,
+    bake::lighting::implicit::ImplicitParameters,
     scene::{AmbientTerm, CrownNormals, Expressive, Lighting},
 };
 

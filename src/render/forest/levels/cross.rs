@@ -19,10 +19,10 @@ use bevy::{
 use glam::Vec3;
 
 use crate::{
-    bake::{BakedPlant, billboard::Cross},
+    bake::{BakedPlant, levels::cross::Cross},
     cull::Grouping,
     lod::Representation,
-    plant::texture::MipChain,
+    math::MipChain,
     render::{
         components::Forest,
         forest::{

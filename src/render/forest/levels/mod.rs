@@ -17,7 +17,10 @@ pub fn built_in(shaders: &CanopyShaders) -> [Arc<dyn LevelRenderer>; 2] {
 mod tests {
     use super::*;
     use crate::{
-        bake::{BakeSettings, BakedPlant, bake_plant, implicit::ImplicitSettings, lighting::LightingSettings},
+        bake::{
+            BakeSettings, BakedPlant, bake_plant,
+            lighting::{LightingSettings, implicit::ImplicitSettings},
+        },
         plant::grow::{GrowParameters, grow},
     };
 

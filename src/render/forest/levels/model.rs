@@ -22,7 +22,7 @@ use crate::{
     bake::{
         BakedPlant,
         lighting::BakedLighting,
-        transfer::{Channels, TransferSettings},
+        lighting::transfer::{Channels, TransferSettings},
     },
     cull::Grouping,
     lod::Representation,
