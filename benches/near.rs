@@ -20,7 +20,7 @@ use canopy::{
     app::{Picture, Renderer, Stage, reference},
     math::srgb_to_linear,
     render::components::Ground,
-    scene::{LightGroup, LocalTime, Overrides, ReferenceOptions, Silent, View, parse_lighting, parse_size},
+    scene::{LightGroup, LocalTime, Overrides, ReferenceOptions, Scene, Silent, View, parse_lighting, parse_size},
 };
 use clap::Parser;
 use nv_flip::{FlipImageRgb8, FlipPool, flip};
@@ -74,14 +74,15 @@ fn near(arguments: &Arguments, folder: &Path) -> anyhow::Result<()> {
     );
     for scene in SCENES {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/scenes").join(scene).with_extension("ron");
+        let read = Scene::read(&path)?;
         for (hour, at) in HOURS {
             let at: LocalTime = at.parse()?;
             let name = |what: &str| folder.join(format!("{scene}-{}-{what}.png", hour.replace(' ', "-")));
-            let traced = trace(arguments, &path, at, &name("traced"))?;
-            let bare = draw(arguments, &path, None, at)?;
+            let traced = trace(arguments, &read, at, &name("traced"))?;
+            let bare = draw(arguments, &read, None, at)?;
             let mut row = Vec::new();
             for light in LIGHTS {
-                let drawn = draw(arguments, &path, Some(light), at)?;
+                let drawn = draw(arguments, &read, Some(light), at)?;
                 let (flip, relative, share) = compare(&traced, &drawn, |index| of_tree(&traced, &bare, index));
                 println!("| {scene} | {hour} | {light} | {flip:.4} | {relative:.3} | {share:.2} |");
                 drawn.save(&name(light), &[])?;
@@ -117,18 +118,16 @@ fn stands(arguments: &Arguments, folder: &Path) -> anyhow::Result<()> {
     }
     for (kind, species, stems) in kinds {
         for (view, position, yaw) in VIEWS {
-            let write = |drawn: &str, distance: u32| -> anyhow::Result<PathBuf> {
-                let path = folder.join(format!("{kind}-{drawn}.ron"));
-                let scene = format!(
+            let stand = |drawn: &str, distance: u32| {
+                let text = format!(
                     "(terrain: Flat(size: 400), species: [{species}], trees: Scattered(stems_per_hectare: {stems}, \
                      min_distance: 2, area: (west: -60, south: 10, east: 60, north: 130)), place: (latitude: 48, longitude: \
                      11, time: \"2026-06-21T11:30+00:00\"), camera: (start: (position: {position}, yaw: {yaw}, pitch: -14)), \
                      quality: (near_distance: {distance}, shadow_distance: 400))"
                 );
-                std::fs::write(&path, scene)?;
-                Ok(path)
+                Scene::parse(&text, Path::new(&format!("{kind}-{drawn}.ron")))
             };
-            let forms = [("models", write("models", 2000)?), ("crosses", write("crosses", 1)?)];
+            let forms = [("models", stand("models", 2000)?), ("crosses", stand("crosses", 1)?)];
             for (hour, at) in STAND_HOURS {
                 let at: LocalTime = at.parse()?;
                 let name = |what: &str| folder.join(format!("{kind}-{view}-{hour}-{what}.png").replace(' ', "-"));
@@ -148,9 +147,9 @@ fn stands(arguments: &Arguments, folder: &Path) -> anyhow::Result<()> {
 }
 
 /// The scene in one light; without one, the scene without its trees.
-fn draw(arguments: &Arguments, scene: &Path, light: Option<&str>, at: LocalTime) -> anyhow::Result<Picture> {
+fn draw(arguments: &Arguments, scene: &Scene, light: Option<&str>, at: LocalTime) -> anyhow::Result<Picture> {
     let overrides = Overrides { lighting: light.map(parse_lighting).transpose()?, ..Overrides::default() };
-    let stage = Stage::build(scene, &overrides, &mut Silent)?;
+    let stage = Stage::build(&overrides.applied(scene.clone()), &mut Silent)?;
     let view = stage.scene.camera.start;
     let view = view.viewpoint(stage.terrain.height(view.position.0, view.position.2), stage.scene.camera.field_of_view);
     let mut renderer = Renderer::new(arguments.size, None, stage.scene.quality.msaa)?;
@@ -163,9 +162,9 @@ fn draw(arguments: &Arguments, scene: &Path, light: Option<&str>, at: LocalTime)
     Ok(renderer.draw(&stage, &view, at.utc())?)
 }
 
-fn trace(arguments: &Arguments, scene: &Path, at: LocalTime, out: &Path) -> anyhow::Result<Picture> {
+fn trace(arguments: &Arguments, scene: &Scene, at: LocalTime, out: &Path) -> anyhow::Result<Picture> {
     let options = ReferenceOptions {
-        scene: scene.to_owned(),
+        scene: scene.clone().into(),
         out: out.to_owned(),
         at: Some(at),
         view: View::Scene,

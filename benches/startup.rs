@@ -126,7 +126,7 @@ impl Progress for Steps {
 fn turn(arguments: &Arguments) -> anyhow::Result<()> {
     let folder = tempfile::tempdir()?;
     let mut steps = Steps { last: Instant::now(), open: None };
-    let stage = Stage::build(&arguments.scene, &Overrides::default(), &mut steps)?;
+    let stage = Stage::build(&Scene::read(&arguments.scene)?, &mut steps)?;
     steps.done("loading: scene file and the rest");
     let mut renderer = Renderer::new(arguments.size, None, stage.scene.quality.msaa)?;
     steps.done("Bevy and the device");
@@ -164,7 +164,7 @@ fn turn(arguments: &Arguments) -> anyhow::Result<()> {
 
 fn first_view(arguments: &Arguments, scene: &Scene, stage: &Stage) -> anyhow::Result<Viewpoint> {
     let options = RenderOptions {
-        scene: arguments.scene.clone(),
+        scene: arguments.scene.as_path().into(),
         pictures: Pictures::Stills(vec![Still { out: "picture.png".into(), at: None }]),
         view: View::Scene,
         size: arguments.size,

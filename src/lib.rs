@@ -31,6 +31,7 @@
 //! }
 //! ```
 //!
+//! A scene that is built in code ([`Scene`](scene::Scene)) goes where a file's name can go, and needs no file.
 //! Another scene takes its place when a [`LoadScene`](app::LoadScene) asks for it. A program that would rather wait calls
 //! [`Stage::build`](app::Stage::build) itself, and [`Stage::show`](app::Stage::show).
 //!
@@ -68,6 +69,6 @@ pub mod prelude {
             },
             daylight::{FollowsDaylight, SkySettings},
         },
-        scene::{Overrides, Progress, Silent},
+        scene::{Overrides, Progress, Scene, SceneSource, Silent},
     };
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use canopy::{
     app::{AppError, Stage, info},
     plant::PartKind,
-    scene::{Overrides, Silent},
+    scene::{Scene, Silent},
 };
 
 use crate::support::{
@@ -35,7 +35,7 @@ fn assert_says(text: &str, says: &[&str]) {
 #[test]
 fn the_demo_is_wooded_like_a_forest() {
     let mut heard = Heard::default();
-    let stage = built(&asset("scenes/demo.ron"), &mut heard);
+    let stage = built(asset("scenes/demo.ron"), &mut heard);
     assert_eq!(heard.warnings, Vec::<String>::new());
     let trees = stage.stand.trees.len();
     assert!(trees >= 300_000, "{trees} trees");
@@ -63,7 +63,7 @@ fn the_demo_is_wooded_like_a_forest() {
 #[test]
 fn the_inventory_stands_as_it_is_listed() {
     let mut heard = Heard::default();
-    let stage = built(&asset("scenes/inventory.ron"), &mut heard);
+    let stage = built(asset("scenes/inventory.ron"), &mut heard);
     assert_eq!(heard.warnings, Vec::<String>::new());
     assert_eq!(stage.stand.trees.len(), 600);
     let stand = stage.forest().expect("a forest");
@@ -172,9 +172,8 @@ fn lit_stand(folder: &Path, trees: &str, light: &str) -> Result<Stage, AppError>
          (name: \"other\", plant: Grown(form: Conifer, individuals: 1, triangles: 5000, seed: 2), lighting: Local)], \
          trees: Inventory(path: \"trees.csv\"))"
     );
-    std::fs::write(folder.join("scene.ron"), scene).expect("a temporary file");
     std::fs::write(folder.join("trees.csv"), format!("x,y,height,species\n{trees}")).expect("a temporary file");
-    Stage::build(&folder.join("scene.ron"), &Overrides::default(), &mut Silent)
+    Stage::build(&Scene::parse(&scene, &folder.join("scene.ron"))?, &mut Silent)
 }
 
 #[test]

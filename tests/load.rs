@@ -11,6 +11,7 @@ use canopy::{
     app::LoadedScene,
     prelude::*,
     render::{components::Forest, daylight::SkySettings},
+    scene::{GroundFlat, GrownPlants, Lighting, Quality, ScatteredTrees, Scene, SceneSource, Species},
 };
 use tempfile::TempDir;
 
@@ -20,6 +21,7 @@ use crate::support::stage::{PLACE, quality};
 #[derive(Resource, Default)]
 struct Told {
     ready: Vec<(PathBuf, Arc<Stage>)>,
+    scenes: Vec<SceneSource>,
     failed: Vec<String>,
     progress: Vec<SceneProgress>,
 }
@@ -34,7 +36,8 @@ fn listen(
     for scene in ready.read() {
         // What is ready is there.
         assert!(loaded.as_ref().is_some_and(|loaded| Arc::ptr_eq(&loaded.stage, &scene.stage)));
-        told.ready.push((scene.path.clone(), scene.stage.clone()));
+        told.ready.push((scene.scene.file().unwrap_or("".as_ref()).to_owned(), scene.stage.clone()));
+        told.scenes.push(scene.scene.clone());
     }
     told.failed.extend(failed.read().map(ToString::to_string));
     if progress.is_changed() {
@@ -107,6 +110,10 @@ fn folder(files: &[(&str, &str)]) -> TempDir {
     folder
 }
 
+fn is_file(scene: &SceneSource, name: &str) -> bool {
+    scene.file().is_some_and(|file| file.ends_with(name))
+}
+
 /// The plugin with a scene of `folder`.
 fn first(folder: &TempDir, name: &str) -> CanopyScenePlugin {
     CanopyScenePlugin::new(folder.path().join(name))
@@ -116,12 +123,12 @@ fn first(folder: &TempDir, name: &str) -> CanopyScenePlugin {
 fn a_scene_is_built_beside_the_program_and_shown() {
     let folder = folder(&[("grove.ron", &scene(3, 100.0))]);
     let overrides = Overrides { seed: Some(5), ..Overrides::default() };
-    let wanted = LoadScene { path: folder.path().join("grove.ron"), overrides };
+    let wanted = LoadScene { scene: folder.path().join("grove.ron").into(), overrides };
     let mut program = Program::new(&[CanopyScenePlugin { first: Some(wanted) }], folder);
     program.app.update();
     let building = program.told().progress.first().expect("progress in the first frame");
     assert_eq!(building.state, SceneState::Building);
-    assert!(building.path.ends_with("grove.ron"));
+    assert!(is_file(&building.scene, "grove.ron"));
     program.until(|told| !told.ready.is_empty());
 
     let (path, stage) = program.told().ready[0].clone();
@@ -156,6 +163,30 @@ fn a_scene_is_built_beside_the_program_and_shown() {
 }
 
 #[test]
+fn a_scene_built_in_code_needs_no_file() {
+    let plant = GrownPlants { individuals: 1, triangles: 5000, ..GrownPlants::default() };
+    let scene = Scene {
+        name: "in code".to_owned(),
+        species: vec![Species { lighting: Some(Lighting::Local), ..Species::new("broadleaf", plant) }],
+        trees: ScatteredTrees { stems_per_hectare: 20.0, ..ScatteredTrees::default() }.into(),
+        quality: Quality { cross_resolution: 64, ..Quality::default() },
+        ..Scene::new(GroundFlat { size: 100.0 })
+    };
+    let broken =
+        Scene { trees: ScatteredTrees { min_distance: f64::NAN, ..ScatteredTrees::default() }.into(), ..scene.clone() };
+    let mut program = Program::new(&[CanopyScenePlugin::new(broken)], folder(&[]));
+    program.until(|told| !told.failed.is_empty());
+    let message = program.told().failed[0].clone();
+    for word in ["the scene `in code`: `trees.min_distance` is NaN", "write a value from 0 to 100 m"] {
+        assert!(message.contains(word), "no `{word}` in {message}");
+    }
+    program.app.world_mut().write_message(LoadScene::new(scene.clone()));
+    program.until(|told| !told.scenes.is_empty());
+    assert_eq!(program.told().scenes, [SceneSource::from(scene)]);
+    assert_eq!((program.all::<Ground>().len(), program.all::<Forest>().len()), (1, 1));
+}
+
+#[test]
 fn a_broken_scene_is_told_of_and_the_program_goes_on() {
     let broken = scene(1, 100.0).replace("terrain: Flat(size: 100)", "\nterrain: Flat(size: -1)");
     let folder = folder(&[("broken.ron", &broken), ("good.ron", &scene(1, 100.0))]);
@@ -178,7 +209,7 @@ fn a_broken_scene_is_told_of_and_the_program_goes_on() {
     program.until(|told| told.failed.len() == 3);
     assert!(program.told().failed[2].contains("missing.ron"), "{}", program.told().failed[2]);
     assert_eq!(program.all::<Ground>(), grounds);
-    assert!(program.app.world().resource::<LoadedScene>().path.ends_with("good.ron"));
+    assert!(is_file(&program.app.world().resource::<LoadedScene>().scene, "good.ron"));
 }
 
 #[test]
@@ -214,7 +245,7 @@ fn of_several_scenes_the_last_one_counts() {
     // A second plugin is no panic, and its scene comes instead of the first one's.
     let mut program = Program::new(&[first(&folder, "two.ron"), first(&folder, "one.ron")], folder);
     program.app.update();
-    assert!(program.told().progress[0].path.ends_with("one.ron"));
+    assert!(is_file(&program.told().progress[0].scene, "one.ron"));
     // Nor is a scene that is wanted while another is being built, nor two at once.
     program.load("missing.ron");
     program.load("two.ron");

@@ -3,8 +3,9 @@
 use std::path::Path as FilePath;
 
 use canopy::scene::{
-    Ground, GrownForm, LeafGloss, LengthUnit, Lighting, Moon, Overrides, Path, PlantSource, Position, Scene,
-    SceneError, Sequence, SunLight, Transfer, Trees, parse_lighting,
+    GltfPlants, Ground, GroundFile, GrownForm, GrownPlants, InventoryTrees, LeafGloss, LengthUnit, Lighting, Moon,
+    Overrides, Path, PlantSource, Position, ScatteredTrees, Scene, SceneError, Sequence, Species, SunLight, Transfer,
+    Trees, parse_lighting,
 };
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
@@ -108,7 +109,7 @@ fn faulty(old: &str, new: &str, at: usize, words: &[&str]) {
         }
         SceneError::Invalid { problems, .. } => {
             assert!(problems.iter().all(|problem| !problem.remedy.is_empty()));
-            problems[0].position
+            problems[0].position.expect("a scene file has positions")
         }
         other => panic!("unexpected kind of error: {other}"),
     };
@@ -220,7 +221,7 @@ fn inventories_state_units_and_species() -> Outcome {
     let wrong = text.replace("\"pine\"}", "\"pin\"}");
     let error = parse(&wrong).err().ok_or("accepted")?;
     let SceneError::Invalid { problems, .. } = &error else { return Err(error.into()) };
-    assert_eq!(problems[0].position, place_of(&wrong, "\"pin\"", 0));
+    assert_eq!(problems[0].position, Some(place_of(&wrong, "\"pin\"", 0)));
     assert!(problems[0].remedy.contains("did you mean `pine`"), "{error}");
     let wrong = text.replace("default_species: \"birch\"", "default_species: \"elm\"");
     assert!(parse(&wrong).is_err_and(|error| error.to_string().contains("`oak`, `pine`, `birch`")));
@@ -456,4 +457,46 @@ proptest::proptest! {
         let end = (at + length).min(FULL.len());
         let _ = parse(&format!("{}{patch}{}", &FULL[..at], &FULL[end..]));
     }
+}
+
+#[test]
+fn a_scene_in_code_has_the_defaults_of_a_file() -> Outcome {
+    let text = "(terrain: Flat(), place: (latitude: 47.5, longitude: 9.2), trees: Inventory(path: \"t.csv\"), species: [\
+                (name: \"a\", plant: Grown()), (name: \"b\", plant: Gltf(files: [\"b.glb\"]))])";
+    let read = Scene::parse(text, FilePath::new("scene.ron"))?;
+    let species = vec![Species::new("a", GrownPlants::default()), Species::new("b", GltfPlants::new(["b.glb"]))];
+    let built = Scene { species, trees: InventoryTrees::new("t.csv").into(), ..Scene::default() };
+    built.validate()?;
+    assert_eq!(Scene { file: None, ..read.clone() }, built);
+    assert_eq!((read.label(), built.label()), ("scene.ron".to_owned(), "the scene `scene`".to_owned()));
+
+    // A terrain file keeps its own place, and paths can be moved to another folder.
+    let read = Scene::parse(
+        "(terrain: File(path: \"hills.tif\"), trees: Scattered(), species: [(name: \"a\", plant: \
+                             Grown())])",
+        FilePath::new("a/scene.ron"),
+    )?;
+    let mut built = Scene {
+        species: vec![Species::new("a", GrownPlants::default())],
+        trees: ScatteredTrees::default().into(),
+        file: read.file.clone(),
+        ..Scene::new(GroundFile::new("hills.tif"))
+    };
+    built.resolve_paths(FilePath::new("a"));
+    assert_eq!(built, read);
+    Ok(())
+}
+
+#[test]
+fn a_scene_in_code_lists_what_is_out_of_range_by_name() -> Outcome {
+    let mut scene = Scene { name: "oaks".to_owned(), ..Scene::default() };
+    scene.place.latitude = Some(100.0);
+    scene.quality.msaa = 3;
+    let error = scene.validate().err().ok_or("accepted")?;
+    let SceneError::Invalid { problems, .. } = &error else { return Err(error.into()) };
+    assert!(problems.len() == 2 && problems.iter().all(|problem| problem.position.is_none()));
+    let lines: Vec<String> = error.to_string().lines().map(str::to_owned).collect();
+    assert!(lines[0].starts_with("the scene `oaks`: `place.latitude` is 100 degrees"), "{error}");
+    assert_eq!(lines[1], "the scene `oaks`: `quality.msaa` is 3; write 1 (off) or 4");
+    Ok(())
 }

@@ -143,10 +143,10 @@ pub enum AppError {
         limit: usize,
     },
     /// Nobody knows where on earth the scene lies.
-    #[error("{}: the terrain does not say where on earth it lies; add `place: (latitude: ..., longitude: ...)`", path.display())]
+    #[error("{scene}: the terrain does not say where on earth it lies; add `place: (latitude: ..., longitude: ...)`")]
     NoPlace {
-        /// The scene file.
-        path: PathBuf,
+        /// The scene file, or what names a scene that was built in code.
+        scene: String,
     },
     /// An inventory whose coordinates say nothing about where it lies on the terrain.
     #[error(

@@ -38,7 +38,7 @@ use crate::{
         readback::read_rgb,
         report::{FrameReport, PassOutcome},
     },
-    scene::{Progress, RenderOptions, RenderPlan, RenderReport, Scene, Viewpoint},
+    scene::{Progress, RenderOptions, RenderPlan, RenderReport, Viewpoint},
 };
 
 /// Draws the pictures that `options` ask for.
@@ -48,10 +48,10 @@ use crate::{
 pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<RenderReport, AppError> {
     // The scene's own errors come first, then the device's: both are found before the long work, and before anything is
     // left behind.
-    Scene::read(&options.scene)?;
+    let scene = options.overrides.applied(options.scene.read()?);
     let settings = adapter::settings(options.adapter.as_deref())?;
     adapter::check_size(&settings, options.size)?;
-    let stage = Stage::build(&options.scene, &options.overrides, progress)?;
+    let stage = Stage::build(&scene, progress)?;
     let plan = RenderPlan::new(options, &stage.scene, &|x, z| stage.terrain.height(x, z))?;
     check_writable(&plan)?;
     let started = Instant::now();
@@ -67,7 +67,7 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
         let started = Instant::now();
         let picture = renderer.draw(&stage, &frame.view, frame.instant)?;
         let drawn = started.elapsed().as_secs_f64();
-        picture.save(&frame.file, &notes(&stage, &options.scene, &frame.view, frame.instant))?;
+        picture.save(&frame.file, &notes(&stage, &frame.view, frame.instant))?;
         progress.note(&format!(
             "{}: drawn in {drawn:.2} s, written in {:.2} s",
             frame.file.display(),

@@ -1,19 +1,16 @@
 //! What a picture's text chunks say: enough to make it again.
 
-use std::path::Path;
-
 use chrono::{DateTime, Utc};
 
 use super::stage::Stage;
 use crate::scene::Viewpoint;
 
-/// Pairs of keyword and text for a picture of `stage`, built from the scene file `scene`, seen from `view` in the
-/// light of `instant`.
-pub fn notes(stage: &Stage, scene: &Path, view: &Viewpoint, instant: DateTime<Utc>) -> Vec<(&'static str, String)> {
+/// Pairs of keyword and text for a picture of `stage`, seen from `view` in the light of `instant`.
+pub fn notes(stage: &Stage, view: &Viewpoint, instant: DateTime<Utc>) -> Vec<(&'static str, String)> {
     vec![
         ("Software", format!("Canopy {}", env!("CARGO_PKG_VERSION"))),
         ("Title", stage.scene.name.clone()),
-        ("Scene", scene.display().to_string()),
+        ("Scene", stage.scene.label()),
         ("Instant", instant.to_rfc3339()),
         ("Place", format!("{:.6}, {:.6}", stage.observer.latitude_deg, stage.observer.longitude_deg)),
         (

@@ -13,7 +13,7 @@ use crate::{
         Camera, Development, Film, Fog, Ground, GroundColor, GroundShape, Instance, Light, PathTracer, ReferenceScene,
         Shot, Soil, TraceSettings,
     },
-    scene::{Frame, LightGroup, Pictures, Progress, ReferenceOptions, RenderOptions, RenderPlan, Scene, Still},
+    scene::{Frame, LightGroup, Pictures, Progress, ReferenceOptions, RenderOptions, RenderPlan, Still},
 };
 
 /// How often the film is kept on disk while it grows.
@@ -28,8 +28,7 @@ const KEEP_EVERY: Duration = Duration::from_secs(30);
 /// # Errors
 /// [`AppError`]; a picture that was there before stays as it is.
 pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Result<PathBuf, AppError> {
-    Scene::read(&options.scene)?;
-    let stage = Stage::build(&options.scene, &options.overrides, progress)?;
+    let stage = Stage::build(&options.overrides.applied(options.scene.read()?), progress)?;
     let frame = frame(options, &stage)?;
     let sky = stage.sky(frame.instant);
     let atmosphere = Atmosphere::new(AtmosphereParams::with_visibility_km(sky.visibility_km))?;
@@ -127,7 +126,7 @@ fn save(
     let table = tone_table()?;
     let (width, height) = film.size();
     let pixels = film.develop(&Development::of(light, Some(&table)));
-    let mut notes = notes(stage, &options.scene, &frame.view, frame.instant);
+    let mut notes = notes(stage, &frame.view, frame.instant);
     notes.push(("Samples", film.samples().to_string()));
     Picture { width, height, pixels }.save(&options.out, &notes)
 }

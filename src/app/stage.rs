@@ -1,6 +1,6 @@
 //! From a validated scene to what the renderer shows: terrain, plants, stand, baked and packed.
 
-use std::{ops::Range, path::Path, sync::Arc, time::Instant};
+use std::{ops::Range, sync::Arc, time::Instant};
 
 use bevy::ecs::{entity::Entity, system::Commands};
 use glam::DVec3;
@@ -16,7 +16,7 @@ use crate::{
         daylight::SkySettings,
     },
     scatter::{CoverMap, PackedStand, VariantBounds, cover_map, packed::DEFAULT_CELL_SIZE},
-    scene::{self, Overrides, Progress, Quality, Scene},
+    scene::{self, Progress, Quality, Scene},
     terrain::Terrain,
 };
 
@@ -66,32 +66,31 @@ impl Shown {
 }
 
 impl Stage {
-    /// Builds the scene in `path`, with what `overrides` replace in it.
+    /// Builds `scene`: one from a file ([`Scene::read`]), or one that was built in code.
     ///
     /// # Errors
     /// [`AppError`] for anything in the scene or its files that cannot be used; [`AppError::Cancelled`] soon after `progress`
     /// [is cancelled](Progress::is_cancelled), in the midst of the bakes after those of a few plants.
-    pub fn build(path: &Path, overrides: &Overrides, progress: &mut dyn Progress) -> Result<Self, AppError> {
-        let mut scene = Scene::read(path)?;
-        overrides.apply(&mut scene);
+    pub fn build(scene: &Scene, progress: &mut dyn Progress) -> Result<Self, AppError> {
+        scene.validate()?;
         let started = Instant::now();
         progress.begin("Terrain", 0);
         let terrain = Arc::new(ground::build_terrain(&scene.terrain, progress)?);
         progress.end();
         progress.note(&format!("terrain: {:.2} s", started.elapsed().as_secs_f64()));
-        let observer = observer(&scene, &terrain, path)?;
+        let observer = observer(scene, &terrain)?;
         check_wanted(progress)?;
 
         let has_trees = !matches!(scene.trees, scene::Trees::None);
-        let mut species = if has_trees { plants::plan(&scene)? } else { plants::PlantPlan::default() };
+        let mut species = if has_trees { plants::plan(scene)? } else { plants::PlantPlan::default() };
         let plants = bake(&species, &scene.quality, progress)?;
 
         let started = Instant::now();
         progress.begin("Trees", 0);
-        let mut stand = trees::build_stand(&scene, &species, &plants, &terrain, progress)?;
+        let mut stand = trees::build_stand(scene, &species, &plants, &terrain, progress)?;
         progress.end();
         check_wanted(progress)?;
-        let plants = together::light_together(&scene, &mut species, plants, &mut stand, progress)?;
+        let plants = together::light_together(scene, &mut species, plants, &mut stand, progress)?;
         let bounds: Vec<VariantBounds> = plants.iter().map(variant_bounds).collect();
         let packed = PackedStand::new(&stand, DEFAULT_CELL_SIZE, &bounds)?;
         let cover = if stand.trees.is_empty() {
@@ -109,7 +108,7 @@ impl Stage {
         };
         let suns = scene.species.iter().zip(&species.variants).flat_map(sun).collect();
         let (stand, plants, variants) = (Arc::new(packed), Arc::new(plants), species.variants);
-        Ok(Self { terrain, stand, plants, variants, suns, cover, observer, scene })
+        Ok(Self { terrain, stand, plants, variants, suns, cover, observer, scene: scene.clone() })
     }
 
     /// Puts ground, forest and shadows into a world. The light is another matter, as time passes: see [`sky`](Self::sky).
@@ -178,12 +177,12 @@ fn check_wanted(progress: &dyn Progress) -> Result<(), AppError> {
     if progress.is_cancelled() { Err(AppError::Cancelled) } else { Ok(()) }
 }
 
-pub(super) fn observer(scene: &Scene, terrain: &Terrain, path: &Path) -> Result<Observer, AppError> {
+pub(super) fn observer(scene: &Scene, terrain: &Terrain) -> Result<Observer, AppError> {
     let known = terrain.reference().and_then(|reference| reference.latitude_longitude());
     let latitude = scene.place.latitude.or(known.map(|place| place.0));
     let longitude = scene.place.longitude.or(known.map(|place| place.1));
     let (Some(latitude), Some(longitude)) = (latitude, longitude) else {
-        return Err(AppError::NoPlace { path: path.to_owned() });
+        return Err(AppError::NoPlace { scene: scene.label() });
     };
     let height = terrain.height(0.0, 0.0).clamp(-500.0, 9000.0);
     Ok(Observer::new(latitude, longitude, height)?)

@@ -18,7 +18,7 @@ fn overrides(common: &Common) -> Overrides {
 /// The options of a flight.
 pub fn fly_options(fly: Fly, common: &Common) -> FlyOptions {
     FlyOptions {
-        scene: fly.scene.unwrap_or_else(demo_scene),
+        scene: fly.scene.unwrap_or_else(demo_scene).into(),
         size: fly.size,
         at: fly.at,
         view: view(&fly.view),
@@ -43,7 +43,7 @@ pub fn render_options(render: Render, common: &Common) -> Result<RenderOptions, 
         adapter: common.adapter.clone(),
         quiet: common.quiet,
         explain: common.explain,
-        scene: render.scene,
+        scene: render.scene.into(),
         pictures: pictures(render.out, &render.at, render.frames, render.fps, render.from.zip(render.to))?,
     })
 }
@@ -61,7 +61,7 @@ pub fn reference_options(reference: Reference, common: &Common) -> Result<Refere
     }
     Ok(ReferenceOptions {
         view: view(&reference.view),
-        scene: reference.scene,
+        scene: reference.scene.into(),
         out: reference.out,
         at: reference.at,
         size: reference.size,

@@ -1,25 +1,35 @@
-//! Collecting impossible values with their place in the text.
+//! Collecting values that are out of range, with their positions in the text of the scene file.
 
 use std::ops::RangeInclusive;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::error::{Problem, SceneError};
 use super::locate::{Outline, Position};
 
-/// Gathers the problems of one scene file.
+/// Gathers the problems of one scene.
 pub(super) struct Check<'a> {
-    outline: Option<Outline<'a>>,
+    /// Outline of the scene file's text; `None` for a scene that was built in code.
+    text: Option<Option<Outline<'a>>>,
     problems: Vec<Problem>,
 }
 
 impl<'a> Check<'a> {
-    pub(super) fn new(text: &'a str) -> Self {
-        Self { outline: Outline::of(text), problems: Vec::new() }
+    /// Checks a scene that was read from `text`: problems have positions.
+    pub(super) fn of_text(text: &'a str) -> Self {
+        Self { text: Some(Outline::of(text)), problems: Vec::new() }
+    }
+
+    /// Checks a scene that was built in code: problems have no positions.
+    pub(super) fn of_values() -> Self {
+        Self { text: None, problems: Vec::new() }
     }
 
     /// Notes that the value at `field` is impossible.
     pub(super) fn problem(&mut self, field: &str, message: impl Into<String>, remedy: impl Into<String>) {
-        let position = self.outline.as_ref().map_or(Position { line: 1, column: 1 }, |outline| outline.value(field));
+        let position = self
+            .text
+            .as_ref()
+            .map(|outline| outline.as_ref().map_or(Position { line: 1, column: 1 }, |outline| outline.value(field)));
         self.problems.push(Problem {
             position,
             field: field.to_owned(),
@@ -100,8 +110,8 @@ impl<'a> Check<'a> {
     }
 
     /// The error that lists the problems in the file's order, if there are any.
-    pub(super) fn finish(mut self, path: PathBuf) -> Result<(), SceneError> {
+    pub(super) fn finish(mut self, scene: String) -> Result<(), SceneError> {
         self.problems.sort_by_key(|problem| problem.position);
-        if self.problems.is_empty() { Ok(()) } else { Err(SceneError::Invalid { path, problems: self.problems }) }
+        if self.problems.is_empty() { Ok(()) } else { Err(SceneError::Invalid { scene, problems: self.problems }) }
     }
 }

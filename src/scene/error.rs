@@ -43,21 +43,22 @@ pub enum SceneError {
         /// What to do about it.
         remedy: String,
     },
-    /// The file is well formed, but values in it are impossible. Every one found is listed, in the file's order.
-    #[error("{}", problem_lines(path, problems))]
+    /// The scene is well formed, but values in it are out of range. Every one found is listed, in the file's order.
+    #[error("{}", problem_lines(scene, problems))]
     Invalid {
-        /// The file.
-        path: PathBuf,
-        /// What is impossible, in the file's order; never empty.
+        /// The file, or [`Scene::label`](super::Scene::label) of a scene that was built in code.
+        scene: String,
+        /// What is out of range, in the file's order; never empty.
         problems: Vec<Problem>,
     },
 }
 
-/// One impossible value of a scene file.
+/// One value of a scene that is out of range.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
-    /// Where the value stands (or, for one that is missing, the structure that lacks it).
-    pub position: Position,
+    /// Where the value is in the file (or, for one that is missing, the structure that lacks it). `None` for a scene that
+    /// was built in code.
+    pub position: Option<Position>,
     /// The path of the field, such as `species[1].height`.
     pub field: String,
     /// What is wrong with it.
@@ -68,12 +69,17 @@ pub struct Problem {
 
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: `{}` {}; {}", self.position, self.field, self.message, self.remedy)
+        if let Some(position) = self.position {
+            write!(f, "{position}: ")?;
+        }
+        write!(f, "`{}` {}; {}", self.field, self.message, self.remedy)
     }
 }
 
-fn problem_lines(path: &std::path::Path, problems: &[Problem]) -> String {
-    let lines: Vec<String> = problems.iter().map(|problem| format!("{}:{problem}", path.display())).collect();
+fn problem_lines(scene: &str, problems: &[Problem]) -> String {
+    // `file:line:column: ` is what editors and terminals take for a link.
+    let colon = |problem: &Problem| if problem.position.is_some() { ":" } else { ": " };
+    let lines: Vec<String> = problems.iter().map(|problem| format!("{scene}{}{problem}", colon(problem))).collect();
     lines.join("\n")
 }
 

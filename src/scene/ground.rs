@@ -161,6 +161,50 @@ impl Default for GroundFlat {
     }
 }
 
+impl GroundFile {
+    /// All of the terrain file `path`, as it is.
+    pub fn new(path: impl Into<PathBuf>) -> Self {
+        Self {
+            path: path.into(),
+            crop: None,
+            coordinates: None,
+            surroundings: Surroundings::default(),
+            exaggeration: one(),
+        }
+    }
+}
+
+impl GroundImage {
+    /// The greyscale picture `path` with `spacing` metres between pixels; black is at 0 m, white at `high` metres.
+    pub fn new(path: impl Into<PathBuf>, spacing: f64, high: f64) -> Self {
+        Self { path: path.into(), spacing, low: 0.0, high }
+    }
+}
+
+impl From<GroundFile> for Ground {
+    fn from(file: GroundFile) -> Self {
+        Self::File(file)
+    }
+}
+
+impl From<GroundImage> for Ground {
+    fn from(image: GroundImage) -> Self {
+        Self::Image(image)
+    }
+}
+
+impl From<GroundNoise> for Ground {
+    fn from(noise: GroundNoise) -> Self {
+        Self::Noise(noise)
+    }
+}
+
+impl From<GroundFlat> for Ground {
+    fn from(flat: GroundFlat) -> Self {
+        Self::Flat(flat)
+    }
+}
+
 impl GroundNoise {
     /// Distance of the samples in metres, as stated or 1/256 of the size.
     pub fn spacing_m(&self) -> f64 {

@@ -19,6 +19,20 @@
 //! # Ok::<(), canopy::scene::SceneError>(())
 //! ```
 //!
+//! A scene can be built in code as well, where a file is only one of the ways to get a [`Scene`]:
+//!
+//! ```
+//! use canopy::scene::{GroundNoise, GrownPlants, Scene, ScatteredTrees, Species};
+//!
+//! let scene = Scene {
+//!     species: vec![Species { height: (14.0, 22.0), ..Species::new("oak", GrownPlants::default()) }],
+//!     trees: ScatteredTrees { stems_per_hectare: 280.0, ..ScatteredTrees::default() }.into(),
+//!     ..Scene::new(GroundNoise { size: 400.0, ..GroundNoise::default() })
+//! };
+//! scene.validate()?;
+//! # Ok::<(), canopy::scene::SceneError>(())
+//! ```
+//!
 //! Positions are metres from the terrain's centre: +X east, −Z north. Angles in scene files and on the command line
 //! are degrees, yaw is a compass bearing; [`Viewpoint`] turns both into the renderer's frame.
 //!
@@ -37,6 +51,7 @@ mod place;
 mod plan;
 mod quality;
 mod request;
+mod source;
 mod species;
 mod time;
 mod trees;
@@ -56,13 +71,14 @@ pub use request::{
     Clock, FlyOptions, LightGroup, Pictures, Progress, ReferenceOptions, RenderOptions, RenderReport, Silent, Still,
     View,
 };
+pub use source::SceneSource;
 pub use species::{GltfPlants, GrownForm, GrownPlants, LeafGloss, PlantSource, Species};
 pub use time::{LocalTime, TimeError, YEARS};
 pub use trees::{Anchor, Area, Clearings, InventoryTrees, LengthUnit, ScatteredTrees, Sequence, Trees};
 
 use std::fs::File;
 use std::io::Read;
-use std::path::Path as FilePath;
+use std::path::{Path as FilePath, PathBuf};
 
 use ron::extensions::Extensions;
 use serde::Deserialize;
@@ -97,6 +113,9 @@ pub struct Scene {
     /// Drawing quality.
     #[serde(default)]
     pub quality: Quality,
+    /// The file that the scene was read from; `None` for a scene that was built in code. No field of a scene file.
+    #[serde(skip)]
+    pub file: Option<PathBuf>,
 }
 
 /// No scene file is larger; what is, is something else (a terrain, a plant), and would only waste memory.
@@ -106,7 +125,68 @@ fn one() -> u64 {
     1
 }
 
+impl Default for Scene {
+    /// A plane of one square kilometre without trees, placed as [`Scene::new`] says.
+    fn default() -> Self {
+        Self::new(GroundFlat::default())
+    }
+}
+
 impl Scene {
+    /// A scene of this ground without trees; all else has the defaults of a scene file. A ground that does not know where on
+    /// earth it lies is placed at 47.5° N, 9.2° E; a terrain file keeps its own place.
+    pub fn new(terrain: impl Into<Ground>) -> Self {
+        let terrain = terrain.into();
+        let place = if terrain.may_know_its_place() { Place::default() } else { Place::at(47.5, 9.2) };
+        Self {
+            name: "scene".to_owned(),
+            seed: one(),
+            terrain,
+            species: Vec::new(),
+            trees: Trees::default(),
+            place,
+            camera: Camera::default(),
+            quality: Quality::default(),
+            file: None,
+        }
+    }
+
+    /// What messages call the scene: its file, or "the scene `name`" where it was built in code.
+    pub fn label(&self) -> String {
+        match &self.file {
+            Some(file) => file.display().to_string(),
+            None => format!("the scene `{}`", self.name),
+        }
+    }
+
+    /// Checks that all values are in the ranges that their documentation names. [`read`](Self::read) and
+    /// [`parse`](Self::parse) have done so, with the position of each value; for a scene that was built in code, or
+    /// changed after it was read, whoever builds it does.
+    ///
+    /// # Errors
+    /// [`SceneError::Invalid`], which lists every value that is out of range.
+    pub fn validate(&self) -> Result<(), SceneError> {
+        self.check(Check::of_values(), self.label())
+    }
+
+    fn check(&self, mut check: Check, label: String) -> Result<(), SceneError> {
+        self.terrain.check(&mut check);
+        species::check_all(&self.species, &mut check);
+        self.trees.check(&self.species, &mut check);
+        self.place.check(&self.terrain, &mut check);
+        self.camera.check(&mut check);
+        self.quality.check(&mut check);
+        check.finish(label)
+    }
+
+    /// Puts `folder` before every relative path in the scene. What is read from a file has this done already; a scene that
+    /// was built in code has its paths relative to the working directory.
+    pub fn resolve_paths(&mut self, folder: &FilePath) {
+        self.terrain.resolve(folder);
+        self.trees.resolve(folder);
+        self.species.iter_mut().for_each(|species| species.resolve(folder));
+    }
+
     /// Reads and validates a scene file. Relative paths in it become relative to the working directory, that is,
     /// ready to open.
     ///
@@ -148,19 +228,9 @@ impl Scene {
             .with_default_extension(Extensions::IMPLICIT_SOME)
             .with_default_extension(Extensions::UNWRAP_VARIANT_NEWTYPES);
         let mut scene: Self = options.from_str(text).map_err(|error| error::from_ron(error, text, path.to_owned()))?;
-        let mut check = Check::new(text);
-        scene.terrain.check(&mut check);
-        species::check_all(&scene.species, &mut check);
-        scene.trees.check(&scene.species, &mut check);
-        scene.place.check(&scene.terrain, &mut check);
-        scene.camera.check(&mut check);
-        scene.quality.check(&mut check);
-        check.finish(path.to_owned())?;
-
-        let folder = path.parent().unwrap_or_else(|| FilePath::new(""));
-        scene.terrain.resolve(folder);
-        scene.trees.resolve(folder);
-        scene.species.iter_mut().for_each(|species| species.resolve(folder));
+        scene.check(Check::of_text(text), path.display().to_string())?;
+        scene.resolve_paths(path.parent().unwrap_or_else(|| FilePath::new("")));
+        scene.file = Some(path.to_owned());
         if scene.name.trim().is_empty() {
             scene.name = path.file_stem().map_or("scene".to_owned(), |stem| stem.to_string_lossy().into_owned());
         }

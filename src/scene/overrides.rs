@@ -15,6 +15,12 @@ pub struct Overrides {
 }
 
 impl Overrides {
+    /// `scene` with the values in their places.
+    pub fn applied(&self, mut scene: Scene) -> Scene {
+        self.apply(&mut scene);
+        scene
+    }
+
     /// Puts the values in their places.
     pub fn apply(&self, scene: &mut Scene) {
         scene.seed = self.seed.unwrap_or(scene.seed);

@@ -43,6 +43,11 @@ pub enum Moon {
 }
 
 impl Place {
+    /// Degrees north of the equator and east of Greenwich; all else by default.
+    pub fn at(latitude: f64, longitude: f64) -> Self {
+        Self { latitude: Some(latitude), longitude: Some(longitude), ..Self::default() }
+    }
+
     pub(super) fn check(&self, ground: &Ground, check: &mut Check) {
         for (name, value, limit) in [("latitude", self.latitude, 90.0), ("longitude", self.longitude, 180.0)] {
             let field = format!("place.{name}");

@@ -4,13 +4,14 @@ use std::path::PathBuf;
 
 use super::camera::Pose;
 use super::overrides::Overrides;
+use super::source::SceneSource;
 use super::time::LocalTime;
 
 /// Everything about an interactive flight.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FlyOptions {
-    /// The scene file.
-    pub scene: PathBuf,
+    /// The scene.
+    pub scene: SceneSource,
     /// Size of the window in pixels, each at least 1.
     pub size: (u32, u32),
     /// Date and time at the start; `None` takes the scene's.
@@ -34,8 +35,8 @@ pub struct FlyOptions {
 /// Everything about a headless render.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderOptions {
-    /// The scene file.
-    pub scene: PathBuf,
+    /// The scene.
+    pub scene: SceneSource,
     /// Which pictures, and where they go. [`super::RenderPlan`] turns them into frames.
     pub pictures: Pictures,
     /// Where the camera stands.
@@ -67,8 +68,8 @@ pub enum LightGroup {
 /// Everything about a picture of the ground truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReferenceOptions {
-    /// The scene file.
-    pub scene: PathBuf,
+    /// The scene.
+    pub scene: SceneSource,
     /// The `.exr` (radiance in nits) or `.png` (as the renderer shows it) to write.
     pub out: PathBuf,
     /// Date and time; `None` takes the scene's.

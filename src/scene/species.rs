@@ -128,7 +128,41 @@ fn default_height() -> (f64, f64) {
 /// Ground heights that a limit may name, in metres.
 pub(super) const ELEVATIONS: std::ops::RangeInclusive<f64> = -12_000.0..=100_000.0;
 
+impl From<GrownPlants> for PlantSource {
+    fn from(grown: GrownPlants) -> Self {
+        Self::Grown(grown)
+    }
+}
+
+impl From<GltfPlants> for PlantSource {
+    fn from(gltf: GltfPlants) -> Self {
+        Self::Gltf(gltf)
+    }
+}
+
+impl GltfPlants {
+    /// One individual per glTF or GLB file; what is foliage follows from the materials' alpha modes.
+    pub fn new(files: impl IntoIterator<Item = impl Into<PathBuf>>) -> Self {
+        Self { files: files.into_iter().map(Into::into).collect(), foliage: Vec::new(), wood: Vec::new() }
+    }
+}
+
 impl Species {
+    /// A species called `name`, with the defaults of a scene file.
+    pub fn new(name: impl Into<String>, plant: impl Into<PlantSource>) -> Self {
+        Self {
+            name: name.into(),
+            weight: one(),
+            plant: plant.into(),
+            lighting: None,
+            gloss: LeafGloss::default(),
+            height: default_height(),
+            elevation: None,
+            slope_limit: ninety(),
+            trunk_radius: None,
+        }
+    }
+
     /// Mean of the range of heights, in metres.
     pub fn mean_height(&self) -> f64 {
         0.5 * (self.height.0 + self.height.1)

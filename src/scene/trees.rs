@@ -188,6 +188,33 @@ fn centimetres() -> LengthUnit {
     LengthUnit::Centimetres
 }
 
+impl InventoryTrees {
+    /// The trees of the CSV file `path`, with the defaults of a scene file.
+    pub fn new(path: impl Into<PathBuf>) -> Self {
+        Self {
+            path: path.into(),
+            dbh_unit: centimetres(),
+            height_unit: LengthUnit::default(),
+            anchor: Anchor::default(),
+            default_height: None,
+            species: BTreeMap::new(),
+            default_species: None,
+        }
+    }
+}
+
+impl From<ScatteredTrees> for Trees {
+    fn from(rules: ScatteredTrees) -> Self {
+        Self::Scattered(rules)
+    }
+}
+
+impl From<InventoryTrees> for Trees {
+    fn from(inventory: InventoryTrees) -> Self {
+        Self::Inventory(inventory)
+    }
+}
+
 impl Trees {
     pub(super) fn check(&self, species: &[Species], check: &mut Check) {
         if matches!(self, Self::None) {

@@ -1,10 +1,8 @@
 //! Small scenes, and views into them.
 
-use std::path::Path;
-
 use canopy::{
     app::Stage,
-    scene::{LocalTime, Overrides, Pose, Progress, Viewpoint},
+    scene::{LocalTime, Pose, Progress, Scene, SceneSource, Viewpoint},
 };
 use chrono::{DateTime, Utc};
 use glam::{DVec2, DVec3};
@@ -40,24 +38,26 @@ impl Progress for Heard {
     }
 }
 
-/// Builds the scene `text`; `files` are written beside it first.
+/// Builds the scene `text`; `files` are written where its relative paths lead to.
 #[track_caller]
 pub fn build(text: &str, files: &[(&str, &[u8])]) -> Built {
     let folder = tempfile::tempdir().expect("a temporary folder");
     for (name, bytes) in files {
         std::fs::write(folder.path().join(name), bytes).expect("a temporary file");
     }
-    let path = folder.path().join("scene.ron");
-    std::fs::write(&path, text).expect("a temporary file");
     let mut heard = Heard::default();
-    let stage = built(&path, &mut heard);
+    let stage = match Scene::parse(text, &folder.path().join("scene.ron")) {
+        Ok(scene) => built(scene, &mut heard),
+        Err(error) => panic!("{error}"),
+    };
     Built { stage, warnings: heard.warnings }
 }
 
-/// Builds the scene in `path`.
+/// Builds the scene.
 #[track_caller]
-pub fn built(path: &Path, heard: &mut Heard) -> Stage {
-    match Stage::build(path, &Overrides::default(), heard) {
+pub fn built(scene: impl Into<SceneSource>, heard: &mut Heard) -> Stage {
+    let built = scene.into().read().map_err(Into::into).and_then(|scene| Stage::build(&scene, heard));
+    match built {
         Ok(stage) => stage,
         Err(error) => panic!("{error}"),
     }

@@ -47,7 +47,8 @@ pub fn fly(options: &FlyOptions, progress: &mut dyn Progress) -> Result<(), AppE
     display::check()?;
     let settings = adapter::settings(options.adapter.as_deref())?;
     adapter::check_size(&settings, options.size)?;
-    let stage = Stage::build(&options.scene, &options.overrides, progress)?;
+    let scene = options.overrides.applied(options.scene.read()?);
+    let stage = Stage::build(&scene, progress)?;
     let session = Session::new(stage, options)?;
     let mut app = display::open(|| build(session, options, settings))?;
     match app.run() {

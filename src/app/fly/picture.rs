@@ -24,7 +24,7 @@ pub fn take_picture(mut commands: Commands, session: ResMut<Session>, panel: Res
     if !session.picturing {
         return;
     }
-    let mut notes = notes(&session.stage, &session.scene_file, &session.view(), session.lit());
+    let mut notes = notes(&session.stage, &session.view(), session.lit());
     if session.tinted {
         notes.push(("View", "trees tinted by level of detail".to_owned()));
     }

@@ -1,7 +1,5 @@
 //! The state of a flight and what changes it: commands, held keys, time.
 
-use std::path::PathBuf;
-
 use chrono::{DateTime, TimeDelta, Utc};
 
 use super::{
@@ -28,8 +26,6 @@ const MESSAGE_SECONDS: f64 = 6.0;
 pub struct Session {
     /// What is flown through.
     pub stage: Stage,
-    /// Its scene file.
-    pub scene_file: PathBuf,
     /// The camera.
     pub pilot: Pilot,
     /// The scripted flight, for scenes that have a path.
@@ -92,7 +88,6 @@ impl Session {
             message: None,
             lit: None,
             start,
-            scene_file: options.scene.clone(),
             stage,
         };
         session.fly(&Controls::default(), 0.0);
@@ -200,12 +195,10 @@ fn viewpoint(stage: &Stage, pose: Pose) -> Viewpoint {
 
 #[cfg(test)]
 mod tests {
-    use std::io::Write;
-
     use glam::DVec3;
 
     use super::*;
-    use crate::scene::{Overrides, Silent};
+    use crate::scene::{Overrides, Scene, Silent};
 
     const SCENE: &str = "(
         terrain: Noise(size: 400, amplitude: 40, seed: 3),
@@ -217,10 +210,9 @@ mod tests {
     )";
 
     fn session(view: View, clock: f64) -> Result<Session, Box<dyn std::error::Error>> {
-        let mut file = tempfile::Builder::new().suffix(".ron").tempfile()?;
-        file.write_all(SCENE.as_bytes())?;
+        let scene = Scene::parse(SCENE, "session.ron".as_ref())?;
         let options = FlyOptions {
-            scene: file.path().to_owned(),
+            scene: scene.clone().into(),
             size: (64, 36),
             at: None,
             view,
@@ -231,7 +223,7 @@ mod tests {
             quiet: true,
             explain: false,
         };
-        let stage = Stage::build(&options.scene, &Overrides::default(), &mut Silent)?;
+        let stage = Stage::build(&scene, &mut Silent)?;
         Ok(Session::new(stage, &options)?)
     }
 

@@ -56,7 +56,7 @@ fn describe_species_file(page: &mut Page, path: &Path, species: &GrowParameters)
 fn describe(page: &mut Page, scene: &Scene, path: &Path) -> Result<(), AppError> {
     let mut heard = Heard::default();
     let ground = build_terrain(&scene.terrain, &mut heard)?;
-    let observer = stage::observer(scene, &ground, path)?;
+    let observer = stage::observer(scene, &ground)?;
     let plan = plants::plan(scene)?;
     let mut individuals = Vec::with_capacity(plan.individuals.len());
     for individual in &plan.individuals {

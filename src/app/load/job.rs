@@ -36,12 +36,12 @@ impl Job {
     pub fn start(request: LoadScene) -> Result<Self, AppError> {
         let line = Line::default();
         let mut speaker = Speaker(line.clone());
-        let LoadScene { path, overrides } = request.clone();
+        let LoadScene { scene, overrides } = request.clone();
         let work = move || {
             let name = |index| format!("canopy bake {index}");
             let pool = rayon::ThreadPoolBuilder::new().num_threads(spare_cores()).thread_name(name).build();
             let pool = pool.map_err(|error| AppError::Background(format!("no threads for bakes: {error}")))?;
-            pool.install(|| Stage::build(&path, &overrides, &mut speaker))
+            pool.install(|| Stage::build(&overrides.applied(scene.read()?), &mut speaker))
         };
         let thread = thread::Builder::new().name("canopy scene".to_owned()).spawn(work);
         let thread = thread.map_err(|error| AppError::Background(format!("no thread: {error}")))?;
@@ -114,17 +114,18 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
+    use crate::scene::{GroundFlat, GrownPlants, Lighting, Quality, ScatteredTrees, Scene, Species};
 
     #[test]
     fn a_scene_is_given_up_when_nobody_listens() -> Result<(), Box<dyn std::error::Error>> {
-        let folder = tempfile::tempdir()?;
-        let path = folder.path().join("many.ron");
-        let species =
-            r#"(name: "a", lighting: Local, plant: Grown(form: Broadleaf, individuals: 16, triangles: 5000))"#;
-        let place = "place: (latitude: 48, longitude: 9), quality: (cross_resolution: 64)";
-        let trees = "trees: Scattered(stems_per_hectare: 100)";
-        std::fs::write(&path, format!("(terrain: Flat(size: 100), species: [{species}], {trees}, {place})"))?;
-        let Job { line, thread, .. } = Job::start(LoadScene::new(path))?;
+        let plant = GrownPlants { individuals: 16, triangles: 5000, ..GrownPlants::default() };
+        let scene = Scene {
+            species: vec![Species { lighting: Some(Lighting::Local), ..Species::new("a", plant) }],
+            trees: ScatteredTrees { stems_per_hectare: 100.0, ..ScatteredTrees::default() }.into(),
+            quality: Quality { cross_resolution: 64, ..Quality::default() },
+            ..Scene::new(GroundFlat { size: 100.0 })
+        };
+        let Job { line, thread, .. } = Job::start(LoadScene::new(scene))?;
         let at_plants = |line: &Line| {
             let said = line.lock().unwrap_or_else(PoisonError::into_inner);
             said.iter().any(|said| matches!(said, Said::Begin(step, _) if step == "Plants"))

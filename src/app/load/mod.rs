@@ -7,7 +7,7 @@
 mod job;
 mod progress;
 
-use std::{fmt, path::PathBuf, sync::Arc};
+use std::{fmt, sync::Arc};
 
 use bevy::{
     app::{App, First, Plugin, PreStartup},
@@ -26,7 +26,7 @@ use super::{
     error::AppError,
     stage::{Shown, Stage},
 };
-use crate::scene::Overrides;
+use crate::scene::{Overrides, SceneSource};
 use job::Job;
 use progress::Said;
 pub use progress::{SceneProgress, SceneState};
@@ -50,33 +50,33 @@ pub struct CanopyScenePlugin {
 }
 
 impl CanopyScenePlugin {
-    /// Starts with the scene file `path`, as it is.
-    pub fn new(path: impl Into<PathBuf>) -> Self {
-        Self { first: Some(LoadScene::new(path)) }
+    /// Starts with `scene`, a file or a [`Scene`](crate::scene::Scene), as it is.
+    pub fn new(scene: impl Into<SceneSource>) -> Self {
+        Self { first: Some(LoadScene::new(scene)) }
     }
 }
 
 /// Asks for a scene in the place of the one that is shown.
 #[derive(Message, Clone, Debug, Default, PartialEq)]
 pub struct LoadScene {
-    /// The scene file.
-    pub path: PathBuf,
+    /// The scene: a file, or a value.
+    pub scene: SceneSource,
     /// What replaces values in it.
     pub overrides: Overrides,
 }
 
 impl LoadScene {
-    /// The scene file `path`, as it is.
-    pub fn new(path: impl Into<PathBuf>) -> Self {
-        Self { path: path.into(), overrides: Overrides::default() }
+    /// `scene`, a file or a [`Scene`](crate::scene::Scene), as it is.
+    pub fn new(scene: impl Into<SceneSource>) -> Self {
+        Self { scene: scene.into(), overrides: Overrides::default() }
     }
 }
 
 /// A scene is in the world, from this very frame on.
 #[derive(Message, Clone)]
 pub struct SceneReady {
-    /// Its file.
-    pub path: PathBuf,
+    /// What was asked for.
+    pub scene: SceneSource,
     /// What it is made of.
     pub stage: Arc<Stage>,
 }
@@ -84,8 +84,8 @@ pub struct SceneReady {
 /// A scene cannot be shown. [`Display`](fmt::Display) has the whole message: what is wrong, where, and the remedy.
 #[derive(Message, Debug)]
 pub struct SceneFailed {
-    /// Its file.
-    pub path: PathBuf,
+    /// What was asked for.
+    pub scene: SceneSource,
     /// What is wrong.
     pub error: AppError,
 }
@@ -99,8 +99,8 @@ impl fmt::Display for SceneFailed {
 /// The scene that is shown. Not there before the first is ready.
 #[derive(Resource, Clone)]
 pub struct LoadedScene {
-    /// Its file.
-    pub path: PathBuf,
+    /// What was asked for.
+    pub scene: SceneSource,
     /// What it is made of.
     pub stage: Arc<Stage>,
     /// Its entities, which the next scene despawns.
@@ -117,11 +117,11 @@ struct Loader {
 impl Loader {
     fn load(&mut self, request: LoadScene, progress: &mut SceneProgress) -> Result<(), SceneFailed> {
         if let Some(replaced) = self.job.take() {
-            info!("{}: given up for {}", replaced.request.path.display(), request.path.display());
+            info!("{}: given up for {}", replaced.request.scene, request.scene);
         }
-        progress.begin(request.path.clone());
-        let path = request.path.clone();
-        self.job = Some(Job::start(request).map_err(|error| SceneFailed { path, error })?);
+        progress.begin(request.scene.clone());
+        let scene = request.scene.clone();
+        self.job = Some(Job::start(request).map_err(|error| SceneFailed { scene, error })?);
         Ok(())
     }
 }
@@ -132,7 +132,7 @@ impl Plugin for CanopyScenePlugin {
             if let Some(first) = &self.first
                 && let Some(replaced) = loader.first.replace(first.clone())
             {
-                let (replaced, first) = (replaced.path.display(), first.path.display());
+                let (replaced, first) = (&replaced.scene, &first.scene);
                 warn!(
                     "{replaced}: not loaded: another CanopyScenePlugin asks for {first}, and one scene is shown at a time"
                 );
@@ -184,37 +184,37 @@ fn follow(
     let Some((job, finished)) = loader.job.as_ref().map(|job| (job, job.is_finished())) else { return };
     for said in job.said() {
         match &said {
-            Said::Note(note) => info!("{}: {note}", progress.path.display()),
-            Said::Warning(warning) => warn!("{}: {warning}", progress.path.display()),
+            Said::Note(note) => info!("{}: {note}", progress.scene),
+            Said::Warning(warning) => warn!("{}: {warning}", progress.scene),
             Said::Begin(..) | Said::Advance(_) | Said::End => {}
         }
         progress.hear(said);
     }
     let Some(job) = loader.job.take_if(|_| finished) else { return };
-    let path = job.request.path.clone();
+    let scene = job.request.scene.clone();
     let checked = job.finish().and_then(|stage| {
         device.map_or(Ok(()), |device| adapter::check_trees(&device, &stage))?;
         Ok(Arc::new(stage))
     });
     let stage = match checked {
         Ok(stage) => stage,
-        Err(error) => return tell(Err(SceneFailed { path, error }), &mut progress, &mut failed),
+        Err(error) => return tell(Err(SceneFailed { scene, error }), &mut progress, &mut failed),
     };
     if let Some(loaded) = loaded {
         loaded.shown.despawn(&mut commands);
     }
     let shown = stage.show(&mut commands);
     commands.insert_resource(stage.sky(stage.scene.place.time.utc()));
-    commands.insert_resource(LoadedScene { path: path.clone(), stage: stage.clone(), shown });
-    info!("{}: ready, {} trees", path.display(), stage.stand.trees.len());
+    commands.insert_resource(LoadedScene { scene: scene.clone(), stage: stage.clone(), shown });
+    info!("{scene}: ready, {} trees", stage.stand.trees.len());
     progress.state = SceneState::Ready;
-    ready.write(SceneReady { path, stage });
+    ready.write(SceneReady { scene, stage });
 }
 
 /// Tells of a failure, if there is one.
 fn tell(outcome: Result<(), SceneFailed>, progress: &mut SceneProgress, failed: &mut MessageWriter<SceneFailed>) {
     if let Err(failure) = outcome {
-        error!("{}: {failure}", failure.path.display());
+        error!("{}: {failure}", failure.scene);
         progress.state = SceneState::Failed;
         failed.write(failure);
     }

@@ -1,8 +1,8 @@
 //! How far a scene is, for whoever looks.
 
-use std::path::PathBuf;
-
 use bevy::ecs::resource::Resource;
+
+use crate::scene::SceneSource;
 
 /// Where a scene stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -20,10 +20,10 @@ pub enum SceneState {
 
 /// How far the scene is that was asked for last. A plain value, which changes at most once a frame: cheap to look at, and
 /// Bevy's change detection holds.
-#[derive(Resource, Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Resource, Clone, Debug, Default, PartialEq)]
 pub struct SceneProgress {
-    /// Its file; empty while nobody has asked for one.
-    pub path: PathBuf,
+    /// What was asked for; an empty path while nobody has.
+    pub scene: SceneSource,
     /// Where it stands.
     pub state: SceneState,
     /// Name of the step that it is at, or ended with: "Terrain", "Plants", "Trees" ...; empty before the first.
@@ -44,9 +44,9 @@ impl SceneProgress {
         (self.total > 0).then(|| self.done.min(self.total) as f32 / self.total as f32)
     }
 
-    /// Starts anew with the scene in `path`.
-    pub(super) fn begin(&mut self, path: PathBuf) {
-        *self = Self { path, state: SceneState::Building, ..Self::default() };
+    /// Starts anew with `scene`.
+    pub(super) fn begin(&mut self, scene: SceneSource) {
+        *self = Self { scene, state: SceneState::Building, ..Self::default() };
     }
 
     /// Takes in what the builder said.
@@ -86,7 +86,7 @@ mod tests {
         progress.begin("a.ron".into());
         assert_eq!(
             progress,
-            SceneProgress { path: "a.ron".into(), state: SceneState::Building, ..SceneProgress::default() }
+            SceneProgress { scene: "a.ron".into(), state: SceneState::Building, ..SceneProgress::default() }
         );
         assert_eq!(progress.share(), None);
         progress.hear(Said::Begin("Plants".to_owned(), 4));

@@ -236,13 +236,12 @@ pub fn follow_light(mut panel: ResMut<LightPanel>, mut session: ResMut<Session>,
 #[cfg(test)]
 mod tests {
     use std::{
-        io::Write,
         thread,
         time::{Duration, Instant},
     };
 
     use super::*;
-    use crate::scene::{Overrides, Scene, Silent};
+    use crate::scene::{Scene, Silent};
 
     type Outcome = Result<(), Box<dyn std::error::Error>>;
 
@@ -258,9 +257,7 @@ mod tests {
     )";
 
     fn stage() -> Result<Stage, Box<dyn std::error::Error>> {
-        let mut file = tempfile::Builder::new().suffix(".ron").tempfile()?;
-        file.write_all(SCENE.as_bytes())?;
-        Ok(Stage::build(file.path(), &Overrides::default(), &mut Silent)?)
+        Ok(Stage::build(&Scene::parse(SCENE, "light.ron".as_ref())?, &mut Silent)?)
     }
 
     /// Lets everything be baked that was ordered; the plants that are shown in the end.
@@ -347,9 +344,7 @@ mod tests {
 
     #[test]
     fn a_scene_without_species_has_nothing_to_turn() -> Outcome {
-        let mut file = tempfile::Builder::new().suffix(".ron").tempfile()?;
-        file.write_all(b"(terrain: Flat(size: 100), place: (latitude: 47.5, longitude: 9.2))")?;
-        let stage = Stage::build(file.path(), &Overrides::default(), &mut Silent)?;
+        let stage = Stage::build(&Scene::default(), &mut Silent)?;
         let mut panel = LightPanel::new(&stage);
         assert!(!panel.toggle() && !panel.open && panel.turn(Turn::Reset).is_none());
         Ok(())

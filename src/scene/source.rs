@@ -1,0 +1,91 @@
+//! A scene by its file or by its value.
+
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use super::{Scene, SceneError};
+
+/// A scene that somebody asks for: a file to read, or a scene that is there already.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SceneSource {
+    /// A scene file.
+    File(PathBuf),
+    /// A scene that was built in code or read before.
+    Value(Arc<Scene>),
+}
+
+impl SceneSource {
+    /// The scene, read from its file where it has one.
+    ///
+    /// # Errors
+    /// Those of [`Scene::read`].
+    pub fn read(&self) -> Result<Scene, SceneError> {
+        match self {
+            Self::File(path) => Scene::read(path),
+            Self::Value(scene) => Ok(scene.as_ref().clone()),
+        }
+    }
+
+    /// The scene file; `None` for a scene that was built in code.
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            Self::File(path) => Some(path),
+            Self::Value(scene) => scene.file.as_deref(),
+        }
+    }
+}
+
+impl Default for SceneSource {
+    /// A file without a name, which cannot be read.
+    fn default() -> Self {
+        Self::File(PathBuf::new())
+    }
+}
+
+impl fmt::Display for SceneSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File(path) => path.display().fmt(f),
+            Self::Value(scene) => f.write_str(&scene.label()),
+        }
+    }
+}
+
+impl From<PathBuf> for SceneSource {
+    fn from(path: PathBuf) -> Self {
+        Self::File(path)
+    }
+}
+
+impl From<&Path> for SceneSource {
+    fn from(path: &Path) -> Self {
+        Self::File(path.to_owned())
+    }
+}
+
+impl From<&str> for SceneSource {
+    fn from(path: &str) -> Self {
+        Self::File(path.into())
+    }
+}
+
+impl From<String> for SceneSource {
+    fn from(path: String) -> Self {
+        Self::File(path.into())
+    }
+}
+
+impl From<Scene> for SceneSource {
+    fn from(scene: Scene) -> Self {
+        Self::Value(Arc::new(scene))
+    }
+}
+
+impl From<Arc<Scene>> for SceneSource {
+    fn from(scene: Arc<Scene>) -> Self {
+        Self::Value(scene)
+    }
+}
