@@ -67,18 +67,3 @@ fn apply_fog(color: vec3<f32>, relative: vec3<f32>) -> vec3<f32> {
     let inscatter = mix(mean, min(rim, 6.0 * mean), amount * amount);
     return color * transmittance + inscatter * (1.0 - transmittance);
 }
-
-// The eye's loss of colour in the dark and its shift to blue [Jensen et al. 2000, eq. 4; Larson et al. 1997, eq. 10]:
-// the twin of ScotopicTint::apply in src/light/exposure.rs. `color` is exposed. By day the amount is zero.
-fn night_vision(color: vec3<f32>) -> vec3<f32> {
-    let xyz = mat3x3<f32>(
-        vec3(0.4124564, 0.2126729, 0.0193339),
-        vec3(0.3575761, 0.7151522, 0.1191920),
-        vec3(0.1804375, 0.0721750, 0.9503041),
-    ) * color;
-    let v = max(xyz.y * (1.33 * (1.0 + (xyz.y + xyz.z) / max(xyz.x, 1e-12)) - 1.68) / 2.573, 0.0);
-    let nits = max(xyz.y / light.sky_frame.z, 1e-12);
-    let sigma = clamp((log2(nits) * 0.30103 + 2.0) / 2.6, 0.0, 1.0);
-    let rods = 1.0 - sigma * sigma * (3.0 - 2.0 * sigma);
-    return mix(color, light.night.rgb * v, min(light.night.w, light.sky_frame.w * rods));
-}

@@ -1,8 +1,9 @@
 // Crossed billboards [Franzke 2005, 4.3]: two upright planes and a level one, eighteen pulled vertices a tree.
 #import canopy::frame::{frame, light}
-#import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, cross_threshold, tint_foliage, scattered, leaf_visibility}
+#import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, plant_vertex_position, cross_threshold, tint_foliage, scattered, leaf_visibility}
 #import canopy::lighting::{Surface, shade, even_sky, leaf_transmission}
-#import canopy::sky::{apply_fog, night_vision, sky_transfer}
+#import canopy::output::finish
+#import canopy::sky::sky_transfer
 #import canopy::stand::{stand_light, in_stand_by_transfer, two_bands}
 #import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
 
@@ -48,7 +49,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     let plane = variants[tree.variant].planes[plane_index];
     let height = max(variants[tree.variant].size.x * tree.scale, 0.01);
 
-    let center = tree.position + turn(plane.center.xyz, tree.yaw) * tree.scale;
+    let center = plant_vertex_position(tree, plane.center.xyz).relative;
     let normal = turn(plane.normal.xyz, tree.yaw);
     let toward = dot(normal, normalize(center));
     // A plane goes as it is seen edge-on: its picture is nothing but a streak there. The level plane comes in only
@@ -58,8 +59,8 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     let threshold = max(cross_threshold(length(tree.position.xz)), edge);
 
     var out: Varying;
-    let local = turn(plane.center.xyz + corner.x * plane.u.xyz + corner.y * plane.v.xyz, tree.yaw) * tree.scale;
-    out.relative = tree.position + local;
+    let position = plant_vertex_position(tree, plane.center.xyz + corner.x * plane.u.xyz + corner.y * plane.v.xyz);
+    out.relative = position.relative;
     out.clip = frame.clip_from_relative * vec4(out.relative, 1.0);
     if threshold >= 1.0 {
         // Nothing would pass the test: no area, no fragments. Inside the view, as clipping costs more than rejection.
@@ -71,7 +72,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     out.up = turn(plane.v.xyz, tree.yaw) / max(length(plane.v.xyz), 1e-6);
     // Seen from behind, the crown's other half stands before the viewer: mirrored across the plane.
     out.front = normal * select(1.0, -1.0, toward > 0.0);
-    out.look = vec4(threshold, local.y, local.y / height, tree.tint);
+    out.look = vec4(threshold, position.from_foot.y, position.from_foot.y / height, tree.tint);
     out.crown = vec4(variants[tree.variant].transmission.rgb, variants[tree.variant].size.y * tree.scale);
     return out;
 }
@@ -151,7 +152,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     visibility *= mix(1.0, among, foliage);
     var color = shade(surface, visibility, sky);
     color = mix(color, vec3(0.2, 0.35, 1.0) * dot(color, vec3(0.5)), 0.6 * frame.flags.y);
-    return vec4(night_vision(apply_fog(color, in.relative)), coverage);
+    return finish(in.relative, color, coverage);
 }
 
 // Share of the leaves that a viewer sees of a crown which the light reaches between the others. What one sees from the

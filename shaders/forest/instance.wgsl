@@ -84,6 +84,28 @@ fn turn(v: vec3<f32>, yaw: vec2<f32>) -> vec3<f32> {
     return vec3(yaw.x * v.x + yaw.y * v.z, v.y, -yaw.y * v.x + yaw.x * v.z);
 }
 
+// Where a vertex of a tree is, metres in world axes.
+struct VertexPosition {
+    // From the anchor.
+    relative: vec3<f32>,
+    // From the tree's foot.
+    from_foot: vec3<f32>,
+}
+
+// Where a tree has the vertex that its plant has at `local` (metres in the plant's frame). All vertex shaders of plants
+// take their positions from here, those of shadows too.
+fn plant_vertex_position(tree: Instance, local: vec3<f32>) -> VertexPosition {
+    return turned_vertex_position(tree, turn(local, tree.yaw));
+}
+
+// The same for a position in the plant that is turned into world axes already.
+fn turned_vertex_position(tree: Instance, turned: vec3<f32>) -> VertexPosition {
+    var position: VertexPosition;
+    position.from_foot = turned * tree.scale;
+    position.relative = tree.position + position.from_foot;
+    return position;
+}
+
 // Thresholds of the alpha test over the distance: the CPU twin is src/lod/mod.rs.
 fn model_threshold(distance: f32) -> f32 {
     let middle = 0.5 * (view.fade_start + view.fade_end);

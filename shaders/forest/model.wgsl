@@ -1,8 +1,8 @@
 // The full model of a tree, near the camera.
 #import canopy::frame::{frame, light}
-#import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, model_threshold, tint_foliage, scattered, leaf_visibility}
+#import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, plant_vertex_position, model_threshold, tint_foliage, scattered, leaf_visibility}
 #import canopy::lighting::{Surface, shade, exitant, even_sky, leaf_transmission}
-#import canopy::sky::{apply_fog, night_vision}
+#import canopy::output::finish
 #import canopy::stand::stand_light
 #import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
 
@@ -65,28 +65,27 @@ struct Varying {
 @vertex
 fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index) vertex: u32) -> Varying {
     let tree = unpack_tree(trees[visible[index]]);
-    let local = turn(in.position, tree.yaw) * tree.scale;
-    let relative = tree.position + local;
+    let position = plant_vertex_position(tree, in.position);
     var out: Varying;
-    out.relative = relative;
-    out.clip = frame.clip_from_relative * vec4(relative, 1.0);
+    out.relative = position.relative;
+    out.clip = frame.clip_from_relative * vec4(position.relative, 1.0);
     let stored = in.normal.xyz * (1023.0 / 511.0) - 1.0;
     let size = max(length(stored), 1e-6);
     out.normal = turn(stored / size, tree.yaw);
     let ambient = saturate((size - LEAST_LENGTH) / (1.0 - LEAST_LENGTH));
     out.uv = in.uv;
     let height = max(variants[tree.variant].size.x * tree.scale, 0.01);
-    out.look = vec4(ambient, local.y, local.y / height, tree.tint);
+    out.look = vec4(ambient, position.from_foot.y, position.from_foot.y / height, tree.tint);
     out.threshold = model_threshold(length(tree.position.xz));
 #ifdef TRANSFER
-    let map = ground_map(relative);
+    let map = ground_map(position.relative);
     let stand = stand_light(map.z, 1.0 - out.look.z);
     let sky = light_in_stand(vertex, tree.yaw_code, stand);
     out.front_sky = sky.front;
     out.back_sky = sky.back;
 #ifndef SUN_HARMONICS
     let to_light = turn(light.key_direction.xyz, vec2(tree.yaw.x, -tree.yaw.y));
-    let scattered = scattered_sun(vertex, to_light) * (stand.beam * terrain_visibility(map, local.y));
+    let scattered = scattered_sun(vertex, to_light) * (stand.beam * terrain_visibility(map, position.from_foot.y));
     out.front_sky += scattered;
     out.back_sky += scattered;
 #endif
@@ -200,5 +199,5 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
     var color = shade(surface, visibility, sky);
 #endif
     color = mix(color, vec3(0.15, 0.9, 0.2) * dot(color, vec3(0.5)), 0.6 * frame.flags.y);
-    return vec4(night_vision(apply_fog(color, in.relative)), coverage);
+    return finish(in.relative, color, coverage);
 }

@@ -1,6 +1,7 @@
 // The sky behind everything: the radiance table, the sun's and the moon's disc, stars.
 #import canopy::frame::{frame, light}
-#import canopy::sky::{sky_radiance, night_vision}
+#import canopy::output::finish_sky
+#import canopy::sky::sky_radiance
 
 struct Varying {
     @builtin(position) clip: vec4<f32>,
@@ -90,5 +91,5 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let moon = disc(direction, light.moon_direction);
     color += moon * light.moon_radiance.rgb * above;
     color += stars(direction) * above * (1.0 - moon) * smoothstep(0.0, 0.25, direction.y);
-    return vec4(night_vision(min(color, vec3(6.0e4))), 1.0);
+    return finish_sky(min(color, vec3(6.0e4)));
 }

@@ -1,6 +1,6 @@
 // Depth from the key light: far trees as one upright picture that turns its face to the light's azimuth, so that the
 // shadow's area does not depend on it, and the level picture for a high light.
-#import canopy::instance::{trees, visible, variants, unpack_tree, turn}
+#import canopy::instance::{trees, visible, variants, unpack_tree, turn, turned_vertex_position}
 #import canopy::caster::{cascade, clamp_caster}
 
 @group(2) @binding(0) var color_pictures: texture_2d_array<f32>;
@@ -33,7 +33,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
         u = vec3(axis.x, 0.0, axis.y) * length(plane.u.xyz);
     }
     var out: Varying;
-    out.clip = clamp_caster(tree.position + (center + corner.x * u + corner.y * v) * tree.scale);
+    out.clip = clamp_caster(turned_vertex_position(tree, center + corner.x * u + corner.y * v).relative);
     out.uv = vec2(0.5 + 0.5 * corner.x, 0.5 - 0.5 * corner.y);
     out.layer = u32(variants[tree.variant].size.z) + plane_index;
     return out;

@@ -1,5 +1,5 @@
 // Depth from the key light: the shadow proxies of near trees (src/bake/shadow_proxy.rs).
-#import canopy::instance::{trees, visible, unpack_tree, turn}
+#import canopy::instance::{trees, visible, unpack_tree, plant_vertex_position}
 #import canopy::caster::{cascade, clamp_caster}
 
 @group(2) @binding(0) var color_texture: texture_2d<f32>;
@@ -17,7 +17,7 @@ fn vertex(
 ) -> Varying {
     let tree = unpack_tree(trees[visible[index]]);
     var out: Varying;
-    out.clip = clamp_caster(tree.position + turn(position, tree.yaw) * tree.scale);
+    out.clip = clamp_caster(plant_vertex_position(tree, position).relative);
     out.uv = uv;
     return out;
 }

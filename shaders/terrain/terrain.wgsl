@@ -1,7 +1,7 @@
 // The ground: tiles that morph into each other (src/terrain/tiles), coloured by slope, height, canopy cover and noise.
 #import canopy::frame::{frame, light, shadow}
 #import canopy::lighting::{Surface, shade, even_sky}
-#import canopy::sky::{apply_fog, night_vision}
+#import canopy::output::finish
 #import canopy::stand::ground_light
 #import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
 
@@ -139,5 +139,5 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         visibility *= mix(stand.beam, near.x, near.y);
     }
     let color = shade(surface, visibility, even_sky(surface, stand));
-    return vec4(night_vision(apply_fog(color, in.relative)), 1.0);
+    return finish(in.relative, color, 1.0);
 }

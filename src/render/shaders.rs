@@ -22,6 +22,7 @@ pub const SOURCES: &[(&str, &str)] = sources![
     "common/frame.wgsl",
     "common/sky.wgsl",
     "common/stand.wgsl",
+    "common/output.wgsl",
     "common/sun_visibility.wgsl",
     "common/lighting.wgsl",
     "forest/instance.wgsl",
