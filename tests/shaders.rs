@@ -182,27 +182,46 @@ fn member_size<T: bytemuck::Zeroable>(size: impl Fn(&T) -> usize) -> usize {
 #[test]
 fn gpu_structs_are_what_the_shaders_think() {
     let layouts = layouts();
-    twin!(layouts, "Frame", FrameUniform { clip_from_relative, relative_from_clip, camera, viewport, flags });
+    twin!(
+        layouts,
+        "Frame",
+        FrameUniform {
+            clip_from_relative,
+            relative_from_clip,
+            camera,
+            focal_length_pixels,
+            level_tint,
+            mean_cover,
+        }
+    );
     twin!(
         layouts,
         "Light",
         LightUniform {
             key_direction,
+            exposure,
             key_illuminance,
+            scotopic_strength,
             sun_direction,
+            sun_disc_cosine,
             sun_radiance,
+            star_cells,
             moon_direction,
+            moon_disc_cosine,
             moon_radiance,
+            star_density,
             sky,
-            fog,
-            sky_frame,
-            night,
+            fog_extinction,
+            fog_inverse_scale_height,
+            scotopic_tint,
+            scotopic_amount,
             star_frame,
-            stars,
+            sky_axis,
+            star_seed,
         }
     );
-    twin!(layouts, "Cascade", CascadeUniform { map_from_relative, size });
-    twin!(layouts, "Shadow", ShadowUniform { cascades, count, ground });
+    twin!(layouts, "Cascade", CascadeUniform { map_from_relative, texel, radius });
+    twin!(layouts, "Shadow", ShadowUniform { cascades, ground, cascade_count, inverse_map_size });
     twin!(layouts, "CascadeView", CascadeViewUniform { clip_from_anchor, direction });
     twin!(
         layouts,
@@ -210,9 +229,44 @@ fn gpu_structs_are_what_the_shaders_think() {
         ForestViewUniform { anchor_cell, anchor_offset, anchor_y, cell_size, fade_start, fade_end }
     );
     twin!(layouts, "Plane", PlaneUniform { center, u, v, normal });
-    twin!(layouts, "Variant", VariantUniform { planes, size, transmission, spread, gloss, scattered, scattered_rise });
-    twin!(layouts, "Part", PartUniform { base_color, transmission, gloss });
-    twin!(layouts, "Transfer", TransferUniform { scale, form, scattered });
+    twin!(
+        layouts,
+        "Variant",
+        VariantUniform {
+            planes,
+            height,
+            crown_radius,
+            first_layer,
+            first_light_layer,
+            transmission,
+            radiance_transfer,
+            isotropic_fraction,
+            specular_reflectance,
+            roughness,
+            realigned,
+            indirect_sun_zenith,
+            indirect_sun_color,
+            indirect_sun_mean,
+        }
+    );
+    twin!(
+        layouts,
+        "Part",
+        PartUniform { base_color, realigned, transmission, specular_reflectance, roughness }
+    );
+    twin!(
+        layouts,
+        "Transfer",
+        TransferUniform {
+            scale,
+            vertex_words,
+            mean_words,
+            side_words,
+            indirect_sun_start,
+            indirect_sun_color,
+            indirect_sun_scale,
+        }
+    );
     twin!(layouts, "Tree", PackedTree { xz, y, cell, look });
     twin!(layouts, "Tile", GpuTile { origin, spacing, first, morph_start, morph_end, clearance, level });
     twin!(layouts, "TileVertex", GpuTileVertex { height, parent_height, normal, parent_normal });
@@ -221,7 +275,7 @@ fn gpu_structs_are_what_the_shaders_think() {
 
 #[test]
 fn every_bound_struct_has_its_twin_tested() {
-    // Structs that no buffer holds, or (MeshPlace) that are one matrix.
+    // Structs that no buffer holds, or (MeshPosition) that are one matrix.
     let twins = [
         "Frame",
         "Light",
@@ -234,7 +288,7 @@ fn every_bound_struct_has_its_twin_tested() {
         "Tree",
         "Tile",
         "TileVertex",
-        "MeshPlace",
+        "MeshPosition",
     ];
     for (place, module) in modules() {
         for (_, variable) in module.global_variables.iter().filter(|(_, variable)| variable.binding.is_some()) {

@@ -24,8 +24,8 @@ fn night_vision(color: vec3<f32>) -> vec3<f32> {
         vec3(0.1804375, 0.0721750, 0.9503041),
     ) * color;
     let v = max(xyz.y * (1.33 * (1.0 + (xyz.y + xyz.z) / max(xyz.x, 1e-12)) - 1.68) / 2.573, 0.0);
-    let nits = max(xyz.y / light.sky_frame.z, 1e-12);
+    let nits = max(xyz.y / light.exposure, 1e-12);
     let sigma = clamp((log2(nits) * 0.30103 + 2.0) / 2.6, 0.0, 1.0);
     let rods = 1.0 - sigma * sigma * (3.0 - 2.0 * sigma);
-    return mix(color, light.night.rgb * v, min(light.night.w, light.sky_frame.w * rods));
+    return mix(color, light.scotopic_tint * v, min(light.scotopic_amount, light.scotopic_strength * rods));
 }

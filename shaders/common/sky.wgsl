@@ -11,7 +11,7 @@ const HORIZON_ROW: f32 = 72.0;
 
 // Radiance of the sky without sun and moon, exposed. `direction` has unit length.
 fn sky_radiance(direction: vec3<f32>) -> vec3<f32> {
-    let a = light.sky_frame.xy;
+    let a = light.sky_axis;
     let h = direction.xz;
     var phi = 0.0;
     if dot(h, h) > 1e-12 {
@@ -36,18 +36,19 @@ fn sky_irradiance(n: vec3<f32>) -> vec3<f32> {
     return max(sum, vec3(0.0));
 }
 
-// Irradiance over pi that the sky brings to what has these two bands of transfer: a vector, and in w the first coefficient.
-fn sky_transfer(side: vec4<f32>) -> vec3<f32> {
+// Irradiance over pi that the sky brings to what has these two bands of transfer: the first coefficient `mean`, and the second
+// band's `vector`.
+fn sky_transfer(mean: f32, vector: vec3<f32>) -> vec3<f32> {
     let s = &light.sky;
     // The light is kept as a Lambertian surface returns it: its second band times 2/3.
-    let band = side.y * (*s)[2].rgb - side.x * (*s)[1].rgb - side.z * (*s)[3].rgb;
-    return max(side.w * (*s)[0].rgb + 1.5 * band, vec3(0.0));
+    let band = vector.y * (*s)[2].rgb - vector.x * (*s)[1].rgb - vector.z * (*s)[3].rgb;
+    return max(mean * (*s)[0].rgb + 1.5 * band, vec3(0.0));
 }
 
 // Optical depth of a haze whose density falls exponentially with height, along a straight ray.
 fn fog_optical_depth(relative: vec3<f32>) -> f32 {
     let distance = length(relative);
-    let inverse_scale = light.fog.w;
+    let inverse_scale = light.fog_inverse_scale_height;
     let start = exp(-max(frame.camera.y, 0.0) * inverse_scale);
     let rise = clamp(relative.y * inverse_scale, -20.0, 20.0);
     // (1 - e^-x) / x, by its series where x vanishes.
@@ -59,7 +60,7 @@ fn fog_optical_depth(relative: vec3<f32>) -> f32 {
 // that side: the bright rim around a low sun belongs to the whole path to the horizon, most of which is not there, or lies
 // in the shadow of the land.
 fn apply_fog(color: vec3<f32>, relative: vec3<f32>) -> vec3<f32> {
-    let transmittance = exp(-light.fog.rgb * fog_optical_depth(relative));
+    let transmittance = exp(-light.fog_extinction * fog_optical_depth(relative));
     let direction = relative / max(length(relative), 1e-3);
     let mean = sky_irradiance(normalize(vec3(direction.x, max(direction.y, 0.4), direction.z)));
     let rim = sky_radiance(normalize(vec3(direction.x, max(direction.y, 0.03), direction.z)));

@@ -30,27 +30,36 @@ struct Plane {
 
 struct Variant {
     planes: array<Plane, 3>,
-    // x: height in metres, y: crown radius, z: first layer of its pictures, w: 1 where it has a full model.
-    size: vec4<f32>,
-    // Transmission of its leaves; w: 1 where k_a was traced and holds what leaves send each other.
-    transmission: vec4<f32>,
-    // How far the leaves of a texel face everywhere, 0..1, mip by mip.
-    spread: array<vec4<f32>, 2>,
-    // Gloss of its leaves: reflectance, roughness, 1 where normals point out of the crown; w: first layer of its lighting
-    // pictures.
-    gloss: vec4<f32>,
-    // Light of the key light that its leaves send each other, in the mean (scattered_sun in transfer.wgsl): colour; w: the
-    // first coefficient. Where it comes from: x: the second band's rise towards the zenith.
-    scattered: vec4<f32>,
-    scattered_rise: vec4<f32>,
+    // Metres.
+    height: f32,
+    crown_radius: f32,
+    // First layer of its textures, and of its lighting textures.
+    first_layer: u32,
+    first_light_layer: u32,
+    // Factor for light through its leaves, as in `Surface`.
+    transmission: vec3<f32>,
+    // 1 where it is lit by radiance transfer: its ambient visibility is traced, and holds what leaves scatter.
+    radiance_transfer: u32,
+    // Fraction of a texel's leaf area with isotropic normals, 0..1, mip by mip.
+    isotropic_fraction: array<vec4<f32>, 2>,
+    // Gloss of its leaves.
+    specular_reflectance: f32,
+    roughness: f32,
+    // 1 where the foliage's normals point out of the crown, else 0.
+    realigned: f32,
+    // Indirect light of the key light (indirect_sun in transfer.wgsl) in the mean over its leaves: the component of the second
+    // band towards the zenith, the first coefficient, and its colour.
+    indirect_sun_zenith: f32,
+    indirect_sun_color: vec3<f32>,
+    indirect_sun_mean: f32,
 }
 
 struct Instance {
     // Foot relative to the anchor, metres.
     position: vec3<f32>,
-    // Cosine and sine of the yaw.
+    // Cosine and sine of the yaw, x and y.
     yaw: vec2<f32>,
-    // The yaw in 256ths of a turn.
+    // The yaw in 256ths of a full rotation.
     yaw_code: u32,
     scale: f32,
     variant: u32,
@@ -79,8 +88,8 @@ fn unpack_tree(tree: Tree) -> Instance {
     return instance;
 }
 
-// Plant frame to world axes: a turn about Y.
-fn turn(v: vec3<f32>, yaw: vec2<f32>) -> vec3<f32> {
+// Plant frame to world axes: a rotation about Y.
+fn rotate(v: vec3<f32>, yaw: vec2<f32>) -> vec3<f32> {
     return vec3(yaw.x * v.x + yaw.y * v.z, v.y, -yaw.y * v.x + yaw.x * v.z);
 }
 
@@ -95,13 +104,13 @@ struct VertexPosition {
 // Where a tree has the vertex that its plant has at `local` (metres in the plant's frame). All vertex shaders of plants
 // take their positions from here, those of shadows too.
 fn plant_vertex_position(tree: Instance, local: vec3<f32>) -> VertexPosition {
-    return turned_vertex_position(tree, turn(local, tree.yaw));
+    return rotated_vertex_position(tree, rotate(local, tree.yaw));
 }
 
-// The same for a position in the plant that is turned into world axes already.
-fn turned_vertex_position(tree: Instance, turned: vec3<f32>) -> VertexPosition {
+// The same for a position in the plant that is rotated into world axes already.
+fn rotated_vertex_position(tree: Instance, rotated: vec3<f32>) -> VertexPosition {
     var position: VertexPosition;
-    position.from_foot = turned * tree.scale;
+    position.from_foot = rotated * tree.scale;
     position.relative = tree.position + position.from_foot;
     return position;
 }
@@ -122,15 +131,14 @@ fn tint_foliage(albedo: vec3<f32>, tint: f32) -> vec3<f32> {
     return albedo * (1.0 + tint * vec3(0.18, 0.07, -0.05));
 }
 
-// Ambient light at a visibility k: what does not come from the sky comes from other leaves, by their albedo. The share is
-// fitted to the path tracer (benches/expressive.rs).
-fn scattered(k: f32) -> f32 {
+// Ambient light at an ambient visibility `k`: what does not come from the sky comes from other leaves, by their albedo. The
+// share is fitted to the path tracer (benches/expressive.rs).
+fn with_indirect_ambient(k: f32) -> f32 {
     return k + (1.0 - k) * 0.13;
 }
 
-// Share of the key light that reaches a leaf of ambient visibility k past the leaves around it, for which the shadow
-// maps are too coarse: what sees little of the sky mostly lies in shade. Where the map is fine, k says nothing that the
-// map does not know, and 0.8 + 0.75 k, at most 1.3, would be a little nearer (benches/expressive.rs).
+// Share of the key light that reaches a leaf of ambient visibility `k` past the leaves around it, for which the shadow
+// maps are too coarse: what sees little of the sky mostly lies in shade. Where the map is fine, `k` adds nothing to it, and 0.8 + 0.75 k, at most 1.3, would be a little nearer (benches/expressive.rs).
 fn leaf_visibility(k: f32) -> f32 {
     return min(0.35 + 2.0 * k, 1.1);
 }

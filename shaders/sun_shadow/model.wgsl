@@ -28,8 +28,8 @@ fn alpha(uv: vec2<f32>) -> f32 {
     let size = vec2<f32>(textureDimensions(color_texture));
     let texels = max(fwidth(uv.x) * size.x, fwidth(uv.y) * size.y);
     let level = clamp(i32(log2(max(texels, 1.0))), 0, i32(textureNumLevels(color_texture)) - 1);
-    let place = fract(uv) * vec2<f32>(textureDimensions(color_texture, level));
-    return textureLoad(color_texture, vec2<i32>(place), level).a;
+    let position = fract(uv) * vec2<f32>(textureDimensions(color_texture, level));
+    return textureLoad(color_texture, vec2<i32>(position), level).a;
 }
 
 @fragment

@@ -49,11 +49,18 @@ const SET_BYTES: u64 = (YAWS * STRIDE * size_of::<[f32; 4]>()) as u64;
 pub struct TransferUniform {
     /// What 127 stands for in each coefficient after the first, relative to it, four a word of codes.
     pub scale: [[f32; 4]; WORDS],
-    /// Words from one vertex to the next, of its means, and of the codes of one side and channel; where the codes of the key
-    /// light that leaves send each other begin.
-    pub form: [u32; 4],
-    /// Colour of the key light that leaves send each other; w: what 127 stands for in its codes.
-    pub scattered: [f32; 4],
+    /// Words from one vertex to the next.
+    pub vertex_words: u32,
+    /// Words of a vertex's means, which stand first.
+    pub mean_words: u32,
+    /// Words of the codes of one side and channel.
+    pub side_words: u32,
+    /// Where the codes of the indirect key light begin, a word a vertex.
+    pub indirect_sun_start: u32,
+    /// Colour of the indirect key light, which leaves send each other.
+    pub indirect_sun_color: [f32; 3],
+    /// What 127 stands for in its codes.
+    pub indirect_sun_scale: f32,
 }
 
 impl TransferUniform {
@@ -62,12 +69,14 @@ impl TransferUniform {
         for (i, scale) in scale.iter_mut().enumerate() {
             *scale = part.scale.get((i + 1).isqrt()).copied().unwrap_or(0.0);
         }
-        let form =
-            [part.vertex_bytes / 4, mean_words(settings, part.sides), code_words(settings), part.bytes.len() / 4];
         Self {
             scale: bytemuck::cast(scale),
-            form: form.map(|words| words as u32),
-            scattered: tint.extend(part.scattered_scale).to_array(),
+            vertex_words: (part.vertex_bytes / 4) as u32,
+            mean_words: mean_words(settings, part.sides) as u32,
+            side_words: code_words(settings) as u32,
+            indirect_sun_start: (part.bytes.len() / 4) as u32,
+            indirect_sun_color: tint.to_array(),
+            indirect_sun_scale: part.scattered_scale,
         }
     }
 }

@@ -87,8 +87,6 @@ pub struct PreparedView {
     pub focal_pixels: f32,
     /// Factor from radiance to the attachment's values.
     pub exposure: f32,
-    /// Width and height in pixels.
-    pub size: Vec2,
 }
 
 /// The one view that Canopy draws, if a camera asks for it.
@@ -227,7 +225,6 @@ pub fn prepare_frame(
         samples: msaa.samples(),
         focal_pixels: 0.5 * size.y * view.clip_from_view.y_axis.y.abs(),
         exposure: camera.exposure,
-        size,
     });
 }
 
@@ -251,9 +248,11 @@ fn prepare_bind_group(
     let frame_uniform = FrameUniform {
         clip_from_relative: view.clip_from_relative.to_cols_array_2d(),
         relative_from_clip: view.clip_from_relative.inverse().to_cols_array_2d(),
-        camera: [modulo(view.camera.x), view.camera.y as f32, modulo(view.camera.z), view.focal_pixels],
-        viewport: [view.size.x, view.size.y, 1.0 / view.size.x, 1.0 / view.size.y],
-        flags: [f32::from(view.samples > 1), f32::from(scene.options.tint_levels), ground.mean_cover, 0.0],
+        camera: [modulo(view.camera.x), view.camera.y as f32, modulo(view.camera.z)],
+        focal_length_pixels: view.focal_pixels,
+        level_tint: f32::from(scene.options.tint_levels),
+        mean_cover: ground.mean_cover,
+        padding: [0.0; 2],
     };
     let light_uniform = light::light_uniform(&daylight.0, view.exposure);
     let shadow_uniform = shadows.uniform(view.camera, ground.placement(view.camera));

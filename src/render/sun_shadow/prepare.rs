@@ -56,8 +56,10 @@ pub const SHADOW_FORMAT: TextureFormat = TextureFormat::Depth32Float;
 pub struct CascadeViewUniform {
     /// Metres relative to the box's centre to the map's clip space.
     pub clip_from_anchor: [[f32; 4]; 4],
-    /// To the light.
-    pub direction: [f32; 4],
+    /// Unit vector to the light.
+    pub direction: [f32; 3],
+    /// WGSL rounds the size up to 16 bytes.
+    pub padding: f32,
 }
 
 /// Bind group layouts of casters.
@@ -195,10 +197,18 @@ impl ShadowMaps {
         for (slot, cascade) in cascades.iter_mut().zip(&self.cascades) {
             *slot = CascadeUniform {
                 map_from_relative: cascade.clip_from_camera(camera).to_cols_array_2d(),
-                size: [cascade.texel as f32, cascade.radius as f32, 2.0 * cascade.half_depth as f32, 0.0],
+                texel: cascade.texel as f32,
+                radius: cascade.radius as f32,
+                padding: [0.0; 2],
             };
         }
-        ShadowUniform { cascades, count: [self.cascades.len() as f32, 1.0 / self.map_size as f32, 0.0, 0.0], ground }
+        ShadowUniform {
+            cascades,
+            ground,
+            cascade_count: self.cascades.len() as i32,
+            inverse_map_size: 1.0 / self.map_size as f32,
+            padding: [0.0; 2],
+        }
     }
 
     fn resize(&mut self, device: &RenderDevice, settings: &SunShadowSettings) {
@@ -287,7 +297,8 @@ pub fn prepare_shadows(
         let content = DrawnCascade { key, seen_by: seen.as_ref().map(|_| this_view) };
         let uniform = CascadeViewUniform {
             clip_from_anchor: place.clip_from_anchor().to_cols_array_2d(),
-            direction: place.direction.as_vec3().extend(0.0).to_array(),
+            direction: place.direction.as_vec3().to_array(),
+            padding: 0.0,
         };
         queue.write_buffer(&maps.cascade_uniforms, index as u64 * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));
         // A coarse map could not show a proxy; and near the camera, a finer map has the trees' own shadows already.
