@@ -1,11 +1,13 @@
 // What every pass of a view shares: bind group 0. Rust twins in src/render/frame/uniforms.rs.
 #define_import_path canopy::frame
 
+#import canopy::constants::MAX_CASCADES
+
 struct Frame {
     // Camera-relative metres (world axes, camera at the origin) to clip space, reversed depth.
     clip_from_relative: mat4x4<f32>,
     relative_from_clip: mat4x4<f32>,
-    // Camera position: x and z modulo NOISE_PERIOD, y above the datum; metres.
+    // Camera position: x and z modulo the period of the ground's noise, y above the datum; metres.
     camera: vec3<f32>,
     focal_length_pixels: f32,
     // 1 where trees are tinted by their level of detail, else 0.
@@ -70,8 +72,6 @@ struct Cascade {
     radius: f32,
 }
 
-const MAX_CASCADES: i32 = 4;
-
 struct Shadow {
     cascades: array<Cascade, MAX_CASCADES>,
     ground: GroundMap,
@@ -80,8 +80,6 @@ struct Shadow {
     // One over the map's size in texels.
     inverse_map_size: f32,
 }
-
-const NOISE_PERIOD: f32 = 1024.0;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> light: Light;

@@ -1,13 +1,10 @@
 // Sky radiance from the look-up table of src/light/atmosphere [Hillaire 2020, 5.3], and the fog that fits it.
 #define_import_path canopy::sky
 
+#import canopy::constants::{SKY_COLUMNS, SKY_ROWS, SKY_HORIZON_ROW}
 #import canopy::frame::{frame, light, sky_texture, sky_sampler}
 
 const PI: f32 = 3.14159265;
-
-// Columns and rows of the table, and the row of the horizon: src/light/atmosphere/sky_view.rs.
-const SKY_SIZE: vec2<f32> = vec2(129.0, 97.0);
-const HORIZON_ROW: f32 = 72.0;
 
 // Radiance of the sky without sun and moon, exposed. `direction` has unit length.
 fn sky_radiance(direction: vec3<f32>) -> vec3<f32> {
@@ -18,11 +15,11 @@ fn sky_radiance(direction: vec3<f32>) -> vec3<f32> {
         phi = atan2(a.x * h.y - a.y * h.x, dot(h, a));
     }
     let u = sign(phi) * sqrt(min(abs(phi) / PI, 1.0));
-    let column = (0.5 + 0.5 * u) * (SKY_SIZE.x - 1.0);
+    let column = (0.5 + 0.5 * u) * (SKY_COLUMNS - 1.0);
     let steepness = sqrt(min(abs(asin(clamp(direction.y, -1.0, 1.0))) / (0.5 * PI), 1.0));
-    let below = HORIZON_ROW + (SKY_SIZE.y - 1.0 - HORIZON_ROW) * steepness;
-    let row = select(below, HORIZON_ROW * (1.0 - steepness), direction.y >= 0.0);
-    return textureSampleLevel(sky_texture, sky_sampler, (vec2(column, row) + 0.5) / SKY_SIZE, 0.0).rgb;
+    let below = SKY_HORIZON_ROW + (SKY_ROWS - 1.0 - SKY_HORIZON_ROW) * steepness;
+    let row = select(below, SKY_HORIZON_ROW * (1.0 - steepness), direction.y >= 0.0);
+    return textureSampleLevel(sky_texture, sky_sampler, (vec2(column, row) + 0.5) / vec2(SKY_COLUMNS, SKY_ROWS), 0.0).rgb;
 }
 
 // Radiance that a white Lambertian surface returns under the sky: src/light/sh.rs fixes signs and order.

@@ -2,6 +2,7 @@
 // that of src/light/stand.rs, exposed.
 #define_import_path canopy::stand
 
+#import canopy::constants::{STAND_COVERS, STAND_DEPTHS}
 #import canopy::frame::{stand_texture, sky_sampler}
 
 struct StandLight {
@@ -15,14 +16,10 @@ struct StandLight {
     upwelling: vec3<f32>,
 }
 
-// Covers, depths and rows of the table: the last row is the ground's.
-const COVERS: f32 = 16.0;
-const DEPTHS: f32 = 16.0;
-const ROWS: f32 = 17.0;
-
+// In the row of a depth; the last row is the ground's.
 fn look_up(cover: f32, row: f32) -> StandLight {
-    let u = (clamp(cover, 0.0, 1.0) * (COVERS - 1.0) + 0.5) / COVERS;
-    let v = (row + 0.5) / (3.0 * ROWS);
+    let u = (clamp(cover, 0.0, 1.0) * (STAND_COVERS - 1.0) + 0.5) / STAND_COVERS;
+    let v = (row + 0.5) / (3.0 * (STAND_DEPTHS + 1.0));
     let first = textureSampleLevel(stand_texture, sky_sampler, vec2(u, v), 0.0);
     var stand: StandLight;
     stand.sky_transmittance = first.rgb;
@@ -34,12 +31,12 @@ fn look_up(cover: f32, row: f32) -> StandLight {
 
 // Where crowns cover the share `cover` of the ground, at a depth of 0 (the tops) to 1 (the ground).
 fn stand_light(cover: f32, depth: f32) -> StandLight {
-    return look_up(cover, clamp(depth, 0.0, 1.0) * (DEPTHS - 1.0));
+    return look_up(cover, clamp(depth, 0.0, 1.0) * (STAND_DEPTHS - 1.0));
 }
 
 // On the ground.
 fn ground_light(cover: f32) -> StandLight {
-    return look_up(cover, DEPTHS);
+    return look_up(cover, STAND_DEPTHS);
 }
 
 // Spherical harmonics of the first two bands in a direction, not below zero: the first coefficient, and the second band's

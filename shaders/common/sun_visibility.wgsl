@@ -2,7 +2,8 @@
 // horizon that the terrain raises towards the light (src/terrain/sun_horizon.rs).
 #define_import_path canopy::sun_visibility
 
-#import canopy::frame::{frame, light, shadow, shadow_map, shadow_sampler, ground_texture, sky_sampler, MAX_CASCADES}
+#import canopy::constants::MAX_CASCADES
+#import canopy::frame::{frame, light, shadow, shadow_map, shadow_sampler, ground_texture, sky_sampler}
 
 // What the ground map has below a point.
 struct GroundSample {

@@ -1,4 +1,5 @@
 // Crossed billboards [Franzke 2005, 4.3]: two upright planes and a level one, eighteen pulled vertices a tree.
+#import canopy::constants::{CROSS_VERTICES, PLANES, SPREAD_LEVELS, LIGHT_SCALE, WHOLE, FADE_SPAN, GONE}
 #import canopy::frame::{frame, light}
 #import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, cross_threshold, tint_foliage, with_indirect_ambient, leaf_visibility}
 #import canopy::lighting::{Surface, shade, even_sky, leaf_transmission}
@@ -13,9 +14,6 @@
 #ifdef TRANSFER
 // How the sky's light reaches the leaves: src/bake/billboard/light.rs.
 @group(3) @binding(0) var light_textures: texture_2d_array<f32>;
-
-// What 1 stands for in them.
-const LIGHT_SCALE: f32 = 0.4;
 #endif
 
 struct Varying {
@@ -52,18 +50,13 @@ fn unpack_look(packed: vec4<f32>) -> Look {
     return Look(packed.x, packed.y, packed.z, packed.w);
 }
 
-const VERTICES_A_TREE: u32 = 18u;
-const PLANES: u32 = 3u;
-// Mips for which the spread is known: src/bake/billboard/mod.rs.
-const SPREAD_LEVELS: f32 = 8.0;
-
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     var corners = array<vec2<f32>, 6>(
         vec2(-1.0, -1.0), vec2(1.0, -1.0), vec2(1.0, 1.0), vec2(-1.0, -1.0), vec2(1.0, 1.0), vec2(-1.0, 1.0),
     );
-    let tree = unpack_tree(trees[visible[index / VERTICES_A_TREE]]);
-    let plane_index = (index % VERTICES_A_TREE) / 6u;
+    let tree = unpack_tree(trees[visible[index / CROSS_VERTICES]]);
+    let plane_index = (index % CROSS_VERTICES) / 6u;
     let corner = corners[index % 6u];
     let plane = variants[tree.variant].planes[plane_index];
     let height = max(variants[tree.variant].height * tree.scale, 0.01);
@@ -74,14 +67,14 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     // A plane vanishes as it is seen edge-on: its texture is nothing but a streak there. The level plane comes in only
     // when looked down on; from the side it would be a shelf in the crown.
     let level = plane_index == 2u;
-    let edge = 0.5 + 0.51 * (1.0 - smoothstep(select(0.10, 0.42, level), select(0.34, 0.72, level), abs(toward)));
+    let edge = WHOLE + FADE_SPAN * (1.0 - smoothstep(select(0.10, 0.42, level), select(0.34, 0.72, level), abs(toward)));
     let threshold = max(cross_threshold(length(tree.position.xz)), edge);
 
     var out: Varying;
     let position = plant_vertex_position(tree, plane.center.xyz + corner.x * plane.u.xyz + corner.y * plane.v.xyz);
     out.relative = position.relative;
     out.clip = frame.clip_from_relative * vec4(out.relative, 1.0);
-    if threshold >= 1.0 {
+    if threshold >= GONE {
         // Nothing would pass the test: no area, no fragments. Inside the view, as clipping costs more than rejection.
         out.clip = vec4(0.0, 0.0, 0.5, 1.0);
     }
@@ -191,9 +184,9 @@ fn hot_spot(viewer: vec3<f32>) -> f32 {
 
 // Fraction of a texel's leaf area with isotropic normals.
 fn isotropic_fraction(variant: u32, level: f32) -> f32 {
-    let at = clamp(level, 0.0, SPREAD_LEVELS - 1.0);
+    let at = clamp(level, 0.0, f32(SPREAD_LEVELS - 1u));
     let finer = u32(at);
-    let coarser = min(finer + 1u, u32(SPREAD_LEVELS) - 1u);
+    let coarser = min(finer + 1u, SPREAD_LEVELS - 1u);
     let fraction = &variants[variant].isotropic_fraction;
     return mix((*fraction)[finer / 4u][finer % 4u], (*fraction)[coarser / 4u][coarser % 4u], fract(at));
 }

@@ -1,6 +1,10 @@
 // Trees of 16 bytes: src/scatter/packed.rs packs what this unpacks.
 #define_import_path canopy::instance
 
+#import canopy::constants::{PLACE_STEPS, YAW_BITS, YAWS, SCALE_SHIFT, SCALE_BITS, SCALE_STEPS, SCALE_OCTAVES, LEAST_SCALE_LOG2}
+#import canopy::constants::{VARIANT_SHIFT, VARIANT_BITS, TINT_SHIFT, TINT_BITS, TINT_STEPS}
+#import canopy::constants::{PLANES, SPREAD_VECTORS, WHOLE, FADE_SPAN}
+
 struct Tree {
     xz: u32,
     y: f32,
@@ -29,7 +33,7 @@ struct Plane {
 }
 
 struct Variant {
-    planes: array<Plane, 3>,
+    planes: array<Plane, PLANES>,
     // Metres.
     height: f32,
     crown_radius: f32,
@@ -41,7 +45,7 @@ struct Variant {
     // 1 where it is lit by radiance transfer: its ambient visibility is traced, and holds what leaves scatter.
     radiance_transfer: u32,
     // Fraction of a texel's leaf area with isotropic normals, 0..1, mip by mip.
-    isotropic_fraction: array<vec4<f32>, 2>,
+    isotropic_fraction: array<vec4<f32>, SPREAD_VECTORS>,
     // Gloss of its leaves.
     specular_reflectance: f32,
     roughness: f32,
@@ -59,7 +63,7 @@ struct Instance {
     position: vec3<f32>,
     // Cosine and sine of the yaw, x and y.
     yaw: vec2<f32>,
-    // The yaw in 256ths of a full rotation.
+    // The yaw in steps of a full rotation over YAWS.
     yaw_code: u32,
     scale: f32,
     variant: u32,
@@ -74,17 +78,19 @@ struct Instance {
 
 fn unpack_tree(tree: Tree) -> Instance {
     let cell = vec2(extractBits(bitcast<i32>(tree.cell), 0u, 16u), extractBits(bitcast<i32>(tree.cell), 16u, 16u));
-    let offset = vec2(f32(tree.xz & 0xffffu), f32(tree.xz >> 16u)) * (view.cell_size / 65535.0);
+    let offset = vec2(f32(tree.xz & 0xffffu), f32(tree.xz >> 16u)) * (view.cell_size / PLACE_STEPS);
     let xz = vec2<f32>(cell - view.anchor_cell) * view.cell_size + (offset - view.anchor_offset);
-    let yaw_code = tree.look & 0xffu;
-    let yaw = f32(yaw_code) * (6.28318531 / 256.0);
+    let yaw_code = extractBits(tree.look, 0u, YAW_BITS);
+    let yaw = f32(yaw_code) * (6.28318531 / f32(YAWS));
+    let scale_code = extractBits(tree.look, SCALE_SHIFT, SCALE_BITS);
+    let tint_code = extractBits(bitcast<i32>(tree.look), TINT_SHIFT, TINT_BITS);
     var instance: Instance;
     instance.yaw_code = yaw_code;
     instance.position = vec3(xz.x, tree.y - view.anchor_y, xz.y);
     instance.yaw = vec2(cos(yaw), sin(yaw));
-    instance.scale = exp2(f32((tree.look >> 8u) & 0xfffu) * (8.0 / 4095.0) - 4.0);
-    instance.variant = (tree.look >> 20u) & 0x3fu;
-    instance.tint = max(f32(extractBits(bitcast<i32>(tree.look), 26u, 6u)) / 31.0, -1.0);
+    instance.scale = exp2(f32(scale_code) * (SCALE_OCTAVES / SCALE_STEPS) + LEAST_SCALE_LOG2);
+    instance.variant = extractBits(tree.look, VARIANT_SHIFT, VARIANT_BITS);
+    instance.tint = max(f32(tint_code) / TINT_STEPS, -1.0);
     return instance;
 }
 
@@ -118,12 +124,12 @@ fn rotated_vertex_position(tree: Instance, rotated: vec3<f32>) -> VertexPosition
 // Thresholds of the alpha test over the distance: the CPU twin is src/lod/mod.rs.
 fn model_threshold(distance: f32) -> f32 {
     let middle = 0.5 * (view.fade_start + view.fade_end);
-    return 0.5 + 0.51 * clamp((distance - middle) / max(view.fade_end - middle, 1e-3), 0.0, 1.0);
+    return WHOLE + FADE_SPAN * clamp((distance - middle) / max(view.fade_end - middle, 1e-3), 0.0, 1.0);
 }
 
 fn cross_threshold(distance: f32) -> f32 {
     let middle = 0.5 * (view.fade_start + view.fade_end);
-    return 0.5 + 0.51 * clamp((middle - distance) / max(middle - view.fade_start, 1e-3), 0.0, 1.0);
+    return WHOLE + FADE_SPAN * clamp((middle - distance) / max(middle - view.fade_start, 1e-3), 0.0, 1.0);
 }
 
 // Individual shift of the foliage's hue and brightness.

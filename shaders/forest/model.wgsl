@@ -1,4 +1,5 @@
 // The full model of a tree, near the camera.
+#import canopy::constants::{NORMAL_STEPS, NORMAL_LEAST_LENGTH, WHOLE}
 #import canopy::frame::{frame, light}
 #import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, model_threshold, tint_foliage, with_indirect_ambient, leaf_visibility}
 #import canopy::lighting::{Surface, shade, exitant, even_sky, leaf_transmission}
@@ -7,7 +8,10 @@
 #import canopy::sun_visibility::{sample_ground, terrain_visibility, cascaded_visibility}
 
 #ifdef TRANSFER
-#import canopy::transfer::{light_sides, light_in_stand, indirect_sun, SUN_ROWS}
+#import canopy::transfer::{light_sides, light_in_stand, indirect_sun}
+#endif
+#ifdef SUN_HARMONICS
+#import canopy::constants::YAWS
 #endif
 
 struct Part {
@@ -19,9 +23,6 @@ struct Part {
     specular_reflectance: f32,
     roughness: f32,
 }
-
-// Length of a stored normal whose ambient visibility is zero.
-const LEAST_LENGTH: f32 = 0.25;
 
 @group(2) @binding(0) var color_texture: texture_2d<f32>;
 @group(2) @binding(1) var normal_texture: texture_2d<f32>;
@@ -89,10 +90,10 @@ fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index
     var out: Varying;
     out.relative = position.relative;
     out.clip = frame.clip_from_relative * vec4(position.relative, 1.0);
-    let stored = in.normal.xyz * (1023.0 / 511.0) - 1.0;
+    let stored = in.normal.xyz * ((2.0 * NORMAL_STEPS + 1.0) / NORMAL_STEPS) - 1.0;
     let size = max(length(stored), 1e-6);
     out.normal = rotate(stored / size, tree.yaw);
-    let ambient = saturate((size - LEAST_LENGTH) / (1.0 - LEAST_LENGTH));
+    let ambient = saturate((size - NORMAL_LEAST_LENGTH) / (1.0 - NORMAL_LEAST_LENGTH));
     out.uv = in.uv;
     let height = max(variants[tree.variant].height * tree.scale, 0.01);
     let look = Look(ambient, position.from_foot.y, position.from_foot.y / height, tree.tint);
@@ -112,7 +113,7 @@ fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index
 #endif
 #endif
 #ifdef SUN_HARMONICS
-    let sun = light_sides(vertex, SUN_ROWS + tree.yaw_code);
+    let sun = light_sides(vertex, YAWS + tree.yaw_code);
     out.front_sun = sun.front;
     out.back_sun = sun.back;
 #endif
@@ -171,7 +172,7 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
 #else
     normal = detail_normal(normal, in.relative, in.uv);
     let keep = hash(vec3(in.uv * 97.0, look.height * 31.0));
-    if 0.5 + 0.5 * keep < in.threshold - 1e-4 {
+    if WHOLE + (1.0 - WHOLE) * keep < in.threshold - 1e-4 {
         discard;
     }
 #endif

@@ -2,12 +2,13 @@
 // src/bake/transfer/pack.rs packed.
 #define_import_path canopy::transfer
 
+#import canopy::constants::{LIGHT_STRIDE, TRANSFER_WORDS}
 #import canopy::frame::light
 #import canopy::stand::{StandLight, in_stand_by_transfer, evaluate_two_bands}
 
 struct Transfer {
     // What 127 stands for in each coefficient after the first, relative to it, four a word of codes.
-    scale: array<vec4<f32>, 9>,
+    scale: array<vec4<f32>, TRANSFER_WORDS>,
     // Words from one vertex to the next.
     vertex_words: u32,
     // Words of a vertex's means, which stand first.
@@ -27,11 +28,6 @@ struct Sides {
     front: vec3<f32>,
     back: vec3<f32>,
 }
-
-// Vectors from one yaw's light to the next: the first coefficient, then red, green and blue of each word of four.
-const LIGHT_STRIDE: u32 = 28u;
-// The first row of the sun's light.
-const SUN_ROWS: u32 = 256u;
 
 // The surroundings' light as a plant of each yaw sees it, then, where a plant wants it, the sun's.
 @group(3) @binding(0) var<storage, read> light_by_yaw: array<vec4<f32>>;
@@ -113,7 +109,7 @@ fn indirect_sun(vertex: u32, to_light: vec3<f32>) -> vec3<f32> {
 }
 
 // Irradiance over pi that the light of a row brings to the sides of a vertex. The row is the tree's yaw for the
-// surroundings, SUN_ROWS more for the sun.
+// surroundings, YAWS more for the sun.
 fn light_sides(vertex: u32, row: u32) -> Sides {
     let first = vertex * transfer.vertex_words;
     let codes = first + transfer.mean_words;

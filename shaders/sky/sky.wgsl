@@ -1,4 +1,5 @@
 // The sky behind everything: the radiance table, the sun's and the moon's disc, stars.
+#import canopy::constants::LUX_OF_MAGNITUDE_0
 #import canopy::frame::{frame, light}
 #import canopy::output::finish_sky
 #import canopy::sky::sky_radiance
@@ -38,9 +39,6 @@ fn pcg(state: u32) -> u32 {
 fn unit(h: u32) -> f32 {
     return f32(h >> 8u) / 16777216.0;
 }
-
-// Illuminance of a star of magnitude 0 in lux [Allen 1976].
-const LUX_OF_MAGNITUDE_0: f32 = 2.54e-6;
 
 // Radiance of the procedural star field, exposed: one star at most in each cell of a cube grid.
 fn stars(direction: vec3<f32>) -> vec3<f32> {

@@ -1,5 +1,6 @@
 // Depth from the key light: far trees as one upright texture that faces the light's azimuth, so that the
 // shadow's area does not depend on it, and the level one for a high light.
+#import canopy::constants::CASTER_VERTICES
 #import canopy::instance::{trees, visible, variants, unpack_tree, rotate, rotated_vertex_position}
 #import canopy::caster::{cascade, clamp_caster}
 
@@ -11,15 +12,13 @@ struct Varying {
     @location(1) @interpolate(flat) layer: u32,
 }
 
-const VERTICES_A_TREE: u32 = 12u;
-
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     var corners = array<vec2<f32>, 6>(
         vec2(-1.0, -1.0), vec2(1.0, -1.0), vec2(1.0, 1.0), vec2(-1.0, -1.0), vec2(1.0, 1.0), vec2(-1.0, 1.0),
     );
-    let tree = unpack_tree(trees[visible[index / VERTICES_A_TREE]]);
-    let upright = (index % VERTICES_A_TREE) < 6u;
+    let tree = unpack_tree(trees[visible[index / CASTER_VERTICES]]);
+    let upright = (index % CASTER_VERTICES) < 6u;
     let corner = corners[index % 6u];
     let plane_index = select(2u, 0u, upright);
     let plane = variants[tree.variant].planes[plane_index];

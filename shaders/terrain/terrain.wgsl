@@ -1,4 +1,5 @@
 // The ground: tiles that morph into each other (src/terrain/tiles), coloured by slope, height, canopy cover and noise.
+#import canopy::constants::TILE_SIDE
 #import canopy::frame::{frame, light, shadow}
 #import canopy::lighting::{Surface, shade, even_sky}
 #import canopy::output::finish
@@ -32,8 +33,6 @@ struct Tile {
 @group(1) @binding(2) var noise_texture: texture_2d<f32>;
 @group(1) @binding(3) var noise_sampler: sampler;
 
-const SIDE: u32 = 33u;
-
 struct Varying {
     @builtin(position) clip: vec4<f32>,
     @location(0) relative: vec3<f32>,
@@ -53,7 +52,7 @@ fn decode_octahedral(packed: u32) -> vec3<f32> {
 fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: u32) -> Varying {
     let tile = tiles[instance];
     let v = vertices[tile.first + index];
-    let grid = vec2(f32(index % SIDE), f32(index / SIDE));
+    let grid = vec2(f32(index % TILE_SIDE), f32(index / TILE_SIDE));
     let xz = tile.origin + grid * tile.spacing;
     let distance = max(length(xz), tile.clearance);
     let k = clamp((distance - tile.morph_start) / (tile.morph_end - tile.morph_start), 0.0, 1.0);
@@ -65,7 +64,7 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     return out;
 }
 
-// Noise of a period that divides NOISE_PERIOD: r smooth, g fine, b patchy, a ridged; each 0..1 around 0.5.
+// Noise of a period that divides the 1024 metres of `frame.camera`: r smooth, g fine, b patchy, a ridged; each 0..1 around 0.5.
 fn noise(xz: vec2<f32>, period: f32) -> vec4<f32> {
     return textureSample(noise_texture, noise_sampler, xz / period);
 }

@@ -16,8 +16,12 @@ pub struct FadeBand {
     pub end: f32,
 }
 
+/// The threshold of the alpha test at which a representation is whole.
+pub const WHOLE: f32 = 0.5;
 /// The threshold above which nothing passes the alpha test.
 pub const GONE: f32 = 1.0;
+/// What fading adds to [`WHOLE`] until nothing is left: a little more than the way to [`GONE`].
+pub const FADE_SPAN: f32 = 0.51;
 
 impl FadeBand {
     /// A band that begins at `distance` metres and is `width` metres wide. Negative and non-finite values become 0.
@@ -34,13 +38,13 @@ impl FadeBand {
     /// Alpha threshold of the full model at `distance` metres: 0.5 (whole) to above [`GONE`].
     pub fn model_threshold(&self, distance: f32) -> f32 {
         let half = (self.end - self.middle()).max(1e-3);
-        0.5 + 0.51 * ((distance - self.middle()) / half).clamp(0.0, 1.0)
+        WHOLE + FADE_SPAN * ((distance - self.middle()) / half).clamp(0.0, 1.0)
     }
 
     /// Alpha threshold of the crosses at `distance` metres: above [`GONE`] to 0.5 (whole).
     pub fn cross_threshold(&self, distance: f32) -> f32 {
         let half = (self.middle() - self.start).max(1e-3);
-        0.5 + 0.51 * ((self.middle() - distance) / half).clamp(0.0, 1.0)
+        WHOLE + FADE_SPAN * ((self.middle() - distance) / half).clamp(0.0, 1.0)
     }
 
     /// Whether the full model is drawn at `distance` metres.

@@ -21,6 +21,7 @@ pub mod frame;
 mod gpu;
 pub mod readback;
 pub mod report;
+pub mod shader_constants;
 pub mod shaders;
 pub mod sky;
 pub mod sun_shadow;

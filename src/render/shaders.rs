@@ -3,6 +3,8 @@
 //! One table serves the plugin and the test that validates every shader without a GPU. While a shader is worked
 //! on, the environment variable `CANOPY_SHADERS` may name a folder that is read instead, so that no build is needed.
 
+use std::borrow::Cow;
+
 use bevy::{
     app::{App, SubApp},
     asset::{Assets, Handle},
@@ -10,6 +12,8 @@ use bevy::{
     log::warn,
     shader::Shader,
 };
+
+use super::shader_constants;
 
 macro_rules! sources {
     ($($path:literal),+ $(,)?) => {
@@ -37,7 +41,13 @@ pub const SOURCES: &[(&str, &str)] = sources![
     "terrain/terrain.wgsl",
 ];
 
-/// Handles of [`SOURCES`] in the same order; kept alive as long as the app.
+/// [`SOURCES`] behind the module that [`shader_constants`] writes.
+pub fn sources() -> Vec<(&'static str, Cow<'static, str>)> {
+    let constants = ("common/constants.wgsl", Cow::Owned(shader_constants::source()));
+    std::iter::once(constants).chain(SOURCES.iter().map(|&(path, source)| (path, Cow::Borrowed(source)))).collect()
+}
+
+/// Handles of [`sources`] in the same order; kept alive as long as the app.
 #[derive(Resource, Clone, Default)]
 pub struct CanopyShaders(Vec<Handle<Shader>>);
 
@@ -46,7 +56,7 @@ impl CanopyShaders {
     pub fn load(app: &mut App) -> Self {
         let folder = std::env::var_os("CANOPY_SHADERS").map(std::path::PathBuf::from);
         let mut shaders = app.world_mut().resource_mut::<Assets<Shader>>();
-        let handles = SOURCES.iter().map(|&(path, source)| {
+        let handles = sources().into_iter().map(|(path, source)| {
             let name = format!("canopy/{path}");
             let edited = folder.as_ref().and_then(|folder| match std::fs::read_to_string(folder.join(path)) {
                 Ok(text) => Some(text),
@@ -65,9 +75,9 @@ impl CanopyShaders {
 
     /// The shader at `path` below `shaders/`; an unknown path gives a handle that never loads.
     pub fn get(&self, path: &str) -> Handle<Shader> {
-        SOURCES
+        sources()
             .iter()
-            .position(|&(known, _)| known == path)
+            .position(|(known, _)| *known == path)
             .and_then(|index| self.0.get(index).cloned())
             .unwrap_or_default()
     }

@@ -29,6 +29,7 @@ use bevy::{
 };
 
 pub(crate) use layouts::ForestLayouts;
+pub(super) use pass::VERTICES_A_CROSS;
 pub use prepare::ForestStatistics;
 pub(crate) use prepare::{
     ForestPipelines, PreparedForests, forest_view, instance_bind_group, opaque_depth, prepare_view_lists,
@@ -36,6 +37,8 @@ pub(crate) use prepare::{
 pub use resources::GpuForests;
 pub(crate) use resources::prepare_forests;
 pub use transfer::TransferUniform;
+pub(super) use transfer::{STRIDE as LIGHT_STRIDE, WORDS as TRANSFER_WORDS, YAWS};
+pub(super) use uniforms::PLANES;
 pub use uniforms::{ForestViewUniform, PartUniform, PlaneUniform, VariantUniform};
 pub use vertex::PlantVertex;
 

@@ -11,14 +11,14 @@ use bevy::{
     },
 };
 
-use super::{ForestPipelines, GpuForests, PreparedForests, crosses::CrossLight, parts::PartLight};
+use super::{ForestPipelines, GpuForests, PLANES, PreparedForests, crosses::CrossLight, parts::PartLight};
 use crate::{
     plant::PartKind,
     render::{components::CanopyCamera, frame::FrameBindGroup},
 };
 
 /// Vertices that the cross shader pulls for one tree.
-const VERTICES_A_CROSS: u32 = 18;
+pub const VERTICES_A_CROSS: u32 = 6 * PLANES as u32;
 
 /// Draws every forest into the camera's colour and depth.
 pub fn forest_pass(

@@ -32,14 +32,15 @@ use crate::{
     },
     plant::LeafColors,
     render::{components::SunLight, extract::ExtractedScene, frame::PreparedFrame, gpu, report::FrameReport},
+    scatter::packed::YAW_BITS,
 };
 
 /// Yaws of a packed tree.
-const YAWS: usize = 256;
+pub const YAWS: usize = 1 << YAW_BITS;
 /// Words of four coefficients after the first, of all bands.
-const WORDS: usize = (MAX_BANDS * MAX_BANDS - 1).div_ceil(4);
+pub const WORDS: usize = (MAX_BANDS * MAX_BANDS - 1).div_ceil(4);
 /// Vectors from one yaw's light to the next: the first coefficient, then red, green and blue of each word.
-const STRIDE: usize = 1 + 3 * WORDS;
+pub const STRIDE: usize = 1 + 3 * WORDS;
 /// Bytes of one light in all yaws.
 const SET_BYTES: u64 = (YAWS * STRIDE * size_of::<[f32; 4]>()) as u64;
 

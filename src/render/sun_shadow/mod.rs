@@ -24,6 +24,7 @@ use bevy::{
 };
 
 use super::forest::ForestLayouts;
+pub(super) use pass::VERTICES_A_CROSS;
 pub use prepare::{CascadeViewUniform, ShadowMaps};
 
 /// Draws the sun's shadow maps.

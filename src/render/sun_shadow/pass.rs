@@ -24,7 +24,7 @@ use crate::{
 };
 
 /// Vertices that the caster shader pulls for one tree.
-const VERTICES_A_CROSS: u32 = 12;
+pub const VERTICES_A_CROSS: u32 = 12;
 
 /// Draws every cascade whose key changed, and notes what it shows now.
 pub fn sun_shadow_pass(
