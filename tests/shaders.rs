@@ -12,7 +12,7 @@ use canopy::{
     render::{
         forest::{ForestViewUniform, PartUniform, PlaneUniform, PlantVertex, TransferUniform, VariantUniform},
         frame::uniforms::{CascadeUniform, FrameUniform, LightUniform, NOISE_PERIOD, ShadowUniform},
-        shaders::{SOURCES, sources},
+        shaders::{ShaderFile, sources},
         sun_shadow::CascadeViewUniform,
         terrain::{GpuTile, GpuTileVertex},
     },
@@ -64,9 +64,10 @@ fn compose(path: &str, source: &str, defines: &[&str]) -> Result<Module, String>
 /// Every shader with entry points in every variant.
 fn modules() -> Vec<(String, Module)> {
     let mut modules = Vec::new();
-    for &(path, source) in SOURCES.iter().filter(|(_, source)| !is_library(source)) {
+    for file in ShaderFile::ALL.into_iter().filter(|file| !is_library(file.source())) {
+        let path = file.path();
         for defines in variants() {
-            match compose(path, source, &defines) {
+            match compose(path, file.source(), &defines) {
                 Ok(module) => modules.push((format!("{path} {defines:?}"), module)),
                 Err(message) => panic!("{message}"),
             }
@@ -100,10 +101,11 @@ fn the_table_of_sources_is_the_folder_of_shaders() {
         .filter(|path| path.extension().is_some_and(|extension| extension == "wgsl"))
         .filter_map(|path| path.strip_prefix(&folder).ok().map(|path| path.display().to_string()))
         .collect();
-    let embedded: BTreeSet<String> = SOURCES.iter().map(|(path, _)| (*path).to_owned()).collect();
+    let embedded: BTreeSet<String> = ShaderFile::ALL.iter().map(|file| file.path().to_owned()).collect();
     assert_eq!(embedded, on_disk);
-    for (path, source) in SOURCES {
-        for line in source.lines().filter_map(|line| line.trim().strip_prefix("#if")) {
+    for file in ShaderFile::ALL {
+        let path = file.path();
+        for line in file.source().lines().filter_map(|line| line.trim().strip_prefix("#if")) {
             let name = line.trim_start_matches("def").trim_start_matches("ndef").trim();
             assert!(
                 DEFINES.contains(&name),
@@ -182,14 +184,7 @@ fn gpu_structs_are_what_the_shaders_think() {
     twin!(
         layouts,
         "Frame",
-        FrameUniform {
-            clip_from_relative,
-            relative_from_clip,
-            camera,
-            focal_length_pixels,
-            level_tint,
-            mean_cover,
-        }
+        FrameUniform { clip_from_relative, relative_from_clip, camera, focal_length_pixels, level_tint, mean_cover }
     );
     twin!(
         layouts,
@@ -246,11 +241,7 @@ fn gpu_structs_are_what_the_shaders_think() {
             indirect_sun_mean,
         }
     );
-    twin!(
-        layouts,
-        "Part",
-        PartUniform { base_color, realigned, transmission, specular_reflectance, roughness }
-    );
+    twin!(layouts, "Part", PartUniform { base_color, realigned, transmission, specular_reflectance, roughness });
     twin!(
         layouts,
         "Transfer",

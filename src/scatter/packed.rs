@@ -96,7 +96,9 @@ impl PackedTree {
         let axis = |value: f64| {
             let cell = (value / cell_size).floor();
             let inside = ((value / cell_size - cell) * f64::from(PLACE_STEPS)).round() as u32;
-            (f64::from(i16::MIN)..=f64::from(i16::MAX)).contains(&cell).then_some((cell as i16, inside.min(PLACE_STEPS as u32)))
+            (f64::from(i16::MIN)..=f64::from(i16::MAX))
+                .contains(&cell)
+                .then_some((cell as i16, inside.min(PLACE_STEPS as u32)))
         };
         let reach = || format!("stay within ±{} m or take larger cells", cell_size * f64::from(i16::MAX));
         let Some((ix, place_x)) = axis(x) else { return fail("x", x, reach()) };

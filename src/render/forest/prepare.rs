@@ -37,7 +37,7 @@ use crate::{
         frame::{FrameLayout, PreparedFrame},
         gpu::{self, GrowingBuffer},
         report::FrameReport,
-        shaders::CanopyShaders,
+        shaders::{CanopyShaders, ShaderFile},
     },
 };
 
@@ -228,16 +228,16 @@ fn describe(
     layouts: &ForestLayouts,
     shaders: &CanopyShaders,
 ) -> RenderPipelineDescriptor {
-    let (label, path, group, buffers, format, samples, foliage, cull_mode) = match key {
+    let (label, file, group, buffers, format, samples, foliage, cull_mode) = match key {
         PipelineKey::Model { kind, format, samples, .. } => {
             let foliage = kind == PartKind::Foliage;
             let cull = (!foliage).then_some(Face::Back);
             let group = layouts.part.clone();
             let label = if foliage { "canopy_foliage" } else { "canopy_wood" };
-            (label, "forest/model.wgsl", group, vec![PlantVertex::layout()], format, samples, foliage, cull)
+            (label, ShaderFile::ForestModel, group, vec![PlantVertex::layout()], format, samples, foliage, cull)
         }
         PipelineKey::Cross { format, samples, .. } => {
-            ("canopy_crosses", "forest/cross.wgsl", layouts.cross.clone(), vec![], format, samples, true, None)
+            ("canopy_crosses", ShaderFile::ForestCross, layouts.cross.clone(), vec![], format, samples, true, None)
         }
     };
     let mut defs: Vec<ShaderDefVal> = Vec::new();
@@ -273,7 +273,7 @@ fn describe(
         label: Some(label.into()),
         layout,
         vertex: VertexState {
-            shader: shaders.get(path),
+            shader: shaders.get(file),
             shader_defs: defs.clone(),
             entry_point: Some("vertex".into()),
             buffers,
@@ -282,7 +282,7 @@ fn describe(
         depth_stencil: Some(opaque_depth()),
         multisample: MultisampleState { count: samples, alpha_to_coverage_enabled: to_coverage, ..Default::default() },
         fragment: Some(FragmentState {
-            shader: shaders.get(path),
+            shader: shaders.get(file),
             shader_defs: defs,
             entry_point: Some("fragment".into()),
             targets: vec![Some(ColorTargetState { format, blend: None, write_mask: ColorWrites::ALL })],

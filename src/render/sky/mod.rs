@@ -39,7 +39,7 @@ use super::{
     frame::{FrameBindGroup, FrameLayout, PreparedFrame},
     gpu,
     report::FrameReport,
-    shaders::CanopyShaders,
+    shaders::{CanopyShaders, ShaderFile},
 };
 use crate::light::atmosphere::SkyView;
 
@@ -132,7 +132,7 @@ fn prepare_pipeline(
                 label: Some("canopy_sky".into()),
                 layout: vec![layout.0.clone()],
                 vertex: VertexState {
-                    shader: shaders.get("sky/sky.wgsl"),
+                    shader: shaders.get(ShaderFile::SkyPass),
                     entry_point: Some("vertex".into()),
                     ..Default::default()
                 },
@@ -145,7 +145,7 @@ fn prepare_pipeline(
                 }),
                 multisample: MultisampleState { count: view.samples, ..Default::default() },
                 fragment: Some(FragmentState {
-                    shader: shaders.get("sky/sky.wgsl"),
+                    shader: shaders.get(ShaderFile::SkyPass),
                     entry_point: Some("fragment".into()),
                     targets: vec![Some(ColorTargetState {
                         format: view.format,

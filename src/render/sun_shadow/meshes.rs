@@ -33,7 +33,7 @@ use super::prepare::{CasterLayouts, caster_depth};
 use crate::render::{
     extract::ExtractedScene,
     gpu::{self, UNIFORM_STRIDE},
-    shaders::CanopyShaders,
+    shaders::{CanopyShaders, ShaderFile},
 };
 
 /// Stride and topology: what a pipeline depends on.
@@ -168,7 +168,7 @@ pub fn prepare_mesh_casters(
                 label: Some("canopy_caster_mesh".into()),
                 layout: vec![layouts.cascade.clone(), casters.layout.clone()],
                 vertex: VertexState {
-                    shader: shaders.get("sun_shadow/mesh.wgsl"),
+                    shader: shaders.get(ShaderFile::SunShadowMesh),
                     shader_defs: Vec::new(),
                     entry_point: Some("vertex".into()),
                     buffers: vec![VertexBufferLayout {

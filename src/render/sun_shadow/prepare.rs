@@ -40,7 +40,7 @@ use crate::{
         },
         gpu::{self, GrowingBuffer, UNIFORM_STRIDE},
         report::FrameReport,
-        shaders::CanopyShaders,
+        shaders::{CanopyShaders, ShaderFile},
     },
 };
 
@@ -363,21 +363,21 @@ impl FromWorld for CasterPipelines {
         let forest = world.resource::<ForestLayouts>();
         let describe = |kind: Option<PartKind>| {
             let foliage = kind != Some(PartKind::Wood);
-            let path = if kind.is_some() { "sun_shadow/model.wgsl" } else { "sun_shadow/cross.wgsl" };
+            let file = if kind.is_some() { ShaderFile::SunShadowModel } else { ShaderFile::SunShadowCross };
             let group = if kind.is_some() { forest.part.clone() } else { forest.cross.clone() };
             let defs: Vec<ShaderDefVal> = if foliage { vec!["FOLIAGE".into()] } else { Vec::new() };
             RenderPipelineDescriptor {
                 label: Some(format!("canopy_caster_{kind:?}").into()),
                 layout: vec![cascade.clone(), forest.instances.clone(), group],
                 vertex: VertexState {
-                    shader: shaders.get(path),
+                    shader: shaders.get(file),
                     shader_defs: defs.clone(),
                     entry_point: Some("vertex".into()),
                     buffers: if kind.is_some() { vec![PlantVertex::layout()] } else { Vec::new() },
                 },
                 depth_stencil: Some(caster_depth()),
                 fragment: foliage.then(|| FragmentState {
-                    shader: shaders.get(path),
+                    shader: shaders.get(file),
                     shader_defs: defs,
                     entry_point: Some("fragment".into()),
                     targets: Vec::new(),

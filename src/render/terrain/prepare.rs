@@ -33,7 +33,7 @@ use crate::{
         frame::{FrameLayout, PreparedFrame},
         gpu::{self, GrowingBuffer},
         report::FrameReport,
-        shaders::CanopyShaders,
+        shaders::{CanopyShaders, ShaderFile},
     },
     terrain::{
         Terrain,
@@ -368,7 +368,7 @@ pub fn prepare_pipeline(
                 label: Some("canopy_terrain".into()),
                 layout: vec![frame_layout.0.clone(), layout.0.clone()],
                 vertex: VertexState {
-                    shader: shaders.get("terrain/terrain.wgsl"),
+                    shader: shaders.get(ShaderFile::Terrain),
                     entry_point: Some("vertex".into()),
                     ..Default::default()
                 },
@@ -376,7 +376,7 @@ pub fn prepare_pipeline(
                 depth_stencil: Some(opaque_depth()),
                 multisample: MultisampleState { count: view.samples, ..Default::default() },
                 fragment: Some(FragmentState {
-                    shader: shaders.get("terrain/terrain.wgsl"),
+                    shader: shaders.get(ShaderFile::Terrain),
                     entry_point: Some("fragment".into()),
                     targets: vec![Some(ColorTargetState {
                         format: view.format,
