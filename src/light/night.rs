@@ -111,7 +111,7 @@ pub struct Star {
 /// Stars in the whole sky brighter than magnitude 6.5.
 const STARS: f32 = 9_000.0;
 /// Lux of a star of magnitude 0 (Allen 1976, section 10).
-const LUX_OF_MAGNITUDE_0: f32 = 2.54e-6;
+pub const LUX_OF_MAGNITUDE_0: f32 = 2.54e-6;
 
 impl StarField {
     /// The share of cells that hold a star, 0 to 1.

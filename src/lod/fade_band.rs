@@ -15,7 +15,7 @@ pub const WHOLE: f32 = 0.5;
 pub const GONE: f32 = 1.0;
 /// How far the threshold rises over half a band. A little more than from [`WHOLE`] to [`GONE`], so that rounding leaves
 /// nothing behind.
-const RISE: f32 = 0.51;
+pub const FADE_SPAN: f32 = 0.51;
 
 impl FadeBand {
     /// A band that begins at `distance` metres and is `width` metres wide. Negative and non-finite values become 0.
@@ -32,13 +32,13 @@ impl FadeBand {
     /// Alpha threshold of the finer representation at `distance` metres: [`WHOLE`] to above [`GONE`].
     pub fn outgoing_threshold(&self, distance: f32) -> f32 {
         let half = (self.end - self.middle()).max(1e-3);
-        WHOLE + RISE * ((distance - self.middle()) / half).clamp(0.0, 1.0)
+        WHOLE + FADE_SPAN * ((distance - self.middle()) / half).clamp(0.0, 1.0)
     }
 
     /// Alpha threshold of the coarser representation at `distance` metres: above [`GONE`] to [`WHOLE`].
     pub fn incoming_threshold(&self, distance: f32) -> f32 {
         let half = (self.middle() - self.start).max(1e-3);
-        WHOLE + RISE * ((self.middle() - distance) / half).clamp(0.0, 1.0)
+        WHOLE + FADE_SPAN * ((self.middle() - distance) / half).clamp(0.0, 1.0)
     }
 }
 

@@ -11,5 +11,5 @@
 mod fade_band;
 mod levels;
 
-pub use fade_band::{FadeBand, GONE, WHOLE};
+pub use fade_band::{FADE_SPAN, FadeBand, GONE, WHOLE};
 pub use levels::{Levels, MAX_LEVELS, Representation};

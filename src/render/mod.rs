@@ -24,6 +24,7 @@ pub mod gpu;
 pub mod readback;
 pub mod report;
 pub mod sets;
+pub mod shader_constants;
 pub mod shaders;
 pub mod sky;
 pub mod stand_light;
@@ -33,28 +34,43 @@ pub mod view;
 
 use bevy::{
     app::{App, Plugin},
+    asset::{AssetServer, io::embedded::EmbeddedAssetRegistry},
+    core_pipeline::CorePipelinePlugin,
     ecs::schedule::IntoScheduleConfigs,
+    log::error,
     render::{ExtractSchedule, Render, RenderApp, RenderSystems},
 };
 
-/// All passes.
+/// All passes. May stand before or after Bevy's own plugins; where one of them is missing, it says so and draws nothing.
 pub struct CanopyRenderPlugin;
 
 impl Plugin for CanopyRenderPlugin {
     fn build(&self, app: &mut App) {
-        let shaders = shaders::CanopyShaders::load(app);
-        shaders.share(app, |app| app.get_sub_app_mut(RenderApp));
-        let report = report::FrameReport::default();
-        app.insert_resource(report.clone()).add_plugins(components::ComponentsPlugin);
-        if let Some(render_app) = app.get_sub_app_mut(RenderApp) {
-            sets::configure(render_app);
-            render_app
-                .insert_resource(report)
-                .init_resource::<extract::ExtractedScene>()
-                .add_systems(ExtractSchedule, extract::extract_scene)
-                .add_systems(Render, report::finish_report.in_set(RenderSystems::Cleanup));
-        }
-        app.add_plugins((
+        app.init_resource::<report::FrameReport>();
+    }
+
+    // Here all other plugins are built, in whatever order they were added.
+    fn finish(&self, app: &mut App) {
+        app.add_plugins(components::ComponentsPlugin);
+        let has_pipeline = app.is_plugin_added::<CorePipelinePlugin>();
+        let report = app.world().resource::<report::FrameReport>().clone();
+        let assets = app.world().get_resource::<EmbeddedAssetRegistry>().zip(app.world().get_resource::<AssetServer>());
+        let shaders = assets.map(|(registry, server)| shaders::CanopyShaders::load(registry, server));
+        let (Some(shaders), Some(render_app), true) = (shaders, app.get_sub_app_mut(RenderApp), has_pipeline) else {
+            error!(
+                "Canopy draws nothing: the app needs AssetPlugin, RenderPlugin (with a graphics device) and \
+                 CorePipelinePlugin; Bevy's DefaultPlugins have them."
+            );
+            return;
+        };
+        sets::configure(render_app);
+        render_app
+            .insert_resource(report)
+            .insert_resource(shaders.clone())
+            .init_resource::<extract::ExtractedScene>()
+            .add_systems(ExtractSchedule, extract::extract_scene)
+            .add_systems(Render, report::finish_report.in_set(RenderSystems::Cleanup));
+        app.insert_resource(shaders).add_plugins((
             view::ViewPlugin,
             bindings::BindingsPlugin,
             stand_light::StandLightPlugin,

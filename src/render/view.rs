@@ -84,8 +84,6 @@ pub struct PreparedView {
     pub focal_pixels: f32,
     /// Factor from radiance to the attachment's values.
     pub exposure: f32,
-    /// Width and height in pixels.
-    pub size: Vec2,
 }
 
 /// The one view that Canopy draws, if a camera asks for it.
@@ -161,6 +159,5 @@ fn prepare_view(
         attachment: ViewFormat { color: view.target_format, samples: msaa.samples() },
         focal_pixels: 0.5 * size.y * view.clip_from_view.y_axis.y.abs(),
         exposure: camera.exposure,
-        size,
     });
 }

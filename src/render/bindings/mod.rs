@@ -195,20 +195,18 @@ fn prepare_bind_group(
     let frame_uniform = FrameUniform {
         clip_from_relative: view.clip_from_relative.to_cols_array_2d(),
         relative_from_clip: view.clip_from_relative.inverse().to_cols_array_2d(),
-        camera: [modulo(view.camera.x), view.camera.y as f32, modulo(view.camera.z), view.focal_pixels],
-        viewport: [view.size.x, view.size.y, 1.0 / view.size.x, 1.0 / view.size.y],
-        flags: [
-            f32::from(view.attachment.samples > 1),
-            f32::from(scene.options.tint_levels),
-            placement.mean_cover,
-            0.0,
-        ],
+        camera: [modulo(view.camera.x), view.camera.y as f32, modulo(view.camera.z)],
+        focal_length_pixels: view.focal_pixels,
+        mean_cover: placement.mean_cover,
+        padding: [0.0; 3],
     };
     let light_uniform = light::light_uniform(&daylight.0, view.exposure);
     let shadow_uniform = ShadowUniform {
         cascades: placement.cascades,
-        count: [placement.cascade_count as f32, 1.0 / placement.shadow_map_size.max(1) as f32, 0.0, 0.0],
         ground: placement.ground,
+        cascade_count: placement.cascade_count as i32,
+        inverse_map_size: 1.0 / placement.shadow_map_size.max(1) as f32,
+        padding: [0.0; 2],
     };
     queue.write_buffer(&buffers.frame, 0, bytemuck::bytes_of(&frame_uniform));
     queue.write_buffer(&buffers.light, 0, bytemuck::bytes_of(&light_uniform));

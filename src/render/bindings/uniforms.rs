@@ -16,42 +16,62 @@ pub struct FrameUniform {
     pub clip_from_relative: [[f32; 4]; 4],
     /// Its inverse.
     pub relative_from_clip: [[f32; 4]; 4],
-    /// Camera modulo [`NOISE_PERIOD`] (x, z), height above the datum (y), focal length in pixels (w).
-    pub camera: [f32; 4],
-    /// Width, height in pixels and their inverses.
-    pub viewport: [f32; 4],
-    /// Alpha to coverage, tint by level of detail, mean canopy cover, unused.
-    pub flags: [f32; 4],
+    /// Camera position: x and z modulo [`NOISE_PERIOD`], y above the datum; metres.
+    pub camera: [f32; 3],
+    /// Focal length in pixels (vertical).
+    pub focal_length_pixels: f32,
+    /// Mean canopy cover where the terrain is known, 0..1.
+    pub mean_cover: f32,
+    /// WGSL rounds the size up to 16 bytes.
+    pub padding: [f32; 3],
 }
 
 /// `Light` of `frame.wgsl`, premultiplied by the exposure.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct LightUniform {
-    /// To the key light, and the sine of its elevation.
-    pub key_direction: [f32; 4],
-    /// Illuminance of the key light normal to its direction.
-    pub key_illuminance: [f32; 4],
-    /// To the sun, and the cosine of its disc's angular radius.
-    pub sun_direction: [f32; 4],
+    /// Unit vector to the key light: the one that casts shadows, sun or moon.
+    pub key_direction: [f32; 3],
+    /// Factor from radiance in nits to the attachment's values.
+    pub exposure: f32,
+    /// Illuminance of the key light, normal to its direction.
+    pub key_illuminance: [f32; 3],
+    /// The most colour that night sight takes, 0..1.
+    pub scotopic_strength: f32,
+    /// Unit vector to the sun.
+    pub sun_direction: [f32; 3],
+    /// Cosine of the disc's angular radius.
+    pub sun_disc_cosine: f32,
     /// Radiance of the sun's disc.
-    pub sun_radiance: [f32; 4],
-    /// To the moon, and the cosine of its disc's angular radius.
-    pub moon_direction: [f32; 4],
-    /// Radiance of the moon's disc, and its lit fraction.
-    pub moon_radiance: [f32; 4],
+    pub sun_radiance: [f32; 3],
+    /// Cells of the star field along a cube face's edge.
+    pub star_cells: f32,
+    /// Unit vector to the moon.
+    pub moon_direction: [f32; 3],
+    /// Cosine of the disc's angular radius; above 1 without a moon.
+    pub moon_disc_cosine: f32,
+    /// Radiance of the moon's disc.
+    pub moon_radiance: [f32; 3],
+    /// Share of the star field's cells with a star, 0..1.
+    pub star_density: f32,
     /// Exitant radiance of a white Lambertian surface under the sky, bands 0 to 2.
     pub sky: [[f32; 4]; 9],
-    /// Extinction per metre at the datum, one over the scale height.
-    pub fog: [f32; 4],
-    /// Unit vector to the sun in the ground plane (x, z), exposure, the most colour that night sight takes.
-    pub sky_frame: [f32; 4],
-    /// Night tint and its amount.
-    pub night: [f32; 4],
-    /// Columns of the rotation from the world into the stars' frame.
+    /// Extinction per metre at the datum.
+    pub fog_extinction: [f32; 3],
+    /// One over the fog's scale height, 1/m.
+    pub fog_inverse_scale_height: f32,
+    /// Colour of night sight, luminance 1.
+    pub scotopic_tint: [f32; 3],
+    /// Share of night sight that the adaptation to the whole picture allows, 0..1.
+    pub scotopic_amount: f32,
+    /// Rotation from the world into the stars' frame, by columns of four.
     pub star_frame: [[f32; 4]; 3],
-    /// Cells along a cube face's edge, seed, share of cells with a star, unused.
-    pub stars: [f32; 4],
+    /// Unit vector to the sun in the ground plane (x, z).
+    pub sky_axis: [f32; 2],
+    /// Seed of the star field.
+    pub star_seed: u32,
+    /// WGSL rounds the size up to 16 bytes.
+    pub padding: u32,
 }
 
 /// `Cascade` of `frame.wgsl`.
@@ -60,8 +80,12 @@ pub struct LightUniform {
 pub struct CascadeUniform {
     /// Camera-relative metres to the map's clip space.
     pub map_from_relative: [[f32; 4]; 4],
-    /// Metres a texel, served radius in metres, depth range in metres, unused.
-    pub size: [f32; 4],
+    /// Metres a texel.
+    pub texel: f32,
+    /// Radius around the camera within which the map is read, metres.
+    pub radius: f32,
+    /// WGSL rounds the size up to 16 bytes.
+    pub padding: [f32; 2],
 }
 
 /// `Shadow` of `frame.wgsl`.
@@ -70,10 +94,14 @@ pub struct CascadeUniform {
 pub struct ShadowUniform {
     /// From the finest to the widest.
     pub cascades: [CascadeUniform; MAX_CASCADES],
-    /// Number of cascades, one over the map's size in texels, unused, unused.
-    pub count: [f32; 4],
     /// Ground map: camera-relative origin (x, z) and inverse size.
     pub ground: [f32; 4],
+    /// How many of the cascades there are.
+    pub cascade_count: i32,
+    /// One over the map's size in texels.
+    pub inverse_map_size: f32,
+    /// WGSL rounds the size up to 16 bytes.
+    pub padding: [f32; 2],
 }
 
 /// `CascadeView` of `shaders/sun_shadow/caster.wgsl`.
@@ -82,6 +110,8 @@ pub struct ShadowUniform {
 pub struct CascadeViewUniform {
     /// Metres relative to the box's centre to the map's clip space.
     pub clip_from_anchor: [[f32; 4]; 4],
-    /// To the light.
-    pub direction: [f32; 4],
+    /// Unit vector to the light.
+    pub direction: [f32; 3],
+    /// WGSL rounds the size up to 16 bytes.
+    pub padding: f32,
 }

@@ -56,7 +56,7 @@ pub fn forest_view(forest: &GpuForest, anchor: DVec3, level: Option<LevelLook>) 
         cell_size: size as f32,
         fade_in: look.fade_in.map_or([0.0; 2], |fade| [fade.start, fade.end]),
         fade_out: look.fade_out.map_or([NEVER; 2], |fade| [fade.start, fade.end]),
-        unused: [0.0; 2],
+        padding: [0.0; 2],
         tint: look.tint.to_array(),
     }
 }

@@ -16,8 +16,8 @@ mod pipelines;
 pub mod representation;
 mod rotated_light;
 mod textures;
-mod transfer;
-mod uniforms;
+pub(super) mod transfer;
+pub(super) mod uniforms;
 mod vertex;
 
 use bevy::{
@@ -44,15 +44,15 @@ pub struct ForestPassPlugin;
 
 impl Plugin for ForestPassPlugin {
     fn build(&self, app: &mut App) {
+        let mut known = app.world_mut().remove_resource::<Representations>().unwrap_or_default();
         let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
-        let world = render_app.world_mut();
-        if let Some(shaders) = world.get_resource::<CanopyShaders>().cloned() {
-            let mut known = world.get_resource_or_init::<Representations>();
-            for renderer in levels::built_in(&shaders) {
+        if let Some(shaders) = render_app.world().get_resource::<CanopyShaders>() {
+            for renderer in levels::built_in(shaders) {
                 known.add(renderer);
             }
         }
         render_app
+            .insert_resource(known)
             .init_gpu_resource::<GpuForests>()
             .init_gpu_resource::<lists::PreparedForests>()
             .init_gpu_resource::<LevelPipelines>()

@@ -20,7 +20,6 @@ use bevy::{
     ecs::resource::Resource,
     log::warn,
     render::{
-        RenderApp,
         render_phase::TrackedRenderPass,
         render_resource::{BindGroupLayoutDescriptor, DepthStencilState, RenderPipelineDescriptor},
     },
@@ -132,7 +131,7 @@ pub struct ForestUpload<'a, 'w> {
     pub transfer: &'a mut TransferLight,
 }
 
-/// All representations that can be drawn. A resource of the render world.
+/// All representations that can be drawn: a resource of the main world until the app is finished, then of the render world.
 #[derive(Resource, Clone, Default)]
 pub struct Representations(Vec<Arc<dyn LevelRenderer>>);
 
@@ -159,19 +158,16 @@ impl Representations {
 
 /// Adds representations of a program's own.
 pub trait RegisterRepresentation {
-    /// Makes `renderer` known, after [`CanopyRenderPlugin`](crate::render::CanopyRenderPlugin) was added. Without a render
-    /// world nothing happens.
+    /// Makes `renderer` known, before the app runs; the order to Canopy's plugins does not matter.
     fn register_representation(&mut self, renderer: impl LevelRenderer) -> &mut Self;
 }
 
 impl RegisterRepresentation for App {
     fn register_representation(&mut self, renderer: impl LevelRenderer) -> &mut Self {
-        if let Some(render_app) = self.get_sub_app_mut(RenderApp) {
-            let name = renderer.representation().name();
-            let mut known = render_app.world_mut().get_resource_or_init::<Representations>();
-            if !known.add(Arc::new(renderer)) {
-                warn!("a representation called `{name}` is registered already: the second one is not used");
-            }
+        let name = renderer.representation().name();
+        let mut known = self.world_mut().get_resource_or_init::<Representations>();
+        if !known.add(Arc::new(renderer)) {
+            warn!("a representation called `{name}` is registered already: the second one is not used");
         }
         self
     }

@@ -29,12 +29,13 @@ use crate::{
         components::SunLight,
         gpu::{Gpu, buffer_with},
     },
+    scatter::packed::YAW_BITS,
 };
 
 /// Yaws of a packed tree.
-pub const YAWS: usize = 256;
+pub const YAWS: usize = 1 << YAW_BITS;
 /// Vectors from one yaw's light to the next: the first coefficient, then red, green and blue of each word.
-const STRIDE: usize = 1 + 3 * WORDS;
+pub const STRIDE: usize = 1 + 3 * WORDS;
 /// Bytes of one light in all yaws.
 pub const SET_BYTES: u64 = (YAWS * STRIDE * size_of::<[f32; 4]>()) as u64;
 

@@ -37,7 +37,7 @@ use super::{
     gpu::{self, opaque_depth},
     report::FrameReport,
     sets::{CanopyPasses, CanopyRenderSystems},
-    shaders::CanopyShaders,
+    shaders::{CanopyShaders, ShaderFile},
     view::{PreparedFrame, ViewFormat},
 };
 use crate::light::atmosphere::SkyView;
@@ -66,7 +66,7 @@ struct SkyPipeline {
 
 impl FromWorld for SkyPipeline {
     fn from_world(world: &mut World) -> Self {
-        Self { shader: world.resource::<CanopyShaders>().get("sky/sky.wgsl") }
+        Self { shader: world.resource::<CanopyShaders>().get(ShaderFile::SkyPass) }
     }
 }
 

@@ -152,7 +152,9 @@ impl ShadowMaps {
         for (slot, cascade) in cascades.iter_mut().zip(&self.cascades) {
             *slot = CascadeUniform {
                 map_from_relative: cascade.clip_from_camera(camera).to_cols_array_2d(),
-                size: [cascade.texel as f32, cascade.radius as f32, 2.0 * cascade.half_depth as f32, 0.0],
+                texel: cascade.texel as f32,
+                radius: cascade.radius as f32,
+                padding: [0.0; 2],
             };
         }
         cascades

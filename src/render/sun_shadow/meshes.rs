@@ -33,7 +33,7 @@ use crate::render::{
     bindings::{SHADOW_FORMAT, caster_layout},
     extract::ExtractedScene,
     gpu::{self, UNIFORM_STRIDE, reversed_depth},
-    shaders::CanopyShaders,
+    shaders::{CanopyShaders, ShaderFile},
 };
 
 /// Stride and topology: what a pipeline depends on.
@@ -167,7 +167,7 @@ pub fn prepare_mesh_casters(
                 label: Some("canopy_caster_mesh".into()),
                 layout: vec![caster_layout(), casters.layout.clone()],
                 vertex: VertexState {
-                    shader: shaders.get("sun_shadow/mesh.wgsl"),
+                    shader: shaders.get(ShaderFile::SunShadowMesh),
                     shader_defs: Vec::new(),
                     entry_point: Some("vertex".into()),
                     buffers: vec![VertexBufferLayout {

@@ -101,7 +101,8 @@ pub fn prepare_shadows(
         let content = DrawnCascade { key, seen_by: seen.as_ref().map(|_| this_view) };
         let uniform = CascadeViewUniform {
             clip_from_anchor: place.clip_from_anchor().to_cols_array_2d(),
-            direction: place.direction.as_vec3().extend(0.0).to_array(),
+            direction: place.direction.as_vec3().to_array(),
+            padding: 0.0,
         };
         gpu.queue.write_buffer(&maps.cascade_uniforms, index as u64 * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));
         let mut work = CascadeWork { index, content, forests: Vec::new() };

@@ -19,7 +19,7 @@ use bevy::{
 use crate::render::{
     bindings::frame_layout,
     gpu::opaque_depth,
-    shaders::CanopyShaders,
+    shaders::{CanopyShaders, ShaderFile},
     view::{PreparedFrame, ViewFormat},
 };
 
@@ -47,7 +47,7 @@ pub struct TerrainPipeline {
 
 impl FromWorld for TerrainPipeline {
     fn from_world(world: &mut World) -> Self {
-        Self { shader: world.resource::<CanopyShaders>().get("terrain/terrain.wgsl") }
+        Self { shader: world.resource::<CanopyShaders>().get(ShaderFile::Terrain) }
     }
 }
 

@@ -6,10 +6,10 @@
 //! apart):
 //!
 //! ```wgsl
-//!   let stored = vertex.normal.xyz * (1023.0 / 511.0) - 1.0;      // unorm10-10-10-2
+//!   let stored = vertex.normal.xyz * ((2.0 * NORMAL_STEPS + 1.0) / NORMAL_STEPS) - 1.0;      // unorm10-10-10-2
 //!   let size = length(stored);
 //!   let normal = stored / size;
-//!   let k_a = saturate((size - 0.25) / (1.0 - 0.25));
+//!   let k_a = saturate((size - NORMAL_LEAST_LENGTH) / (1.0 - NORMAL_LEAST_LENGTH));
 //! ```
 //!
 //! Each axis has 511 steps on either side of a zero that is exact. Rounding moves the stored vector by at most √3/2 of a
@@ -35,7 +35,7 @@ fn unscaled(stored: Vec3) -> (Vec3, f32) {
 }
 
 /// Steps on either side of zero.
-const STEPS: f32 = 511.0;
+pub const STEPS: f32 = 511.0;
 
 /// Packs a normal and k_a (0..=1) as unorm10-10-10-2, x in the lowest bits. Any input gives a vector that can be decoded.
 pub fn encode(normal: Vec3, ambient: f32) -> u32 {

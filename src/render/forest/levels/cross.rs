@@ -27,19 +27,12 @@ use crate::{
         components::Forest,
         forest::{
             representation::{ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight},
-            uniforms::PLANES,
+            uniforms::{CROSS_CASTER_VERTICES, CROSS_VERTICES, PLANES},
         },
         gpu::{self, Gpu},
-        shaders::CanopyShaders,
+        shaders::{CanopyShaders, ShaderFile},
     },
 };
-
-/// Vertices that the shader pulls for one tree.
-const VERTICES: u32 = 18;
-/// Vertices that the caster's shader pulls for one tree.
-const CASTER_VERTICES: u32 = 12;
-/// Triangles of a tree.
-const TRIANGLES: usize = 6;
 
 /// Draws crossed billboards.
 pub struct CrossRenderer {
@@ -50,7 +43,7 @@ pub struct CrossRenderer {
 impl CrossRenderer {
     /// With Canopy's own shaders.
     pub fn new(shaders: &CanopyShaders) -> Self {
-        Self { shader: shaders.get("forest/cross.wgsl"), caster: shaders.get("sun_shadow/cross.wgsl") }
+        Self { shader: shaders.get(ShaderFile::ForestCross), caster: shaders.get(ShaderFile::SunShadowCross) }
     }
 }
 
@@ -199,15 +192,15 @@ impl GpuLevel for GpuCrosses {
     }
 
     fn triangles(&self, _: usize) -> usize {
-        TRIANGLES
+        CROSS_VERTICES as usize / 3
     }
 
     fn draw<'a>(&'a self, pass: &mut TrackedRenderPass<'a>, _: u32, target: LevelTarget, ranges: &[Range<u32>]) {
         let Some(range) = ranges.first().filter(|range| !range.is_empty()) else { return };
         pass.set_bind_group(2, &self.bind_group, &[]);
         let vertices = match target {
-            LevelTarget::View(_) => VERTICES,
-            LevelTarget::ShadowMap => CASTER_VERTICES,
+            LevelTarget::View(_) => CROSS_VERTICES,
+            LevelTarget::ShadowMap => CROSS_CASTER_VERTICES,
         };
         if let (LevelTarget::View(_), Some(textures)) = (target, &self.light_textures) {
             pass.set_bind_group(3, textures, &[]);

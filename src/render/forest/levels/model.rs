@@ -37,7 +37,7 @@ use crate::{
             vertex::PlantVertex,
         },
         gpu::{self, Gpu},
-        shaders::CanopyShaders,
+        shaders::{CanopyShaders, ShaderFile},
     },
 };
 
@@ -53,7 +53,7 @@ pub struct ModelRenderer {
 impl ModelRenderer {
     /// With Canopy's own shaders.
     pub fn new(shaders: &CanopyShaders) -> Self {
-        Self { shader: shaders.get("forest/model.wgsl"), caster: shaders.get("sun_shadow/model.wgsl") }
+        Self { shader: shaders.get(ShaderFile::ForestModel), caster: shaders.get(ShaderFile::SunShadowModel) }
     }
 }
 
