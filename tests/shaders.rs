@@ -11,7 +11,7 @@ use std::{
 use canopy::{
     render::{
         bindings::uniforms::{
-            CascadeUniform, CascadeViewUniform, FrameUniform, LightUniform, MAX_CASCADES, NOISE_PERIOD, ShadowUniform,
+            CascadeUniform, CascadeViewUniform, FrameUniform, LightUniform, NOISE_PERIOD, ShadowUniform,
         },
         forest::{ForestViewUniform, PartUniform, PlaneUniform, PlantVertex, TransferUniform, VariantUniform},
         shaders::{ShaderFile, sources},
