@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use super::levels::cross::{Cross, CrossSettings};
 use super::lighting::{BakedLighting, LightingSettings};
 use crate::plant::{Plant, PlantMesh};
@@ -21,7 +23,7 @@ pub struct BakedPlant {
 }
 
 /// How a plant is baked. Values out of range are moved into it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BakeSettings {
     /// Which light the foliage gets.
     pub lighting: LightingSettings,
