@@ -124,7 +124,7 @@ fn stands_do_not_depend_on_the_number_of_threads() {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
                 let stand = place(&rules, &hilly).unwrap().stand;
-                let bounds = [VariantBounds { radius: 3.0, height: 20.0 }];
+                let bounds = [PlantSize { radius: 3.0, height: 20.0 }];
                 let packed = PackedStand::new(&stand, DEFAULT_CELL_SIZE, &bounds).unwrap();
                 let cover = cover_map(&stand, &bounds, 5.0, None).unwrap();
                 (stand, packed, cover)
@@ -555,7 +555,7 @@ fn a_packed_tree_is_sixteen_bytes_with_the_documented_bits() {
 
 #[test]
 fn what_does_not_fit_is_refused_with_its_tree() {
-    let bounds = [VariantBounds { radius: 2.0, height: 10.0 }];
+    let bounds = [PlantSize { radius: 2.0, height: 10.0 }];
     let pack =
         |bad: Tree| PackedStand::new(&Stand { trees: vec![tree(0.0, 0.0, 0.0), bad] }, 64.0, &bounds).unwrap_err();
     for (what, bad) in [
@@ -574,10 +574,10 @@ fn what_does_not_fit_is_refused_with_its_tree() {
     }
     let unknown = pack(Tree { variant: 1, ..tree(0.0, 0.0, 0.0) });
     assert!(matches!(unknown, ScatterError::UnknownVariant { tree: 1, variant: 1, count: 1 }));
-    let many = PackedStand::new(&Stand::default(), 64.0, &vec![VariantBounds::default(); MAX_VARIANTS + 1]);
+    let many = PackedStand::new(&Stand::default(), 64.0, &vec![PlantSize::default(); MAX_VARIANTS + 1]);
     assert!(many.unwrap_err().to_string().contains("fewer"));
-    let bad_bounds = PackedStand::new(&Stand::default(), 64.0, &[VariantBounds { radius: f32::NAN, height: 1.0 }]);
-    assert!(matches!(bad_bounds, Err(ScatterError::VariantBounds { variant: 0, .. })));
+    let bad_bounds = PackedStand::new(&Stand::default(), 64.0, &[PlantSize { radius: f32::NAN, height: 1.0 }]);
+    assert!(matches!(bad_bounds, Err(ScatterError::PlantSize { variant: 0, .. })));
     assert!(matches!(PackedStand::new(&Stand::default(), 0.0, &[]), Err(ScatterError::Size { .. })));
     assert!(PackedStand::new(&Stand::default(), 64.0, &[]).unwrap().cells.is_empty());
 }
@@ -588,7 +588,7 @@ fn cells_partition_the_trees_and_hold_their_crowns() {
     let species = vec![SpeciesRule { variants: 0..2, size: sizes, ..Default::default() }];
     let slope = Plane { height: 0.0, east: 0.3, south: 0.2, reach: f64::INFINITY };
     let stand = place(&PlacementRules { species, ..rules() }, &slope).unwrap().stand;
-    let bounds = [VariantBounds { radius: 4.0, height: 25.0 }, VariantBounds { radius: 1.0, height: 5.0 }];
+    let bounds = [PlantSize { radius: 4.0, height: 25.0 }, PlantSize { radius: 1.0, height: 5.0 }];
     let packed = PackedStand::new(&stand, 50.0, &bounds).unwrap();
     assert_eq!(packed.trees.len(), stand.trees.len());
     let mut seen = HashSet::new();
@@ -637,7 +637,7 @@ fn one_crown_covers_its_own_area_wherever_it_stands() {
         for i in 0..40 {
             let foot = (random(i, k as u64) - 0.5) * 1000.0;
             let stand = Stand { trees: vec![Tree { scale: 1.5, ..tree(foot.x, 3.0, foot.y) }] };
-            let map = cover_map(&stand, &[VariantBounds { radius, height: 1.0 }], 2.0, None).unwrap();
+            let map = cover_map(&stand, &[PlantSize { radius, height: 1.0 }], 2.0, None).unwrap();
             let area = PI * f64::from(radius * 1.5).powi(2);
             // One step of 8 bits for each texel of the map, rounded to nearest, is the least that can be promised.
             let rounding = map.cover.len() as f64 * 0.5 / 255.0 * 4.0;
@@ -654,7 +654,7 @@ fn cover_agrees_with_a_fine_raster() {
     let area = Area { min: DVec2::ZERO, max: DVec2::splat(80.0) };
     let rules = PlacementRules { area, species, sequence: Sequence::Random, ..rules() };
     let stand = place(&rules, &FLAT).unwrap().stand;
-    let bounds = [VariantBounds { radius: 3.0, height: 10.0 }];
+    let bounds = [PlantSize { radius: 3.0, height: 10.0 }];
     let map = cover_map(&stand, &bounds, 4.0, Some(area)).unwrap();
     assert_eq!((map.columns, map.rows, map.origin), (20, 20, DVec2::ZERO));
     let mut total_error = 0.0;
@@ -685,7 +685,7 @@ fn cover_agrees_with_a_fine_raster() {
 #[test]
 fn cover_maps_refuse_what_they_cannot_hold() {
     let stand = Stand { trees: vec![tree(0.0, 0.0, 0.0), tree(1e6, 0.0, 1e6)] };
-    let bounds = [VariantBounds { radius: 3.0, height: 10.0 }];
+    let bounds = [PlantSize { radius: 3.0, height: 10.0 }];
     for texel in [0.0, -1.0, f64::NAN, f64::INFINITY, 1.0] {
         assert!(matches!(cover_map(&stand, &bounds, texel, None), Err(ScatterError::Size { .. })), "{texel}");
     }

@@ -12,7 +12,7 @@
 @group(2) @binding(1) var property_textures: texture_2d_array<f32>;
 @group(2) @binding(2) var texture_sampler: sampler;
 #ifdef TRANSFER
-// How the sky's light reaches the leaves: src/bake/billboard/light.rs.
+// How the sky's light reaches the leaves: src/bake/levels/cross/light.rs.
 @group(3) @binding(0) var light_textures: texture_2d_array<f32>;
 #endif
 

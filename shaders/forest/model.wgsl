@@ -31,7 +31,7 @@ struct Part {
 
 struct Vertex {
     @location(0) position: vec3<f32>,
-    // The normal, as long as the ambient visibility says: src/bake/implicit/packing.rs.
+    // The normal, as long as the ambient visibility says: src/bake/lighting/implicit/packing.rs.
     @location(1) normal: vec4<f32>,
     @location(2) uv: vec2<f32>,
 }

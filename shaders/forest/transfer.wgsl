@@ -1,5 +1,5 @@
-// Radiance transfer [Franzke 2005, 4.2.3]: the twin of src/bake/transfer/evaluate.rs on coefficients that
-// src/bake/transfer/pack.rs packed.
+// Radiance transfer [Franzke 2005, 4.2.3]: the twin of src/bake/lighting/transfer/evaluate.rs on coefficients that
+// src/bake/lighting/transfer/pack.rs packed.
 #define_import_path canopy::transfer
 
 #import canopy::constants::{LIGHT_STRIDE, TRANSFER_WORDS}

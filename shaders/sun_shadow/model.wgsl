@@ -1,4 +1,4 @@
-// Depth from the key light: the shadow proxies of near trees (src/bake/shadow_proxy.rs).
+// Depth from the key light: the shadow proxies of near trees (src/bake/levels/shadow_proxy.rs).
 #import canopy::instance::{trees, visible, unpack_tree, plant_vertex_position}
 #import canopy::caster::{cascade, clamp_caster}
 

@@ -15,7 +15,7 @@ use crate::{
         components::{Forest, Ground, SunLight, SunShadowSettings},
         daylight::SkySettings,
     },
-    scatter::{CoverMap, PackedStand, VariantBounds, cover_map, packed::DEFAULT_CELL_SIZE},
+    scatter::{CoverMap, PackedStand, PlantSize, cover_map, packed::DEFAULT_CELL_SIZE},
     scene::{self, Progress, Quality, Scene},
     terrain::Terrain,
 };
@@ -25,7 +25,7 @@ const COVER_TEXEL: f64 = 8.0;
 /// Share of a plant's half width, the greater of its two, that counts as its crown's radius.
 const CROWN_SHARE: f32 = 0.8;
 /// Extent of a plant without any surface, metres.
-const NO_PLANT: VariantBounds = VariantBounds { radius: 0.1, height: 0.1 };
+const NO_PLANT: PlantSize = PlantSize { radius: 0.1, height: 0.1 };
 
 /// A scene, built.
 pub struct Stage {
@@ -87,16 +87,17 @@ impl Stage {
 
         let started = Instant::now();
         progress.begin("Trees", 0);
-        let mut stand = trees::build_stand(scene, &species, &plants, &terrain, progress)?;
+        let sizes: Vec<PlantSize> = plants.iter().map(BakedPlant::size).collect();
+        let mut stand = trees::build_stand(scene, &species, &sizes, &terrain, progress)?;
         progress.end();
         check_wanted(progress)?;
         let plants = together::light_together(scene, &mut species, plants, &mut stand, progress)?;
-        let bounds: Vec<VariantBounds> = plants.iter().map(variant_bounds).collect();
-        let packed = PackedStand::new(&stand, DEFAULT_CELL_SIZE, &bounds)?;
+        let sizes: Vec<PlantSize> = plants.iter().map(BakedPlant::size).collect();
+        let packed = PackedStand::new(&stand, DEFAULT_CELL_SIZE, &sizes)?;
         let cover = if stand.trees.is_empty() {
             None
         } else {
-            let crowns: Vec<VariantBounds> = plants.iter().map(crown).collect();
+            let crowns: Vec<PlantSize> = plants.iter().map(crown).collect();
             Some(Arc::new(cover_map(&packed, &crowns, COVER_TEXEL, None)?.smoothed()))
         };
         progress.note(&format!("{} trees: {:.2} s", stand.trees.len(), started.elapsed().as_secs_f64()));
@@ -188,21 +189,13 @@ pub(super) fn observer(scene: &Scene, terrain: &Terrain) -> Result<Observer, App
     Ok(Observer::new(latitude, longitude, height)?)
 }
 
-/// What holds the plant whatever its yaw.
-fn variant_bounds(plant: &BakedPlant) -> VariantBounds {
-    let plant = &plant.plant;
-    plant
-        .bounds()
-        .map_or(NO_PLANT, |_| VariantBounds { radius: plant.reach().max(0.01), height: plant.height().max(0.01) })
-}
-
 /// The disc of ground that the plant's crown covers, which is smaller than what holds every twig of it.
-fn crown(plant: &BakedPlant) -> VariantBounds {
+fn crown(plant: &BakedPlant) -> PlantSize {
     let (half_width, height) = plant.plant.bounds().map_or((NO_PLANT.radius, NO_PLANT.height), |bounds| {
         let size = bounds.size();
         ((0.5 * size.x.max(size.z)).max(0.01), bounds.max.y.max(0.01))
     });
-    VariantBounds { radius: half_width * CROWN_SHARE, height }
+    PlantSize { radius: half_width * CROWN_SHARE, height }
 }
 
 fn bake(

@@ -2,9 +2,12 @@
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use super::levels::cross::{Cross, CrossSettings};
 use super::lighting::{BakedLighting, LightingSettings};
 use crate::plant::{Plant, PlantMesh};
+use crate::scatter::PlantSize;
 
 /// A plant with everything that is derived from it once and kept in the cache. What is made apart is shared apart: a copy
 /// is cheap, and who draws plants sees by the pointers what of one has changed.
@@ -20,8 +23,20 @@ pub struct BakedPlant {
     pub cross: Arc<Cross>,
 }
 
+impl BakedPlant {
+    /// Its [`plant_size`].
+    pub fn size(&self) -> PlantSize {
+        plant_size(&self.plant)
+    }
+}
+
+/// The size of what holds `plant` whatever its yaw.
+pub fn plant_size(plant: &Plant) -> PlantSize {
+    PlantSize::new(plant.height(), plant.reach())
+}
+
 /// How a plant is baked. Values out of range are moved into it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BakeSettings {
     /// Which light the foliage gets.
     pub lighting: LightingSettings,

@@ -26,7 +26,7 @@ use cache::{Cache, CacheKey};
 use levels::{cross::bake_cross, shadow_proxy::shadow_proxy};
 use lighting::BakedLighting;
 
-pub use baked::{BakeSettings, BakedPlant};
+pub use baked::{BakeSettings, BakedPlant, plant_size};
 pub use error::BakeError;
 
 /// Where a baked plant came from.

@@ -5,11 +5,11 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::{
-    Frustum, VariantSize,
+    Frustum,
     cascades::{CascadeBox, LOWEST_SINE},
     lists::{DrawLists, Grouping, ListBuilder},
 };
-use crate::scatter::PackedStand;
+use crate::scatter::{PackedStand, PlantSize};
 
 /// What a view can see of shadows: a caster counts only if the volume that it shades can be seen.
 #[derive(Clone, Debug)]
@@ -43,7 +43,7 @@ impl SeenShadows<'_> {
 /// no pixel of the view can show are left out.
 pub fn cull_cascade(
     stand: &PackedStand,
-    sizes: &[VariantSize],
+    sizes: &[PlantSize],
     origin: DVec3,
     cascade: &CascadeBox,
     casting: &[Range<f64>],

@@ -16,12 +16,3 @@ pub use casters::{SeenShadows, cull_cascade};
 pub use frustum::Frustum;
 pub use lists::{DrawLists, Grouping};
 pub use view::cull_view;
-
-/// Size of a variant for culling, in metres at scale 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct VariantSize {
-    /// Height above the foot.
-    pub height: f32,
-    /// Horizontal radius around the trunk.
-    pub radius: f32,
-}

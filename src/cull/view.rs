@@ -3,12 +3,12 @@
 use glam::{DVec3, Vec3};
 
 use super::{
-    Frustum, VariantSize,
+    Frustum,
     lists::{DrawLists, Grouping, ListBuilder},
 };
 use crate::{
     lod::Levels,
-    scatter::{Cell, PackedStand},
+    scatter::{Cell, PackedStand, PlantSize},
 };
 
 /// The nearest and the farthest horizontal distance from `point` to a cell.
@@ -24,7 +24,7 @@ fn flat_distances(cell: &Cell, point: DVec3) -> (f64, f64) {
 /// each of the `levels`.
 pub fn cull_view(
     stand: &PackedStand,
-    sizes: &[VariantSize],
+    sizes: &[PlantSize],
     camera: DVec3,
     frustum: &Frustum,
     levels: &Levels,

@@ -38,9 +38,6 @@ impl Default for NightSky {
 }
 
 impl NightSky {
-    /// No light at all.
-    pub const DARK: Self = Self { airglow: Vec3::ZERO, starlight: Vec3::ZERO, zodiacal: Vec3::ZERO };
-
     /// Radiance in nits from the unit direction `view` at an observer at a height above the sea; below the
     /// horizon the ground, dimly lit by it, behind the horizon's haze. What the air scatters into the view is not
     /// integrated; to make up for it (Leinert et al. 1998, 2.2), extinction and slant are those of a zenith cosine

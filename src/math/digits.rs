@@ -19,9 +19,12 @@ mod tests {
 
     #[test]
     fn digits_come_in_threes() {
-        for (number, text) in [(0, "0"), (12, "12"), (123, "123"), (1234, "1,234"), (300_000, "300,000")] {
+        for (number, text) in
+            [(0, "0"), (12, "12"), (123, "123"), (1234, "1,234"), (999, "999"), (1_017_344, "1,017,344")]
+        {
             assert_eq!(grouped(number), text);
         }
+        assert_eq!(grouped(300_000), "300,000");
         assert_eq!(grouped(12_345_678), "12,345,678");
     }
 }

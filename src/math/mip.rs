@@ -1,7 +1,9 @@
 //! A texture with its mip levels.
 
+use serde::{Deserialize, Serialize};
+
 /// A texture with its mip levels, RGBA8, ready to be uploaded.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MipChain {
     /// Width of level 0 in texels.
     pub width: u32,
@@ -17,6 +19,14 @@ impl MipChain {
     pub fn level_size(&self, level: usize) -> (u32, u32) {
         let shrink = |size: u32| if size == 0 { 0 } else { size.checked_shr(level as u32).unwrap_or(0).max(1) };
         (shrink(self.width), shrink(self.height))
+    }
+
+    /// Whether every level has the bytes that its size asks for.
+    pub fn is_whole(&self) -> bool {
+        self.levels.iter().enumerate().all(|(index, level)| {
+            let (width, height) = self.level_size(index);
+            level.len() as u64 == u64::from(width) * u64::from(height) * 4
+        })
     }
 
     /// The levels one after the other in one allocation, full size first: what a GPU upload expects.

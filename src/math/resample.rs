@@ -42,10 +42,7 @@ impl Layer {
         let encoded: Vec<[u8; 4]> = self
             .texels
             .par_iter()
-            .map(|t| {
-                let channel = |value: f32| srgb8(value);
-                [channel(t[0]), channel(t[1]), channel(t[2]), unorm8(t[3])]
-            })
+            .map(|&[red, green, blue, alpha]| [srgb8(red), srgb8(green), srgb8(blue), unorm8(alpha)])
             .collect();
         encoded.into_flattened()
     }

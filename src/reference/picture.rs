@@ -95,7 +95,7 @@ impl<'a> Development<'a> {
             let encoded = shown.max(Vec3::ZERO).map(|c| c.powf(1.0 / 2.2)) + (noise - 0.5) / 255.0;
             shown = encoded.max(Vec3::ZERO).map(|c| c.powf(2.2));
         }
-        shown.to_array().map(|c| srgb8(c))
+        shown.to_array().map(srgb8)
     }
 }
 

@@ -116,7 +116,7 @@ pub enum ScatterError {
         limit: usize,
     },
     /// A tree names a variant that does not exist.
-    #[error("tree {tree} is of variant {variant}, but only {count} variants are known: give bounds for each variant")]
+    #[error("tree {tree} is of variant {variant}, but only {count} variants are known: give the size of each variant")]
     UnknownVariant {
         /// Place of the tree in its stand.
         tree: usize,
@@ -125,9 +125,9 @@ pub enum ScatterError {
         /// Number of variants known.
         count: usize,
     },
-    /// The bounds of a variant are not usable.
+    /// The size of a variant is not usable.
     #[error("variant {variant} has {what} {value} m: give 0 to 1000 m")]
-    VariantBounds {
+    PlantSize {
         /// The variant.
         variant: usize,
         /// `radius` or `height`.

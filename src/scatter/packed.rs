@@ -166,13 +166,23 @@ impl PackedTree {
     }
 }
 
-/// Extent of a plant at scale 1.
+/// Size of a plant at scale 1: an upright cylinder around its trunk's axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct VariantBounds {
-    /// Largest horizontal distance from the trunk's axis, metres.
-    pub radius: f32,
+pub struct PlantSize {
     /// Height above the foot, metres.
     pub height: f32,
+    /// Largest horizontal distance from the trunk's axis, metres.
+    pub radius: f32,
+}
+
+impl PlantSize {
+    /// Sizes below this, metres, count as this: a plant of nothing has a size too.
+    pub const LEAST: f32 = 0.01;
+
+    /// The size of a plant of this height and radius, metres; at least [`Self::LEAST`] each.
+    pub fn new(height: f32, radius: f32) -> Self {
+        Self { height: height.max(Self::LEAST), radius: radius.max(Self::LEAST) }
+    }
 }
 
 /// A square of ground with the trees that stand on it.
@@ -211,10 +221,10 @@ impl PackedStand {
     /// Packs `stand` into cells of `cell_size` metres (1 to 4096). `bounds` are those of the plants, by variant.
     ///
     /// # Errors
-    /// [`ScatterError::Size`] for the cell size, [`ScatterError::TooManyVariants`] and [`ScatterError::VariantBounds`] for
+    /// [`ScatterError::Size`] for the cell size, [`ScatterError::TooManyVariants`] and [`ScatterError::PlantSize`] for
     /// the bounds, [`ScatterError::UnknownVariant`] and [`ScatterError::Unpackable`] for the first tree that cannot be
     /// packed, [`ScatterError::TooManyTrees`] beyond 2³² - 1 trees.
-    pub fn new(stand: &Stand, cell_size: f64, bounds: &[VariantBounds]) -> Result<Self, ScatterError> {
+    pub fn new(stand: &Stand, cell_size: f64, bounds: &[PlantSize]) -> Result<Self, ScatterError> {
         if !(1.0..=4096.0).contains(&cell_size) {
             let remedy = format!("give 1 to 4096 m, such as {DEFAULT_CELL_SIZE}");
             return Err(ScatterError::Size { what: "the cell size", value: cell_size, remedy });
@@ -255,14 +265,14 @@ impl PackedStand {
 }
 
 /// Refuses bounds of too many variants, or that are not usable as lengths.
-pub(super) fn check_bounds(bounds: &[VariantBounds]) -> Result<(), ScatterError> {
+pub(super) fn check_bounds(bounds: &[PlantSize]) -> Result<(), ScatterError> {
     if bounds.len() > MAX_VARIANTS {
         return Err(ScatterError::TooManyVariants { count: bounds.len(), limit: MAX_VARIANTS });
     }
     for (variant, bound) in bounds.iter().enumerate() {
         for (what, value) in [("radius", bound.radius), ("height", bound.height)] {
             if !(0.0..=MAX_PLANT_M).contains(&value) {
-                return Err(ScatterError::VariantBounds { variant, what, value });
+                return Err(ScatterError::PlantSize { variant, what, value });
             }
         }
     }
@@ -270,7 +280,7 @@ pub(super) fn check_bounds(bounds: &[VariantBounds]) -> Result<(), ScatterError>
 }
 
 /// The cell of `group`, which is not empty. Boxes hold the trees as they are drawn, after rounding.
-fn cell(first: u32, group: &[PackedTree], cell_size: f64, bounds: &[VariantBounds]) -> Cell {
+fn cell(first: u32, group: &[PackedTree], cell_size: f64, bounds: &[PlantSize]) -> Cell {
     let (mut min, mut max, mut max_scale) = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0f32);
     for tree in group {
         let foot = tree.position(cell_size);

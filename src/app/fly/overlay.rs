@@ -12,9 +12,12 @@ use super::{
     session::Session,
     timing::FrameTimes,
 };
-use crate::render::{
-    components::Daylight,
-    report::{FrameReport, PassOutcome},
+use crate::{
+    math::digits::grouped,
+    render::{
+        components::Daylight,
+        report::{FrameReport, PassOutcome},
+    },
 };
 
 /// Points between an overlay and the window's edge.
@@ -177,31 +180,4 @@ fn help(ui: &mut Ui) {
             ui.end_row();
         }
     });
-}
-
-/// A number with its digits in groups of three.
-fn grouped(number: usize) -> String {
-    let digits = number.to_string();
-    let first = digits.len() % 3;
-    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
-    for (place, digit) in digits.chars().enumerate() {
-        if place > 0 && place % 3 == first {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn digits_come_in_threes() {
-        for (number, text) in [(0, "0"), (12, "12"), (123, "123"), (1234, "1,234"), (300_000, "300,000")] {
-            assert_eq!(grouped(number), text);
-        }
-        assert_eq!(grouped(12_345_678), "12,345,678");
-    }
 }

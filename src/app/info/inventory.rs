@@ -4,9 +4,10 @@ use std::{collections::BTreeMap, path::Path};
 
 use glam::DVec2;
 
-use super::page::{Page, grouped, length};
+use super::page::{Page, length};
 use crate::{
     app::AppError,
+    math::digits::grouped,
     scatter::{Coordinates, Inventory, InventoryOptions, inventory::columns_of, parse_inventory},
 };
 

@@ -14,13 +14,14 @@ pub mod transfer;
 use std::sync::Arc;
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use crate::plant::Plant;
 use implicit::{ImplicitSettings, NoSurface, bake_implicit};
 use transfer::{PackedPart, PackedTransfer, SCATTERED, TransferFormat, TransferSettings, bake_transfer};
 
 /// Which light a plant gets.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum LightingSettings {
     /// The leaves' own normals, all light from everywhere: [Luft 2007, fig. 1a], to compare with.
     Local,
@@ -48,7 +49,7 @@ impl LightingSettings {
 }
 
 /// What was baked. Lists have one entry a part in the plant's order, each with one value a vertex.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum BakedLighting {
     /// Nothing.
     #[default]
@@ -60,7 +61,7 @@ pub enum BakedLighting {
 }
 
 /// What is kept of an implicit surface's bake.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ExpressiveLighting {
     /// Unit normals. Those of foliage point out of the crown, whichever side of a leaf is seen, unless `no_surface`.
     pub normals: Vec<Vec<Vec3>>,
@@ -71,7 +72,8 @@ pub struct ExpressiveLighting {
 }
 
 /// What is kept of a transfer bake.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "PackedTransfer", into = "PackedTransfer")]
 pub struct TransferLighting {
     /// The coefficients, as the vertex shader reads them.
     pub packed: PackedTransfer,
@@ -97,6 +99,25 @@ impl TransferLighting {
         Self { ambient: ambient.collect(), packed }
     }
 }
+
+impl From<TransferLighting> for PackedTransfer {
+    fn from(lighting: TransferLighting) -> Self {
+        lighting.packed
+    }
+}
+
+impl TryFrom<PackedTransfer> for TransferLighting {
+    type Error = NotWhole;
+
+    fn try_from(packed: PackedTransfer) -> Result<Self, NotWhole> {
+        if packed.is_whole() { Ok(Self::new(packed)) } else { Err(NotWhole) }
+    }
+}
+
+/// Bytes of a transfer that do not fit its settings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the bytes of the transfer do not fit its settings: bake it again")]
+pub struct NotWhole;
 
 impl BakedLighting {
     /// Bakes what `settings` ask for.
@@ -158,13 +179,17 @@ impl BakedLighting {
         if count > 0.0 { ((mean / count) as f32, (rise / count) as f32) } else { (0.0, 0.0) }
     }
 
-    /// Whether the lists have as many entries as `plant` has parts and vertices.
+    /// Whether the lists have as many entries as `plant` has parts and vertices, and all values are in their ranges.
     pub fn fits(&self, plant: &Plant) -> bool {
         let counts = || plant.parts.iter().map(|part| part.mesh.positions.len());
         match self {
             Self::Local => true,
             Self::Expressive(lighting) => {
-                lighting.normals.iter().map(Vec::len).eq(counts()) && lighting.ambient.iter().map(Vec::len).eq(counts())
+                lighting.normals.iter().map(Vec::len).eq(counts())
+                    && lighting.ambient.iter().map(Vec::len).eq(counts())
+                    && lighting.normals.iter().flatten().all(|normal| normal.is_finite())
+                    && lighting.ambient.iter().flatten().all(|ambient| (0.0..=1.0).contains(ambient))
+                    && lighting.no_surface.is_none_or(|reason| reason.is_finite())
             }
             Self::Transfer(lighting) => lighting.ambient.iter().map(Vec::len).eq(counts()),
         }

@@ -21,14 +21,14 @@ use super::{
 };
 use crate::{
     bake::BakedPlant,
-    cull::{Grouping, VariantSize},
+    cull::Grouping,
     light::StandTrees,
     render::{
         components::Forest,
         extract::ExtractedScene,
         gpu::{self, Gpu},
     },
-    scatter::{PackedStand, PackedTree},
+    scatter::{PackedStand, PackedTree, PlantSize},
 };
 
 /// A level of one forest on the device.
@@ -52,7 +52,7 @@ pub struct GpuForest {
     pub variants: Buffer,
     leaves: Leaves,
     /// Size of each variant, for culling.
-    pub sizes: Vec<VariantSize>,
+    pub sizes: Vec<PlantSize>,
     /// Largest scale of any tree.
     pub max_scale: f32,
     /// The levels in the order of [`Forest::levels`]; `None` for a representation that nothing here can draw.
@@ -77,7 +77,7 @@ impl GpuForest {
     fn new(forest: &Forest, generation: u64, known: &Representations, upload: &mut ForestUpload) -> Self {
         let storage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
         let device = &upload.gpu.device;
-        let sizes: Vec<VariantSize> = forest.plants.iter().map(variant_size).collect();
+        let sizes: Vec<PlantSize> = forest.plants.iter().map(BakedPlant::size).collect();
         let trees = gpu::buffer_with::<PackedTree>(device, "canopy_trees", storage, &forest.stand.trees);
         let variants = gpu::buffer_with(device, "canopy_variants", storage, &variants(&forest.plants, &sizes));
         let level = |representation| {
@@ -198,8 +198,4 @@ pub fn prepare_forests(
         let made = GpuForest::new(forest, forests.generations, &representations, &mut upload);
         forests.forests.insert(*entity, made);
     }
-}
-
-fn variant_size(plant: &BakedPlant) -> VariantSize {
-    VariantSize { height: plant.plant.height(), radius: plant.plant.reach() }
 }

@@ -13,10 +13,10 @@ use crate::{
             transfer::{PackedPart, TransferSettings, code_words, mean_words},
         },
     },
-    cull::VariantSize,
     light::sh::MAX_BANDS,
     math::luminance,
     plant::{LeafColors, PlantMaterial},
+    scatter::PlantSize,
 };
 
 /// `ForestView` of `shaders/forest/instance.wgsl`.
@@ -167,7 +167,7 @@ pub fn scattered_tint(leaves: &LeafColors) -> Vec3 {
 }
 
 /// What the shaders know of each plant.
-pub fn variants(plants: &[BakedPlant], sizes: &[VariantSize]) -> Vec<VariantUniform> {
+pub fn variants(plants: &[BakedPlant], sizes: &[PlantSize]) -> Vec<VariantUniform> {
     let mut light_layer = 0;
     plants
         .iter()
@@ -182,7 +182,7 @@ pub fn variants(plants: &[BakedPlant], sizes: &[VariantSize]) -> Vec<VariantUnif
 }
 
 /// `light_layer`: the first of its lighting textures, if it has any.
-fn variant(index: usize, plant: &BakedPlant, size: &VariantSize, light_layer: usize) -> VariantUniform {
+fn variant(index: usize, plant: &BakedPlant, size: &PlantSize, light_layer: usize) -> VariantUniform {
     let mut planes = [PlaneUniform::default(); PLANES];
     for (slot, plane) in planes.iter_mut().zip(&plant.cross.planes) {
         *slot = PlaneUniform {

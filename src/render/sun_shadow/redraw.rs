@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     cull::{
-        SeenShadows, VariantSize,
+        SeenShadows,
         cascades::{CascadeBox, cascade_radii},
         cull_cascade,
     },
@@ -29,6 +29,7 @@ use crate::{
         report::FrameReport,
         view::PreparedFrame,
     },
+    scatter::PlantSize,
 };
 
 /// Places the cascades and gathers the casters of those that changed.
@@ -63,7 +64,7 @@ pub fn prepare_shadows(
         return;
     }
     maps.resize(&gpu.device, &settings);
-    let largest = |measure: fn(&VariantSize) -> f32| {
+    let largest = |measure: fn(&PlantSize) -> f32| {
         forests.iter().flat_map(move |(_, f)| f.sizes.iter().map(move |size| measure(size) * f.max_scale))
     };
     let tallest = largest(|size| size.height).fold(10.0f32, f32::max);

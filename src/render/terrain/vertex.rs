@@ -1,9 +1,8 @@
 //! Tiles and their vertices as the shader reads them.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{Vec2, Vec3};
 
-use crate::terrain::tiles::TileVertex;
+use crate::{math::octahedral, terrain::tiles::TileVertex};
 
 /// `TileVertex` of `shaders/terrain/terrain.wgsl`.
 #[repr(C)]
@@ -24,22 +23,10 @@ impl From<&TileVertex> for GpuTileVertex {
         Self {
             height: vertex.height,
             parent_height: vertex.parent_height,
-            normal: pack_octahedral(vertex.normal),
-            parent_normal: pack_octahedral(vertex.parent_normal),
+            normal: octahedral::pack_snorm16(octahedral::encode_y(vertex.normal)),
+            parent_normal: octahedral::pack_snorm16(octahedral::encode_y(vertex.parent_normal)),
         }
     }
-}
-
-/// Octahedral encoding about +Y [Cigolle et al. 2014] as two snorm16.
-fn pack_octahedral(normal: Vec3) -> u32 {
-    let n = normal / (normal.x.abs() + normal.y.abs() + normal.z.abs()).max(1e-12);
-    let mut e = Vec2::new(n.x, n.z);
-    if n.y < 0.0 {
-        let sign = Vec2::new(1f32.copysign(e.x), 1f32.copysign(e.y));
-        e = (Vec2::ONE - Vec2::new(e.y.abs(), e.x.abs())) * sign;
-    }
-    let snorm = |v: f32| ((v.clamp(-1.0, 1.0) * 32767.0).round() as i16) as u16;
-    u32::from(snorm(e.x)) | u32::from(snorm(e.y)) << 16
 }
 
 /// `Tile` of `shaders/terrain/terrain.wgsl`.

@@ -21,6 +21,7 @@ pub use light::LIGHT_SCALE;
 
 use glam::{Mat3, Vec3, Vec4};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use self::properties::SpreadSum;
 use super::rasterize::{Hit, Raster, View};
@@ -29,7 +30,7 @@ use crate::math::{MipChain, luminance};
 use crate::plant::{Bounds, PartKind, Plant, geometry};
 
 /// Crossed billboards of one plant.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cross {
     /// The planes: facing +Z, facing +X, and facing up. Always three.
     pub planes: Vec<CrossPlane>,
@@ -43,11 +44,25 @@ pub struct Cross {
     pub spread: [f32; SPREAD_LEVELS],
 }
 
+impl Cross {
+    /// Whether the lists go together, of a plant that is lit by radiance transfer or not, and all values are in their ranges.
+    pub fn is_whole(&self, of_transfer: bool) -> bool {
+        let CrossTextures { color, properties, light } = &self.textures;
+        let planes = self.planes.len();
+        let finite = |plane: &CrossPlane| [plane.center, plane.u, plane.v, plane.normal].iter().all(|v| v.is_finite());
+        self.planes.iter().all(finite)
+            && [color.len(), properties.len(), light.len()] == [planes, planes, if of_transfer { planes } else { 0 }]
+            && color.iter().chain(properties).chain(light).all(MipChain::is_whole)
+            && self.transmission.is_finite()
+            && self.spread.iter().all(|share| (0.0..=1.0).contains(share))
+    }
+}
+
 /// Mips for which [`Cross::spread`] is known.
 pub const SPREAD_LEVELS: usize = 8;
 
 /// A rectangle `center + s u + t v` with s and t in -1..=1; its picture's upper left is at `center - u + v`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CrossPlane {
     /// Middle, metres, in the plant's frame.
     pub center: Vec3,
@@ -75,7 +90,7 @@ impl CrossPlane {
 }
 
 /// The pictures of crossed billboards, one of each kind a plane.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CrossTextures {
     /// Base colour: sRGB-encoded RGB, to be drawn with an alpha test at 0.5 or above. At 0.5 the outline covers what
     /// the full model covers (in every mip); towards 1 the crown shrinks to its inside
@@ -97,7 +112,7 @@ pub struct CrossTextures {
 }
 
 /// How crossed billboards are made. Values out of range are moved into it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CrossSettings {
     /// Edge of the square textures in texels, a power of two, 64..=1024 (rounded up to one). Larger: crosses may come
     /// nearer to the viewer; memory grows with the square (256: 2.1 MB a plant, 3.1 MB of one lit by transfer).

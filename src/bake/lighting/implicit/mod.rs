@@ -46,6 +46,7 @@ pub mod stand;
 use std::borrow::Cow;
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use crate::plant::{PartKind, Plant, PlantMesh, PlantPart, geometry};
 use ambient_term::ambient_term;
@@ -61,7 +62,7 @@ pub use simplify::{COARSE_SHARE, FINE_SHARE};
 pub use stand::{StandBake, StandPlant, bake_implicit_stand};
 
 /// Why the foliage keeps its own normals. As published its ambient term is 1 throughout in the first two cases.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
 pub enum NoSurface {
     /// There is no leaf that counts, or ρ is 0.
     #[error("there is no density field: the plant has no foliage with an area, or the radius is 0; normals are kept")]
@@ -83,6 +84,17 @@ pub enum NoSurface {
         /// Edge of a cell, metres.
         cell: f32,
     },
+}
+
+impl NoSurface {
+    /// Whether all numbers of the reason are finite.
+    pub fn is_finite(self) -> bool {
+        match self {
+            Self::NoField => true,
+            Self::Threshold { threshold, greatest } => threshold.is_finite() && greatest.is_finite(),
+            Self::BelowResolution { cell } => cell.is_finite(),
+        }
+    }
 }
 
 /// How a bake went.

@@ -10,6 +10,7 @@
 //!   were fitted to the traced visibility of ten plants, which `benches/implicit.rs` prints beside what they give.
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use super::density::DensityField;
 use super::generators::{Generator, Weighting, even_share};
@@ -27,7 +28,7 @@ const THRESHOLD_SHARE: f32 = 0.25;
 const SAMPLES: usize = 4096;
 
 /// What the ambient term is a function of.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum AmbientField {
     /// F - τ of the field with the radius ρ, as published: the surface of the normals is where the crown begins to
     /// darken. What lies beyond ρ casts no shade.
@@ -58,7 +59,7 @@ impl AmbientField {
 }
 
 /// Where the normals of the foliage come from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum NormalSource {
     /// The nearest vertex of the surface, as published. Jumps between lobes of the crown.
     #[default]
@@ -68,7 +69,7 @@ pub enum NormalSource {
 }
 
 /// How a plant is lit by implicit surfaces. Values out of range are moved into it; `None` follows from the model.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ImplicitSettings {
     /// ρ, metres, 0..=1e6. Larger: a smoother, more general shape of the crown.
     pub radius: Option<f32>,

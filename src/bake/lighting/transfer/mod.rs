@@ -52,6 +52,8 @@ mod scene;
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 pub use evaluate::{exitant_radiance, scattered_share, share};
 pub use pack::{PackedPart, PackedTransfer, TransferFormat, code_words, mean_words};
 pub use rays::direction_set;
@@ -64,7 +66,7 @@ use rays::Directions;
 use scene::Scene;
 
 /// How many coefficients a vertex and side have, and whether they have a colour.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Channels {
     /// One channel.
     One,
@@ -83,7 +85,7 @@ impl Channels {
 }
 
 /// How the coefficients follow from the sampled directions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Projection {
     /// The integral against each basis function, by quadrature [Franzke 2005, 4.2.3].
     Quadrature,
@@ -92,7 +94,7 @@ pub enum Projection {
 }
 
 /// What happens to light that meets the plant on its way to a vertex.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Interior {
     /// Light goes straight on through up to this many leaves (0..=8; 0: none), dimmed and tinted by the transmission
     /// of each; wood, and one leaf more, stop it. Nothing is reflected. A leaf under an even sky shines through as
@@ -104,7 +106,7 @@ pub enum Interior {
 }
 
 /// How transfer is baked. Values out of range are moved into it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct TransferSettings {
     /// Bands n, 2..=6: n² coefficients a side and channel. More: sharper, memory and run time grow with the square.
     pub bands: u8,

@@ -20,12 +20,13 @@
 //! comes to under skies.
 
 use half::f16;
+use serde::{Deserialize, Serialize};
 
 use super::{SCATTERED, TransferBake, TransferPart, TransferSettings};
 use crate::light::sh::MAX_BANDS;
 
 /// How a coefficient is stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum TransferFormat {
     /// As computed, 4 bytes each.
     Float32,
@@ -36,7 +37,7 @@ pub enum TransferFormat {
 }
 
 /// A plant's transfer as bytes.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PackedTransfer {
     /// The settings it was baked with.
     pub settings: TransferSettings,
@@ -47,7 +48,7 @@ pub struct PackedTransfer {
 }
 
 /// One part's transfer as bytes.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PackedPart {
     /// 1 for wood, 2 for foliage.
     pub sides: usize,
@@ -97,6 +98,17 @@ impl TransferBake {
 }
 
 impl PackedTransfer {
+    /// Whether the settings are in their ranges, all parts have whole vertices of them, and all scales are finite.
+    pub fn is_whole(&self) -> bool {
+        self.settings == self.settings.in_range()
+            && self.parts.iter().all(|part| {
+                (1..=2).contains(&part.sides)
+                    && part.vertex_bytes == self.format.vertex_bytes(&self.settings, part.sides)
+                    && part.bytes.len().is_multiple_of(part.vertex_bytes)
+                    && part.scale.iter().chain([&part.scattered_scale]).all(|scale| scale.is_finite())
+            })
+    }
+
     /// The coefficients that the bytes stand for. Bytes that are missing count as zeros; never NaN.
     pub fn unpack(&self) -> TransferBake {
         let count = self.settings.coefficients();
