@@ -5,6 +5,7 @@ mod bake;
 mod cli;
 mod grow;
 mod implicit;
+mod library;
 mod light;
 mod load;
 mod plant;

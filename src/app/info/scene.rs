@@ -10,7 +10,8 @@ use super::{
     plant, terrain,
 };
 use crate::{
-    app::{AppError, ground::build_terrain, plants, stage, trees},
+    app::AppError,
+    assets::{ground::build_terrain, observer, plants, trees},
     bake::{
         BakedPlant,
         billboard::{Cross, CrossTextures, SPREAD_LEVELS},
@@ -18,8 +19,9 @@ use crate::{
     },
     light::sun::{Observer, SunPosition},
     plant::{PartKind, Plant, grow::GrowParameters},
+    progress::Progress,
     scatter::{InventoryOptions, LengthUnit, Stand, read_inventory},
-    scene::{self, PlantSource, Progress, Scene, Species, Trees},
+    scene::{self, PlantSource, Scene, Species, Trees},
     terrain::Terrain,
 };
 
@@ -56,7 +58,7 @@ fn describe_species_file(page: &mut Page, path: &Path, species: &GrowParameters)
 fn describe(page: &mut Page, scene: &Scene, path: &Path) -> Result<(), AppError> {
     let mut heard = Heard::default();
     let ground = build_terrain(&scene.terrain, &mut heard)?;
-    let observer = stage::observer(scene, &ground)?;
+    let observer = observer(scene, &ground)?;
     let plan = plants::plan(scene)?;
     let mut individuals = Vec::with_capacity(plan.individuals.len());
     for individual in &plan.individuals {

@@ -16,7 +16,7 @@ use std::{
 };
 
 use crate::{
-    app::threads::spare_cores,
+    assets::threads::spare_cores,
     bake::{
         billboard::{Cross, CrossSettings, bake_cross},
         implicit::{ImplicitParameters, ImplicitSettings, NoSurface, bake_implicit, implicit_parameters},

@@ -18,7 +18,7 @@ use bevy::ecs::{
 
 use super::{controls::Turn, session::Session};
 use crate::{
-    app::{plants, stage::Stage},
+    assets::{Stage, plants},
     bake::{BakedPlant, billboard::CrossSettings, implicit::ImplicitParameters, lighting::LightingSettings},
     render::components::Forest,
     scene::{Lighting, Transfer},
@@ -237,7 +237,7 @@ mod tests {
     };
 
     use super::*;
-    use crate::scene::{Scene, Silent};
+    use crate::{progress::Silent, scene::Scene};
 
     type Outcome = Result<(), Box<dyn std::error::Error>>;
 
