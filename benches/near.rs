@@ -17,10 +17,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use canopy::{
-    app::{Picture, Renderer, Stage, reference},
+    app::{LightGroup, Picture, ReferenceOptions, Renderer, View, parse_lighting, parse_size, reference},
+    assets::Stage,
     math::srgb_to_linear,
+    progress::Silent,
     render::components::Ground,
-    scene::{LightGroup, LocalTime, Overrides, ReferenceOptions, Scene, Silent, View, parse_lighting, parse_size},
+    scene::{LocalTime, Overrides, Scene},
 };
 use clap::Parser;
 use nv_flip::{FlipImageRgb8, FlipPool, flip};

@@ -18,9 +18,11 @@ use bevy::ecs::{
     query::{Or, With},
 };
 use canopy::{
-    app::{Renderer, Stage},
+    app::{Pictures, RenderOptions, RenderPlan, Renderer, Still, View},
+    assets::Stage,
+    progress::Progress,
     render::components::{Forest, Ground},
-    scene::{Overrides, Pictures, Progress, RenderOptions, RenderPlan, Scene, Still, View, Viewpoint},
+    scene::{Overrides, Scene, Viewpoint},
 };
 use chrono::TimeDelta;
 use clap::Parser;

@@ -32,14 +32,22 @@
 //! ```
 //!
 //! A scene that is built in code ([`Scene`](scene::Scene)) goes where a file's name can go, and needs no file.
-//! Another scene takes its place when a [`LoadScene`](app::LoadScene) asks for it. A program that would rather wait calls
-//! [`Stage::build`](app::Stage::build) itself, and [`Stage::show`](app::Stage::show).
+//! Another scene takes its place when a [`LoadScene`](assets::LoadScene) asks for it. A program that would rather wait calls
+//! [`Stage::build`](assets::Stage::build) itself, and [`Stage::show`](assets::Stage::show).
 //!
 //! The rooms: [`math`], [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`bake`], [`light`], [`lod`],
-//! [`trace`] and [`mod@reference`] know no App and no GPU; [`render`] draws what they make; [`app`] is the interactive
-//! program. ARCHITECTURE.md in the repository shows how a tree gets from a file to a pixel.
+//! [`trace`] and [`mod@reference`] know no App and no GPU; [`assets`] builds scenes from them, and [`render`] draws what they
+//! make. ARCHITECTURE.md in the repository shows how a tree gets from a file to a pixel.
+//!
+//! # Cargo features
+//! - `program` (default): the command `canopy` and the module `app`; brings `clap`, `egui` and progress bars.
+//! - `window` (part of `program`): Bevy's window, keyboard and mouse.
+//!
+//! A program that has a window of its own takes Canopy with `default-features = false`.
 
+#[cfg(feature = "program")]
 pub mod app;
+pub mod assets;
 pub mod bake;
 pub mod cull;
 mod files;
@@ -48,6 +56,7 @@ pub mod lod;
 pub mod math;
 pub mod plant;
 mod plugin;
+pub mod progress;
 pub mod reference;
 pub mod render;
 pub mod scatter;
@@ -61,14 +70,17 @@ pub use plugin::CanopyPlugins;
 pub mod prelude {
     pub use crate::{
         CanopyPlugins,
-        app::{CanopyScenePlugin, LoadScene, LoadedScene, SceneFailed, SceneProgress, SceneReady, SceneState, Stage},
+        assets::{
+            CanopyScenePlugin, LoadScene, LoadedScene, SceneFailed, SceneProgress, SceneReady, SceneState, Stage,
+        },
         lod::{FadeBand, Levels, Representation},
+        progress::{Progress, Silent},
         render::{
             components::{
                 CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, SunShadowSettings, ViewOptions,
             },
             daylight::{FollowsDaylight, SkySettings},
         },
-        scene::{Overrides, Progress, Scene, SceneSource, Silent},
+        scene::{Overrides, Scene, SceneSource},
     };
 }

@@ -40,12 +40,12 @@ fn list_adapters() -> anyhow::Result<()> {
     cli::print_lines(canopy::app::list_adapters()?)
 }
 
-fn fly_through(options: &canopy::scene::FlyOptions) -> anyhow::Result<()> {
+fn fly_through(options: &canopy::app::FlyOptions) -> anyhow::Result<()> {
     let mut bars = Bars::new(options.quiet);
     Ok(canopy::app::fly(options, &mut bars)?)
 }
 
-fn render_pictures(options: &canopy::scene::RenderOptions) -> anyhow::Result<()> {
+fn render_pictures(options: &canopy::app::RenderOptions) -> anyhow::Result<()> {
     let mut bars = Bars::new(options.quiet);
     let report = canopy::app::render(options, &mut bars)?;
     drop(bars);
@@ -56,7 +56,7 @@ fn render_pictures(options: &canopy::scene::RenderOptions) -> anyhow::Result<()>
     cli::print_lines(report.files.iter().map(|file| file.display()))
 }
 
-fn trace_reference(options: &canopy::scene::ReferenceOptions) -> anyhow::Result<()> {
+fn trace_reference(options: &canopy::app::ReferenceOptions) -> anyhow::Result<()> {
     let mut bars = Bars::new(options.quiet);
     let file = canopy::app::reference(options, &mut bars)?;
     drop(bars);

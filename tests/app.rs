@@ -3,9 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use canopy::{
-    app::{AppError, Stage, info},
+    app::{AppError, info},
+    assets::{Stage, StageError},
     plant::PartKind,
-    scene::{Scene, Silent},
+    progress::Silent,
+    scene::Scene,
 };
 
 use crate::support::{
@@ -165,7 +167,7 @@ fn info_of_the_real_data() {
 }
 
 /// A scene of `trees` (lines of a table) whose broadleaves are lit `light`.
-fn lit_stand(folder: &Path, trees: &str, light: &str) -> Result<Stage, AppError> {
+fn lit_stand(folder: &Path, trees: &str, light: &str) -> Result<Stage, StageError> {
     let scene = format!(
         "(terrain: Flat(size: 200), place: (latitude: 48, longitude: 9), species: [\
          (name: \"tree\", plant: Grown(form: Broadleaf, individuals: 1, triangles: 5000, seed: 1), lighting: {light}), \

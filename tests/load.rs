@@ -8,7 +8,7 @@ use std::{
 
 use bevy::prelude::*;
 use canopy::{
-    app::LoadedScene,
+    assets::LoadedScene,
     prelude::*,
     render::{components::Forest, daylight::SkySettings},
     scene::{GroundFlat, GrownPlants, Lighting, Quality, ScatteredTrees, Scene, SceneSource, Species},

@@ -6,6 +6,7 @@ mod cli;
 mod grow;
 mod implicit;
 mod layering;
+mod library;
 mod light;
 mod load;
 mod math;

@@ -5,7 +5,8 @@ mod pictures;
 mod shadows;
 mod world;
 
-use canopy::app::{Picture, Renderer, Stage};
+use canopy::app::{Picture, Renderer};
+use canopy::assets::Stage;
 use canopy::scene::Viewpoint;
 
 use crate::support::stage::instant;

@@ -2,10 +2,11 @@
 
 use std::path::Path as FilePath;
 
+use canopy::app::parse_lighting;
 use canopy::scene::{
     GltfPlants, Ground, GroundFile, GrownForm, GrownPlants, InventoryTrees, LeafGloss, LengthUnit, Lighting, Moon,
     Overrides, Path, PlantSource, Position, ScatteredTrees, Scene, SceneError, Sequence, Species, SunLight, Transfer,
-    Trees, parse_lighting,
+    Trees,
 };
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;

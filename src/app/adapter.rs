@@ -1,15 +1,11 @@
 //! Graphics adapters: which there are, and the one to use.
 
 use bevy::{
-    render::{
-        renderer::RenderDevice,
-        settings::{Backends, WgpuSettings},
-    },
+    render::settings::{Backends, WgpuSettings},
     tasks::block_on,
 };
 
-use super::{error::AppError, stage::Stage};
-use crate::scatter::PackedTree;
+use super::error::AppError;
 
 /// Of these only errors are worth the user's while: that a driver is slow, lacks bindless textures, or that a display
 /// does not know its size in millimetres, is none.
@@ -49,15 +45,6 @@ fn best_first(mut infos: Vec<wgpu::AdapterInfo>) -> Vec<wgpu::AdapterInfo> {
     };
     infos.sort_by_key(rank);
     infos
-}
-
-/// Refuses a stand beyond the device's largest storage buffer, in which all trees lie.
-pub fn check_trees(device: &RenderDevice, stage: &Stage) -> Result<(), AppError> {
-    let limits = device.limits();
-    let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-    let limit = usize::try_from(bytes).unwrap_or(usize::MAX) / size_of::<PackedTree>();
-    let count = stage.stand.trees.len();
-    if count > limit { Err(AppError::TooManyTrees { count, limit }) } else { Ok(()) }
 }
 
 /// Whether `name` contains `part`, as Bevy compares them: case does not count, and an empty part is in every name.

@@ -33,16 +33,20 @@ use bevy::{
 };
 use chrono::{DateTime, Utc};
 
-use super::{adapter, camera, error::AppError, notes::notes, picture::Picture, stage::Stage};
+use super::{
+    RenderOptions, RenderPlan, RenderReport, adapter, camera, error::AppError, notes::notes, picture::Picture,
+};
 use crate::{
+    assets::Stage,
     plugin::CanopyPlugins,
+    progress::Progress,
     render::{
         components::CanopyCamera,
         readback::read_rgb,
         report::{FrameReport, PassOutcome},
         shaders::CanopyShaders,
     },
-    scene::{Progress, RenderOptions, RenderPlan, RenderReport, Viewpoint},
+    scene::Viewpoint,
 };
 
 /// Draws the pictures that `options` ask for.
@@ -61,7 +65,7 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
     let started = Instant::now();
     progress.begin("Renderer", 0);
     let mut renderer = Renderer::with_settings(settings, options.size, stage.scene.quality.msaa)?;
-    adapter::check_trees(renderer.app.world().resource::<RenderDevice>(), &stage)?;
+    stage.check_device(renderer.app.world().resource::<RenderDevice>())?;
     renderer.show(&stage);
     progress.end();
     progress.note(&format!("renderer: {:.2} s", started.elapsed().as_secs_f64()));

@@ -1,29 +1,30 @@
-//! The program: scenes built into stages, beside a Bevy program where it wants, headless pictures, the ground truth of a scene, the interactive flight, and what a file holds.
+//! The program, behind the cargo feature `program`: the interactive flight, pictures without a window, the ground truth of
+//! a scene, and what a file holds. The command line fills the requests ([`FlyOptions`], [`RenderOptions`],
+//! [`ReferenceOptions`]), and the functions here carry them out.
 
 mod adapter;
 mod camera;
 mod error;
 mod fly;
-mod ground;
 mod headless;
 mod info;
-mod load;
 mod notes;
+mod parse;
 mod picture;
-mod plants;
+mod plan;
 mod reference;
-mod stage;
-mod threads;
-mod together;
+mod request;
 mod tone;
-mod trees;
 
 pub use adapter::list_adapters;
 pub use error::AppError;
 pub use fly::fly;
 pub use headless::{Renderer, render};
 pub use info::info;
-pub use load::{CanopyScenePlugin, LoadScene, LoadedScene, SceneFailed, SceneProgress, SceneReady, SceneState};
+pub use parse::{ArgumentError, parse_lighting, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size};
 pub use picture::Picture;
+pub use plan::{Frame, PlanError, RenderPlan};
 pub use reference::reference;
-pub use stage::{Shown, Stage};
+pub use request::{
+    Clock, FlyOptions, LightGroup, Pictures, ReferenceOptions, RenderOptions, RenderReport, Still, View,
+};

@@ -2,8 +2,7 @@
 
 use chrono::{DateTime, Utc};
 
-use super::stage::Stage;
-use crate::scene::Viewpoint;
+use crate::{assets::Stage, scene::Viewpoint};
 
 /// Pairs of keyword and text for a picture of `stage`, seen from `view` in the light of `instant`.
 pub fn notes(stage: &Stage, view: &Viewpoint, instant: DateTime<Utc>) -> Vec<(&'static str, String)> {

@@ -6,14 +6,18 @@ use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
-use super::{camera::NEAR, error::AppError, notes::notes, picture::Picture, stage::Stage, tone::tone_table};
+use super::{
+    Frame, LightGroup, Pictures, PlanError, ReferenceOptions, RenderOptions, RenderPlan, Still, camera::NEAR,
+    error::AppError, notes::notes, picture::Picture, tone::tone_table,
+};
 use crate::{
+    assets::Stage,
     light::{Atmosphere, AtmosphereParams, LightState},
+    progress::Progress,
     reference::{
         Camera, Development, Film, Fog, Ground, GroundColor, GroundShape, Instance, Light, PathTracer, ReferenceScene,
         Shot, Soil, TraceSettings,
     },
-    scene::{Frame, LightGroup, Pictures, Progress, ReferenceOptions, RenderOptions, RenderPlan, Still},
 };
 
 /// How often the film is kept on disk while it grows.
@@ -100,7 +104,7 @@ fn frame(options: &ReferenceOptions, stage: &Stage) -> Result<Frame, AppError> {
         explain: false,
     };
     let plan = RenderPlan::new(&still, &stage.scene, &|x, z| stage.terrain.height(x, z))?;
-    plan.frames.into_iter().next().ok_or(AppError::Plan(crate::scene::PlanError::Nothing))
+    plan.frames.into_iter().next().ok_or(AppError::Plan(PlanError::Nothing))
 }
 
 fn scene(stage: &Stage) -> Result<ReferenceScene, AppError> {

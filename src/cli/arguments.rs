@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use canopy::scene::{
-    Lighting, LocalTime, Pose, parse_lighting, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size,
+use canopy::{
+    app::{parse_lighting, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size},
+    scene::{Lighting, LocalTime, Pose},
 };
 use clap::{Args, Parser, Subcommand};
 

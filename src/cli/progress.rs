@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use canopy::scene::Progress;
+use canopy::progress::Progress;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// A progress bar on the standard error output, one stage at a time. It vanishes with its stage, and is never drawn

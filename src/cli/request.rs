@@ -2,7 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use canopy::scene::{Clock, FlyOptions, LightGroup, Overrides, Pictures, ReferenceOptions, RenderOptions, Still, View};
+use canopy::{
+    app::{Clock, FlyOptions, LightGroup, Pictures, ReferenceOptions, RenderOptions, Still, View},
+    scene::{LocalTime, Overrides},
+};
 use clap::CommandFactory;
 use clap::error::ErrorKind;
 
@@ -81,10 +84,10 @@ pub fn reference_options(reference: Reference, common: &Common) -> Result<Refere
 
 fn pictures(
     mut out: Vec<PathBuf>,
-    at: &[canopy::scene::LocalTime],
+    at: &[LocalTime],
     frames: Option<u32>,
     fps: Option<f64>,
-    span: Option<(canopy::scene::LocalTime, canopy::scene::LocalTime)>,
+    span: Option<(LocalTime, LocalTime)>,
 ) -> Result<Pictures, clap::Error> {
     let Some(frames) = frames else {
         if out.len() != at.len().max(1) {

@@ -1,4 +1,4 @@
-//! What a user writes: scene files, times, poses and render requests, validated.
+//! What a user writes: scene files, times and poses, validated.
 //!
 //! A scene file is [RON](https://docs.rs/ron): structures are `(field: value, ...)`, choices `Name(field: value, ...)`,
 //! lists `[a, b]`, comments `//`. Optional values need no `Some`. Only `terrain` is required; every other field has
@@ -45,12 +45,9 @@ mod ground;
 mod lighting;
 mod locate;
 mod overrides;
-mod parse;
 mod path;
 mod place;
-mod plan;
 mod quality;
-mod request;
 mod source;
 mod species;
 mod time;
@@ -62,15 +59,9 @@ pub use ground::{Coordinates, Crop, Ground, GroundFile, GroundFlat, GroundImage,
 pub use lighting::{AmbientTerm, CrownNormals, Expressive, Lighting, SunLight, Transfer};
 pub use locate::Position;
 pub use overrides::Overrides;
-pub use parse::{ArgumentError, parse_lighting, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size};
 pub use path::Path;
 pub use place::{Moon, Place};
-pub use plan::{Frame, PlanError, RenderPlan};
 pub use quality::Quality;
-pub use request::{
-    Clock, FlyOptions, LightGroup, Pictures, Progress, ReferenceOptions, RenderOptions, RenderReport, Silent, Still,
-    View,
-};
 pub use source::SceneSource;
 pub use species::{GltfPlants, GrownForm, GrownPlants, LeafGloss, PlantSource, Species};
 pub use time::{LocalTime, TimeError, YEARS};

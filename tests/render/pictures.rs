@@ -1,7 +1,8 @@
 //! Whole pictures: against references, against each other, and that each depends on its arguments alone.
 
 use canopy::{
-    app::{Picture, Stage},
+    app::Picture,
+    assets::Stage,
     lod::{FadeBand, Levels},
     render::components::{CanopyOrigin, Forest, SunShadowSettings},
     scene::Viewpoint,

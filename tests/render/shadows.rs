@@ -3,7 +3,8 @@
 use std::sync::{Arc, OnceLock};
 
 use canopy::{
-    app::{Picture, Renderer, Stage},
+    app::{Picture, Renderer},
+    assets::Stage,
     light::{Atmosphere, AtmosphereParams, LightSettings, LightState, SunPosition},
     render::components::{Daylight, Forest, SunShadowSettings},
     scene::Viewpoint,

@@ -10,7 +10,8 @@ use bevy::{
     render::{RenderApp, render_resource::TextureFormat, view::Msaa},
 };
 use canopy::{
-    app::{Picture, Renderer, Stage},
+    app::{Picture, Renderer},
+    assets::Stage,
     bake::{
         BakeSettings, BakedPlant, bake_plant,
         levels::cross::CrossSettings,

@@ -1,8 +1,9 @@
 //! Small scenes, and views into them.
 
 use canopy::{
-    app::Stage,
-    scene::{LocalTime, Pose, Progress, Scene, SceneSource, Viewpoint},
+    assets::{Stage, StageError},
+    progress::Progress,
+    scene::{LocalTime, Pose, Scene, SceneSource, Viewpoint},
 };
 use chrono::{DateTime, Utc};
 use glam::{DVec2, DVec3};
@@ -56,7 +57,7 @@ pub fn build(text: &str, files: &[(&str, &[u8])]) -> Built {
 /// Builds the scene.
 #[track_caller]
 pub fn built(scene: impl Into<SceneSource>, heard: &mut Heard) -> Stage {
-    let built = scene.into().read().map_err(Into::into).and_then(|scene| Stage::build(&scene, heard));
+    let built = scene.into().read().map_err(StageError::from).and_then(|scene| Stage::build(&scene, heard));
     match built {
         Ok(stage) => stage,
         Err(error) => panic!("{error}"),

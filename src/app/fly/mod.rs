@@ -31,11 +31,8 @@ use bevy::{
 };
 use bevy_egui::{EguiPlugin, EguiPostUpdateSet, EguiPrimaryContextPass};
 
-use super::{adapter, error::AppError, stage::Stage};
-use crate::{
-    plugin::CanopyPlugins,
-    scene::{FlyOptions, Progress},
-};
+use super::{FlyOptions, adapter, error::AppError};
+use crate::{assets::Stage, plugin::CanopyPlugins, progress::Progress};
 use session::Session;
 
 /// Opens a window and flies until the user has enough. Blocks; must be called on the program's main thread.

@@ -9,8 +9,9 @@ use super::{
     tour::Tour,
 };
 use crate::{
-    app::{error::AppError, stage::Stage},
-    scene::{FlyOptions, LocalTime, Pose, View, Viewpoint},
+    app::{AppError, FlyOptions, View},
+    assets::Stage,
+    scene::{LocalTime, Pose, Viewpoint},
 };
 
 use bevy::ecs::resource::Resource;
@@ -198,7 +199,10 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::scene::{Overrides, Scene, Silent};
+    use crate::{
+        progress::Silent,
+        scene::{Overrides, Scene},
+    };
 
     const SCENE: &str = "(
         terrain: Noise(size: 400, amplitude: 40, seed: 3),

@@ -1,6 +1,9 @@
 //! The scripted flight: the scene's path, round and round.
 
-use crate::scene::{Path, PlanError, Pose, Scene, View};
+use crate::{
+    app::{PlanError, View},
+    scene::{Path, Pose, Scene},
+};
 
 /// A place on the scene's path that moves with time.
 #[derive(Clone, Debug, PartialEq)]

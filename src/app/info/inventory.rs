@@ -7,6 +7,7 @@ use glam::DVec2;
 use super::page::{Page, length};
 use crate::{
     app::AppError,
+    assets::StageError,
     math::digits::grouped,
     scatter::{Coordinates, Inventory, InventoryOptions, inventory::columns_of, parse_inventory},
 };
@@ -15,7 +16,7 @@ use crate::{
 const LISTED: usize = 12;
 
 pub(super) fn describe_file(page: &mut Page, path: &Path) -> Result<(), AppError> {
-    let bytes = std::fs::read(path).map_err(|source| AppError::Read { path: path.to_owned(), source })?;
+    let bytes = std::fs::read(path).map_err(|source| StageError::Read { path: path.to_owned(), source })?;
     let (name, options) = (path.display().to_string(), InventoryOptions::default());
     let inventory = parse_inventory(&bytes, &name, options)?;
     let columns = columns_of(&bytes, &name, options)?;

@@ -8,13 +8,15 @@ use super::{
     plant, terrain,
 };
 use crate::{
-    app::{AppError, ground::build_terrain, plants, stage, trees},
+    app::AppError,
+    assets::{ground::build_terrain, observer, plants, trees},
     bake::plant_size,
     light::sun::{Observer, SunPosition},
     math::digits::grouped,
     plant::{PartKind, Plant, grow::GrowParameters},
+    progress::Progress,
     scatter::{InventoryOptions, LengthUnit, PlantSize, Stand, read_inventory},
-    scene::{self, PlantSource, Progress, Scene, Species, Trees},
+    scene::{self, PlantSource, Scene, Species, Trees},
     terrain::Terrain,
 };
 
@@ -51,7 +53,7 @@ fn describe_species_file(page: &mut Page, path: &Path, species: &GrowParameters)
 fn describe(page: &mut Page, scene: &Scene, path: &Path) -> Result<(), AppError> {
     let mut heard = Heard::default();
     let ground = build_terrain(&scene.terrain, &mut heard)?;
-    let observer = stage::observer(scene, &ground)?;
+    let observer = observer(scene, &ground)?;
     let plan = plants::plan(scene)?;
     let mut individuals = Vec::with_capacity(plan.individuals.len());
     for individual in &plan.individuals {

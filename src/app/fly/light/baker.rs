@@ -16,7 +16,7 @@ use std::{
 };
 
 use crate::{
-    app::threads::spare_cores,
+    assets::threads::spare_cores,
     bake::{
         levels::cross::{Cross, CrossSettings, bake_cross},
         lighting::{

@@ -18,7 +18,7 @@ use bevy::ecs::{
 
 use super::{controls::Turn, session::Session};
 use crate::{
-    app::{plants, stage::Stage},
+    assets::{Stage, plants},
     bake::{
         BakedPlant,
         levels::cross::CrossSettings,
@@ -241,7 +241,7 @@ mod tests {
     };
 
     use super::*;
-    use crate::scene::{Scene, Silent};
+    use crate::{progress::Silent, scene::Scene};
 
     type Outcome = Result<(), Box<dyn std::error::Error>>;
 

@@ -12,8 +12,8 @@ use std::{
 
 use super::{LoadScene, progress::Said};
 use crate::{
-    app::{error::AppError, stage::Stage, threads::spare_cores},
-    scene::Progress,
+    assets::{Stage, StageError, threads::spare_cores},
+    progress::Progress,
 };
 
 /// What was said and nobody has heard yet.
@@ -25,26 +25,26 @@ pub struct Job {
     /// What is built.
     pub request: LoadScene,
     line: Line,
-    thread: JoinHandle<Result<Stage, AppError>>,
+    thread: JoinHandle<Result<Stage, StageError>>,
 }
 
 impl Job {
     /// Begins.
     ///
     /// # Errors
-    /// [`AppError::Background`] where the system has no thread for it.
-    pub fn start(request: LoadScene) -> Result<Self, AppError> {
+    /// [`StageError::Background`] where the system has no thread for it.
+    pub fn start(request: LoadScene) -> Result<Self, StageError> {
         let line = Line::default();
         let mut speaker = Speaker(line.clone());
         let LoadScene { scene, overrides } = request.clone();
         let work = move || {
             let name = |index| format!("canopy bake {index}");
             let pool = rayon::ThreadPoolBuilder::new().num_threads(spare_cores()).thread_name(name).build();
-            let pool = pool.map_err(|error| AppError::Background(format!("no threads for bakes: {error}")))?;
+            let pool = pool.map_err(|error| StageError::Background(format!("no threads for bakes: {error}")))?;
             pool.install(|| Stage::build(&overrides.applied(scene.read()?), &mut speaker))
         };
         let thread = thread::Builder::new().name("canopy scene".to_owned()).spawn(work);
-        let thread = thread.map_err(|error| AppError::Background(format!("no thread: {error}")))?;
+        let thread = thread.map_err(|error| StageError::Background(format!("no thread: {error}")))?;
         Ok(Self { request, line, thread })
     }
 
@@ -61,9 +61,9 @@ impl Job {
     /// What came of it.
     ///
     /// # Errors
-    /// Those of [`Stage::build`]; [`AppError::Background`] where the thread broke off.
-    pub fn finish(self) -> Result<Stage, AppError> {
-        self.thread.join().unwrap_or_else(|panic| Err(AppError::Background(broken_off(&*panic))))
+    /// Those of [`Stage::build`]; [`StageError::Background`] where the thread broke off.
+    pub fn finish(self) -> Result<Stage, StageError> {
+        self.thread.join().unwrap_or_else(|panic| Err(StageError::Background(broken_off(&*panic))))
     }
 }
 
@@ -135,7 +135,7 @@ mod tests {
         }
         drop(line);
         let outcome = thread.join().map_err(|_| "a panic")?;
-        assert!(matches!(outcome, Err(AppError::Cancelled)), "{:?}", outcome.err());
+        assert!(matches!(outcome, Err(StageError::Cancelled)), "{:?}", outcome.err());
         Ok(())
     }
 

@@ -5,11 +5,8 @@ use std::path::{Path as FilePath, PathBuf};
 
 use chrono::{DateTime, Utc};
 
-use super::Scene;
-use super::camera::{Pose, Viewpoint};
-use super::path::Path;
 use super::request::{Clock, Pictures, RenderOptions, View};
-use super::time::LocalTime;
+use crate::scene::{LocalTime, Path, Pose, Scene, Viewpoint};
 
 /// Pictures per second of a flight whose rate nobody stated.
 const DEFAULT_FPS: f64 = 25.0;
@@ -191,12 +188,15 @@ fn numbered(out: &FilePath, number: u32, frames: u32) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Overrides, Still};
     use super::*;
+    use crate::{
+        app::Still,
+        scene::{Overrides, SceneError},
+    };
 
     type Outcome = Result<(), Box<dyn std::error::Error>>;
 
-    fn scene(path: &str) -> Result<Scene, super::super::SceneError> {
+    fn scene(path: &str) -> Result<Scene, SceneError> {
         let text = format!(
             "(terrain: Flat(), place: (latitude: 47, longitude: 9, time: \"2026-06-21T12:00+02:00\"), camera: (start: \
              (position: (1, 2, 3), yaw: 90, pitch: -10), field_of_view: 60, path: [{path}]))"

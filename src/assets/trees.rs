@@ -2,13 +2,14 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{error::AppError, plants::PlantPlan};
+use super::{StageError, plants::PlantPlan};
 use crate::{
+    progress::Progress,
     scatter::{
         Allometry, Area, ClearingNoise, Coordinates, Ground, Inventory, InventoryOptions, InventorySpecies, LengthUnit,
         PlacementRules, PlantSize, Sequence, SizeRule, SpeciesRule, Stand, place, read_inventory, stand_from_inventory,
     },
-    scene::{self, Anchor, InventoryTrees, Progress, ScatteredTrees, Scene, Species, Trees},
+    scene::{self, Anchor, InventoryTrees, ScatteredTrees, Scene, Species, Trees},
     terrain::{CoordinateSystem, GeoReference, Terrain},
 };
 
@@ -30,14 +31,14 @@ impl Ground for Terrain {
 /// Builds the stand of `scene` on `terrain`, from plants of these sizes, by variant.
 ///
 /// # Errors
-/// [`AppError`] for rules that cannot be met and inventories that cannot be read.
+/// [`StageError`] for rules that cannot be met and inventories that cannot be read.
 pub fn build_stand(
     scene: &Scene,
     plan: &PlantPlan,
     sizes: &[PlantSize],
     terrain: &Terrain,
     progress: &mut dyn Progress,
-) -> Result<Stand, AppError> {
+) -> Result<Stand, StageError> {
     match &scene.trees {
         Trees::None => Ok(Stand::default()),
         Trees::Scattered(rules) => scatter(scene, rules, plan, sizes, terrain, progress),
@@ -62,7 +63,7 @@ fn scatter(
     sizes: &[PlantSize],
     terrain: &Terrain,
     progress: &mut dyn Progress,
-) -> Result<Stand, AppError> {
+) -> Result<Stand, StageError> {
     let extent = terrain.extent();
     let area = trees.area.map_or(Area::centered(DVec2::ZERO, extent), |area| Area {
         min: DVec2::new(area.west, -area.north),
@@ -133,7 +134,7 @@ fn from_inventory(
     sizes: &[PlantSize],
     terrain: &Terrain,
     progress: &mut dyn Progress,
-) -> Result<Stand, AppError> {
+) -> Result<Stand, StageError> {
     let unit = |unit: scene::LengthUnit| match unit {
         scene::LengthUnit::Metres => LengthUnit::Metre,
         scene::LengthUnit::Centimetres => LengthUnit::Centimetre,
@@ -155,10 +156,10 @@ fn placement<'a>(
     trees: &InventoryTrees,
     inventory: &Inventory,
     terrain: &'a Terrain,
-) -> Result<Box<dyn Fn(f64, f64) -> DVec3 + 'a>, AppError> {
+) -> Result<Box<dyn Fn(f64, f64) -> DVec3 + 'a>, StageError> {
     let on_ground = |place: DVec2| DVec3::new(place.x, 0.0, place.y);
     let reference = terrain.reference();
-    let unknown = || AppError::NoReference { path: trees.path.clone() };
+    let unknown = || StageError::NoReference { path: trees.path.clone() };
     let geographic = |reference: &GeoReference| reference.system() == CoordinateSystem::Geographic;
     if inventory.coordinates == Coordinates::Geographic {
         let reference = reference.filter(|reference| geographic(reference)).ok_or_else(unknown)?;

@@ -2,21 +2,25 @@
 
 use std::{ops::Range, sync::Arc, time::Instant};
 
-use bevy::ecs::{entity::Entity, system::Commands};
+use bevy::{
+    ecs::{entity::Entity, system::Commands},
+    render::renderer::RenderDevice,
+};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{error::AppError, ground, plants, together, trees};
+use super::{StageError, ground, plants, together, trees};
 use crate::{
     bake::{BakeSource, BakedPlant, bake_plant, cache::Cache},
     light::{MoonSetting, sun::Observer},
     lod::{FadeBand, Levels},
+    progress::Progress,
     render::{
         components::{Forest, Ground, SunLight, SunShadowSettings},
         daylight::SkySettings,
     },
-    scatter::{CoverMap, PackedStand, PlantSize, cover_map, packed::DEFAULT_CELL_SIZE},
-    scene::{self, Progress, Quality, Scene},
+    scatter::{CoverMap, PackedStand, PackedTree, PlantSize, cover_map, packed::DEFAULT_CELL_SIZE},
+    scene::{self, Quality, Scene},
     terrain::Terrain,
 };
 
@@ -69,9 +73,9 @@ impl Stage {
     /// Builds `scene`: one from a file ([`Scene::read`]), or one that was built in code.
     ///
     /// # Errors
-    /// [`AppError`] for anything in the scene or its files that cannot be used; [`AppError::Cancelled`] soon after `progress`
+    /// [`StageError`] for anything in the scene or its files that cannot be used; [`StageError::Cancelled`] soon after `progress`
     /// [is cancelled](Progress::is_cancelled), in the midst of the bakes after those of a few plants.
-    pub fn build(scene: &Scene, progress: &mut dyn Progress) -> Result<Self, AppError> {
+    pub fn build(scene: &Scene, progress: &mut dyn Progress) -> Result<Self, StageError> {
         scene.validate()?;
         let started = Instant::now();
         progress.begin("Terrain", 0);
@@ -119,6 +123,18 @@ impl Stage {
             ground: commands.spawn(self.ground()).id(),
             forest: self.forest().map(|forest| commands.spawn(forest).id()),
         }
+    }
+
+    /// Whether `device` can hold the trees, all of which lie in one storage buffer.
+    ///
+    /// # Errors
+    /// [`StageError::TooManyTrees`].
+    pub fn check_device(&self, device: &RenderDevice) -> Result<(), StageError> {
+        let limits = device.limits();
+        let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let limit = usize::try_from(bytes).unwrap_or(usize::MAX) / size_of::<PackedTree>();
+        let count = self.stand.trees.len();
+        if count > limit { Err(StageError::TooManyTrees { count, limit }) } else { Ok(()) }
     }
 
     /// The forest of the scene, or `None` without trees.
@@ -174,16 +190,20 @@ impl Stage {
 }
 
 /// Stops a build that nobody waits for any more.
-fn check_wanted(progress: &dyn Progress) -> Result<(), AppError> {
-    if progress.is_cancelled() { Err(AppError::Cancelled) } else { Ok(()) }
+fn check_wanted(progress: &dyn Progress) -> Result<(), StageError> {
+    if progress.is_cancelled() { Err(StageError::Cancelled) } else { Ok(()) }
 }
 
-pub(super) fn observer(scene: &Scene, terrain: &Terrain) -> Result<Observer, AppError> {
+/// Where on earth the scene lies: as it says itself, or else as its terrain file does.
+///
+/// # Errors
+/// [`StageError::NoPlace`] where neither says.
+pub(crate) fn observer(scene: &Scene, terrain: &Terrain) -> Result<Observer, StageError> {
     let known = terrain.reference().and_then(|reference| reference.latitude_longitude());
     let latitude = scene.place.latitude.or(known.map(|place| place.0));
     let longitude = scene.place.longitude.or(known.map(|place| place.1));
     let (Some(latitude), Some(longitude)) = (latitude, longitude) else {
-        return Err(AppError::NoPlace { scene: scene.label() });
+        return Err(StageError::NoPlace { scene: scene.label() });
     };
     let height = terrain.height(0.0, 0.0).clamp(-500.0, 9000.0);
     Ok(Observer::new(latitude, longitude, height)?)
@@ -202,7 +222,7 @@ fn bake(
     species: &plants::PlantPlan,
     quality: &Quality,
     progress: &mut dyn Progress,
-) -> Result<Vec<BakedPlant>, AppError> {
+) -> Result<Vec<BakedPlant>, StageError> {
     let started = Instant::now();
     progress.begin("Plants", species.individuals.len() as u64);
     let cache = Cache::of_user();
@@ -220,7 +240,7 @@ fn bake(
                 warnings.extend(baked.0.lighting.warning().map(|what| format!("{}: {what}", baked.0.plant.name)));
                 Ok((baked, warnings))
             })
-            .collect::<Result<_, AppError>>()?;
+            .collect::<Result<_, StageError>>()?;
         for ((plant, source), warnings) in results {
             for warning in warnings {
                 progress.warn(&warning);

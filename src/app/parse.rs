@@ -1,7 +1,6 @@
 //! Texts of the command line to values.
 
-use super::camera::Pose;
-use super::lighting::{Expressive, Lighting, SunLight, Transfer};
+use crate::scene::{Expressive, Lighting, Pose, SunLight, Transfer};
 
 /// Why an argument is not what it should be.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -21,11 +21,7 @@ use bevy::{
 };
 use tracing::{error, info, warn};
 
-use super::{
-    adapter,
-    error::AppError,
-    stage::{Shown, Stage},
-};
+use super::{Shown, Stage, StageError};
 use crate::scene::{Overrides, SceneSource};
 use job::Job;
 use progress::Said;
@@ -87,7 +83,7 @@ pub struct SceneFailed {
     /// What was asked for.
     pub scene: SceneSource,
     /// What is wrong.
-    pub error: AppError,
+    pub error: StageError,
 }
 
 impl fmt::Display for SceneFailed {
@@ -193,7 +189,7 @@ fn follow(
     let Some(job) = loader.job.take_if(|_| finished) else { return };
     let scene = job.request.scene.clone();
     let checked = job.finish().and_then(|stage| {
-        device.map_or(Ok(()), |device| adapter::check_trees(&device, &stage))?;
+        device.map_or(Ok(()), |device| stage.check_device(&device))?;
         Ok(Arc::new(stage))
     });
     let stage = match checked {

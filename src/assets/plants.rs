@@ -2,7 +2,7 @@
 
 use std::{ops::Range, path::PathBuf};
 
-use super::error::AppError;
+use super::StageError;
 use crate::{
     bake::{
         BakeSettings,
@@ -50,12 +50,12 @@ impl IndividualSource {
     /// Makes the plant; the strings are warnings.
     ///
     /// # Errors
-    /// [`AppError`] for rules or a file that cannot be used.
-    pub fn build(&self) -> Result<(Plant, Vec<String>), AppError> {
+    /// [`StageError`] for rules or a file that cannot be used.
+    pub fn build(&self) -> Result<(Plant, Vec<String>), StageError> {
         match self {
             Self::Grown { parameters, from, seed, triangles } => {
                 let plant = grow(parameters, *seed, *triangles)
-                    .map_err(|source| AppError::Grow { path: from.clone(), source })?;
+                    .map_err(|source| StageError::Grow { path: from.clone(), source })?;
                 Ok((plant, Vec::new()))
             }
             Self::Gltf { path, options } => {
@@ -83,7 +83,7 @@ impl Individual {
     ///
     /// # Errors
     /// Those of [`IndividualSource::build`].
-    pub fn build(&self) -> Result<(Plant, Vec<String>), AppError> {
+    pub fn build(&self) -> Result<(Plant, Vec<String>), StageError> {
         let (mut plant, warnings) = self.source.build()?;
         plant.set_leaf_gloss(self.gloss);
         Ok((plant, warnings))
@@ -102,8 +102,8 @@ pub struct PlantPlan {
 /// Lists the individuals of `scene`.
 ///
 /// # Errors
-/// [`AppError`] for species files that cannot be read, and for more individuals than a forest holds.
-pub fn plan(scene: &Scene) -> Result<PlantPlan, AppError> {
+/// [`StageError`] for species files that cannot be read, and for more individuals than a forest holds.
+pub fn plan(scene: &Scene) -> Result<PlantPlan, StageError> {
     let mut plan = PlantPlan::default();
     for species in &scene.species {
         let first = plan.individuals.len();
@@ -115,12 +115,12 @@ pub fn plan(scene: &Scene) -> Result<PlantPlan, AppError> {
         plan.variants.push(first as u16..plan.individuals.len() as u16);
     }
     if plan.individuals.len() > MAX_VARIANTS {
-        return Err(AppError::TooManyPlants { count: plan.individuals.len(), limit: MAX_VARIANTS });
+        return Err(StageError::TooManyPlants { count: plan.individuals.len(), limit: MAX_VARIANTS });
     }
     Ok(plan)
 }
 
-fn sources(species: &Species) -> Result<Vec<IndividualSource>, AppError> {
+fn sources(species: &Species) -> Result<Vec<IndividualSource>, StageError> {
     Ok(match &species.plant {
         PlantSource::Grown(grown) => {
             let (parameters, from) = match &grown.form {
@@ -128,9 +128,9 @@ fn sources(species: &Species) -> Result<Vec<IndividualSource>, AppError> {
                 GrownForm::Conifer => (GrowParameters::conifer(), "conifer".into()),
                 GrownForm::File(path) => {
                     let text = std::fs::read_to_string(path)
-                        .map_err(|source| AppError::Read { path: path.clone(), source })?;
+                        .map_err(|source| StageError::Read { path: path.clone(), source })?;
                     let parameters = GrowParameters::from_ron(&text)
-                        .map_err(|source| AppError::Grow { path: path.clone(), source })?;
+                        .map_err(|source| StageError::Grow { path: path.clone(), source })?;
                     (parameters, path.clone())
                 }
             };

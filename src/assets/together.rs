@@ -9,7 +9,7 @@ use std::{collections::HashSet, sync::Arc};
 
 use rayon::prelude::*;
 
-use super::{error::AppError, plants::PlantPlan, plants::bake_settings};
+use super::{StageError, plants::PlantPlan, plants::bake_settings};
 use crate::{
     bake::{
         BakedPlant,
@@ -19,8 +19,9 @@ use crate::{
             implicit::{StandPlant, bake_implicit_stand},
         },
     },
+    progress::Progress,
     scatter::{Stand, packed::MAX_VARIANTS},
-    scene::{Progress, Scene, Species},
+    scene::{Scene, Species},
 };
 
 /// Makes a plant of its own of every tree whose species asks for it, and lights those trees in one field. Brings `stand`,
@@ -28,14 +29,14 @@ use crate::{
 /// all of them.
 ///
 /// # Errors
-/// [`AppError::TooManyTogether`] where the trees are more than a forest can tell apart.
+/// [`StageError::TooManyTogether`] where the trees are more than a forest can tell apart.
 pub fn light_together(
     scene: &Scene,
     plan: &mut PlantPlan,
     plants: Vec<BakedPlant>,
     stand: &mut Stand,
     progress: &mut dyn Progress,
-) -> Result<Vec<BakedPlant>, AppError> {
+) -> Result<Vec<BakedPlant>, StageError> {
     let chosen: Vec<bool> = scene.species.iter().map(Species::is_lit_together).collect();
     let first = plan.variants.iter().zip(&chosen).find(|(variants, chosen)| **chosen && !variants.is_empty());
     let lighting = first.and_then(|(variants, _)| plan.individuals.get(usize::from(variants.start)));
@@ -56,7 +57,7 @@ pub fn light_together(
     let others: usize = plan.variants.iter().zip(&chosen).filter(|(_, chosen)| !**chosen).map(|(v, _)| v.len()).sum();
     let limit = MAX_VARIANTS.saturating_sub(others);
     if count > limit {
-        return Err(AppError::TooManyTogether { count, limit });
+        return Err(StageError::TooManyTogether { count, limit });
     }
     progress.begin("Trees lit together", count as u64);
     let order: Vec<usize> = trees.concat();

@@ -4,9 +4,10 @@ use std::path::Path;
 
 use glam::DVec2;
 
-use super::error::AppError;
+use super::StageError;
 use crate::{
-    scene::{self, Coordinates, Progress},
+    progress::Progress,
+    scene::{self, Coordinates},
     terrain::{
         CoordinateSystem, HeightField, NoiseKind, NoiseTerrain, ReadOptions, Surroundings, Terrain,
         read::{Crop, ImageScale},
@@ -17,10 +18,10 @@ use crate::{
 /// Builds the ground that a scene asks for; what the readers decided on their own account becomes a warning.
 ///
 /// # Errors
-/// [`AppError::Terrain`].
-pub fn build_terrain(ground: &scene::Ground, progress: &mut dyn Progress) -> Result<Terrain, AppError> {
+/// [`StageError::Terrain`].
+pub fn build_terrain(ground: &scene::Ground, progress: &mut dyn Progress) -> Result<Terrain, StageError> {
     let surroundings = Surroundings::Mirror;
-    let read = |path: &Path, options: ReadOptions, progress: &mut dyn Progress| -> Result<Terrain, AppError> {
+    let read = |path: &Path, options: ReadOptions, progress: &mut dyn Progress| -> Result<Terrain, StageError> {
         let (terrain, warnings) = read_terrain(path, &options)?;
         for warning in warnings {
             progress.warn(&format!("{}: {warning}", path.display()));
@@ -72,7 +73,7 @@ pub fn build_terrain(ground: &scene::Ground, progress: &mut dyn Progress) -> Res
     })
 }
 
-fn exaggerated(terrain: Terrain, factor: f64) -> Result<Terrain, AppError> {
+fn exaggerated(terrain: Terrain, factor: f64) -> Result<Terrain, StageError> {
     if factor == 1.0 {
         return Ok(terrain);
     }
