@@ -5,23 +5,24 @@ use canopy::prelude::*;
 
 fn main() {
     App::new()
-        .add_plugins((DefaultPlugins, CanopyPlugins, CanopyScenePlugin::new("assets/scenes/inventory.ron")))
-        .add_systems(Update, (tell, look))
+        .add_plugins((DefaultPlugins, CanopyPlugins))
+        .add_systems(Startup, set_up)
+        .add_systems(Update, show_progress)
         .run();
 }
 
-fn tell(progress: Res<SceneProgress>, mut window: Single<&mut Window>) {
-    if progress.is_changed() {
-        window.title = match progress.state {
-            SceneState::Building => format!("{}: {} of {}", progress.step, progress.done, progress.total),
-            state => format!("{state:?}"),
-        };
-    }
+fn set_up(mut commands: Commands) {
+    commands.spawn(CanopyScene::new("assets/scenes/inventory.ron")).observe(look);
 }
 
-fn look(mut commands: Commands, mut ready: MessageReader<SceneReady>) {
-    for SceneReady { stage, .. } in ready.read() {
-        let height = stage.terrain.height(0.0, 120.0) as f32 + 20.0;
-        commands.spawn((CanopyCamera, Transform::from_xyz(0.0, height, 120.0)));
-    }
+fn look(ready: On<SceneReady>, mut commands: Commands) {
+    let height = ready.stage.terrain.height(0.0, 120.0) as f32 + 20.0;
+    commands.spawn((CanopyCamera, Transform::from_xyz(0.0, height, 120.0)));
+}
+
+fn show_progress(progress: Single<&SceneProgress, Changed<SceneProgress>>, mut window: Single<&mut Window>) {
+    window.title = match progress.state {
+        SceneState::Building => format!("{}: {} of {}", progress.step, progress.done, progress.total),
+        state => format!("{state:?}"),
+    };
 }

@@ -8,36 +8,29 @@
 //! use canopy::prelude::*;
 //!
 //! fn main() {
-//!     App::new()
-//!         .add_plugins((DefaultPlugins, CanopyPlugins, CanopyScenePlugin::new("assets/scenes/demo.ron")))
-//!         .add_systems(Update, (tell, look))
-//!         .run();
+//!     App::new().add_plugins((DefaultPlugins, CanopyPlugins)).add_systems(Startup, set_up).run();
 //! }
 //!
-//! fn tell(progress: Res<SceneProgress>, mut failed: MessageReader<SceneFailed>) {
-//!     if progress.is_changed() && progress.state == SceneState::Building {
-//!         println!("{}: {} of {}", progress.step, progress.done, progress.total);
-//!     }
-//!     for failure in failed.read() {
-//!         println!("{failure}");
-//!     }
+//! fn set_up(mut commands: Commands) {
+//!     commands
+//!         .spawn(CanopyScene::new("assets/scenes/demo.ron"))
+//!         .observe(look)
+//!         .observe(|failed: On<SceneFailed>| println!("{}", *failed));
 //! }
 //!
-//! fn look(mut commands: Commands, mut ready: MessageReader<SceneReady>) {
-//!     for SceneReady { stage, .. } in ready.read() {
-//!         let height = stage.terrain.height(0.0, 0.0) as f32 + 40.0;
-//!         commands.spawn((CanopyCamera, Transform::from_xyz(0.0, height, 0.0)));
-//!     }
+//! fn look(ready: On<SceneReady>, mut commands: Commands) {
+//!     let height = ready.stage.terrain.height(0.0, 0.0) as f32 + 40.0;
+//!     commands.spawn((CanopyCamera, Transform::from_xyz(0.0, height, 0.0)));
 //! }
 //! ```
 //!
 //! A scene that is built in code ([`Scene`](scene::Scene)) goes where a file's name can go, and needs no file.
-//! Another scene takes its place when a [`LoadScene`](assets::LoadScene) asks for it. A program that would rather wait calls
+//! Another [`CanopyScene`](components::CanopyScene) on the same entity takes its place. A program that would rather wait calls
 //! [`Stage::build`](assets::Stage::build) itself, and [`Stage::show`](assets::Stage::show).
 //!
 //! The rooms: [`math`], [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`bake`], [`light`], [`lod`],
-//! [`trace`] and [`mod@reference`] know no App and no GPU; [`assets`] builds scenes from them, and [`render`] draws what they
-//! make. ARCHITECTURE.md in the repository shows how a tree gets from a file to a pixel.
+//! [`trace`] and [`mod@reference`] know no App and no GPU; [`assets`] builds scenes from them, [`render`] draws what
+//! they make, and [`components`] are what a program spawns. ARCHITECTURE.md in the repository shows how a tree gets from a file to a pixel.
 //!
 //! # Cargo features
 //! - `program` (default): the command `canopy` and the module `app`; brings `clap`, `egui` and progress bars.
@@ -49,6 +42,7 @@
 pub mod app;
 pub mod assets;
 pub mod bake;
+pub mod components;
 pub mod cull;
 mod files;
 pub mod light;
@@ -70,16 +64,15 @@ pub use plugin::CanopyPlugins;
 pub mod prelude {
     pub use crate::{
         CanopyPlugins,
-        assets::{
-            CanopyScenePlugin, LoadScene, LoadedScene, SceneFailed, SceneProgress, SceneReady, SceneState, Stage,
+        assets::Stage,
+        components::{
+            CanopyScene, CanopySystems, FloatingOrigin, FollowsDaylight, LoadedScene, SceneFailed, SceneProgress,
+            SceneReady, SceneState, Sun, SunRefresh,
         },
         lod::{FadeBand, Levels, Representation},
         progress::{Progress, Silent},
-        render::{
-            components::{
-                CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, SunShadowSettings, ViewOptions,
-            },
-            daylight::{FollowsDaylight, SkySettings},
+        render::components::{
+            CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, SunShadowSettings, ViewOptions,
         },
         scene::{Overrides, Scene, SceneSource},
     };

@@ -2,13 +2,16 @@
 
 use bevy::app::{PluginGroup, PluginGroupBuilder};
 
-use crate::render::{CanopyRenderPlugin, daylight::DaylightPlugin};
+use crate::{
+    components::{OriginPlugin, ScenePlugin, SunPlugin},
+    render::CanopyRenderPlugin,
+};
 
-/// All of Canopy for a Bevy program that has its `DefaultPlugins`.
+/// All of Canopy for a Bevy program that has its `DefaultPlugins`, added before or after these.
 pub struct CanopyPlugins;
 
 impl PluginGroup for CanopyPlugins {
     fn build(self) -> PluginGroupBuilder {
-        PluginGroupBuilder::start::<Self>().add(DaylightPlugin).add(CanopyRenderPlugin)
+        PluginGroupBuilder::start::<Self>().add(CanopyRenderPlugin).add(SunPlugin).add(OriginPlugin).add(ScenePlugin)
     }
 }

@@ -257,7 +257,7 @@ fn gpu_structs_are_what_the_shaders_think() {
         }
     );
     twin!(layouts, "Tree", PackedTree { xz, y, cell, look });
-    twin!(layouts, "Tile", GpuTile { origin, spacing, first, morph_start, morph_end, clearance, level });
+    twin!(layouts, "Tile", GpuTile { origin, spacing, first, morph_start, morph_end, clearance, camera_height });
     twin!(layouts, "TileVertex", GpuTileVertex { height, parent_height, normal, parent_normal });
     assert_eq!(size_of::<PackedTree>(), 16, "a tree costs at most 16 bytes");
 }

@@ -7,7 +7,7 @@ use canopy::{
     cull::cascades::{CascadeBox, cascade_radii},
     light::sun::SunPosition,
     math::srgb_to_linear,
-    render::{components::SunShadowSettings, daylight::SkySettings},
+    render::components::SunShadowSettings,
 };
 use chrono::TimeDelta;
 use glam::DVec3;
@@ -117,7 +117,7 @@ pub fn compare(field: &Field, hours: &[f64], out: Option<&Path>) -> anyhow::Resu
 
 /// How far the shadow of a cached map is from that of the true sun, at most, over a midsummer day.
 pub fn shadow_lag(plant: &Arc<BakedPlant>, look: &Look) -> anyhow::Result<String> {
-    let sky = SkySettings::default();
+    let sky = Sun::default();
     let height = f64::from(plant.plant.height()).max(10.0);
     let radii = cascade_radii(look.cascades, look.shadow_distance, SunShadowSettings::default().finest_radius);
     let mut table = String::from(

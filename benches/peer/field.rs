@@ -12,7 +12,7 @@ use canopy::{
         gltf::{GltfOptions, load_plant},
         grow::{GrowParameters, grow},
     },
-    render::daylight::SkySettings,
+    render::daylight::Sun,
     scatter::{
         Area, CoverMap, PackedStand, PlacementRules, PlantSize, Sequence, SizeRule, SpeciesRule, cover_map,
         packed::DEFAULT_CELL_SIZE, place,
@@ -136,7 +136,7 @@ impl Field {
             terrain: Arc::new(terrain),
             look,
             side,
-            atmosphere: Atmosphere::new(AtmosphereParams::with_visibility_km(SkySettings::default().visibility_km))?,
+            atmosphere: Atmosphere::new(AtmosphereParams::with_visibility_km(Sun::default().visibility_km))?,
         })
     }
 
@@ -162,21 +162,21 @@ impl Field {
     }
 
     /// Place, air and time of frame `frame`.
-    pub fn sky(&self, frame: usize, moving: bool) -> SkySettings {
+    pub fn sky(&self, frame: usize, moving: bool) -> Sun {
         let morning = DateTime::<Utc>::from_timestamp(MORNING, 0).unwrap_or_default();
         let minutes = if moving { MINUTES_A_FRAME * (frame as i64 + 1) } else { 0 };
-        SkySettings { instant: morning + TimeDelta::minutes(minutes), ..SkySettings::default() }
+        Sun { instant: morning + TimeDelta::minutes(minutes), ..Sun::default() }
     }
 
     /// Place, air and time `hours` after midnight UTC of the same day.
-    pub fn sky_at(&self, hours: f64) -> SkySettings {
+    pub fn sky_at(&self, hours: f64) -> Sun {
         let morning = DateTime::<Utc>::from_timestamp(MORNING, 0).unwrap_or_default();
         let midnight = morning.date_naive().and_time(NaiveTime::MIN).and_utc();
-        SkySettings { instant: midnight + TimeDelta::seconds((3600.0 * hours) as i64), ..SkySettings::default() }
+        Sun { instant: midnight + TimeDelta::seconds((3600.0 * hours) as i64), ..Sun::default() }
     }
 
     /// The light of a time, which ours computes itself and stock is given.
-    pub fn light(&self, sky: &SkySettings) -> anyhow::Result<LightState> {
+    pub fn light(&self, sky: &Sun) -> anyhow::Result<LightState> {
         Ok(sky.light(&self.atmosphere)?)
     }
 }

@@ -7,10 +7,7 @@ use canopy::{
     app::Renderer,
     bake::BakedPlant,
     lod::{FadeBand, Levels},
-    render::{
-        components::{Forest, Ground, SunShadowSettings},
-        daylight::SkySettings,
-    },
+    render::components::{Forest, Ground, SunShadowSettings},
     scene::Viewpoint,
 };
 use glam::DVec3;
@@ -61,7 +58,7 @@ impl Ours {
                 view_distance: EVERYWHERE,
             });
         }
-        world.insert_resource(shadow);
+        renderer.set_shadow(shadow);
         Ok(Self(renderer))
     }
 
@@ -71,7 +68,7 @@ impl Ours {
     }
 
     /// Sets the time; the light follows within the frame.
-    pub fn light(&mut self, sky: &SkySettings) {
+    pub fn light(&mut self, sky: &Sun) {
         let world = self.0.app().world_mut();
         if world.get_resource() != Some(sky) {
             world.insert_resource(sky.clone());

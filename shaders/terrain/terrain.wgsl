@@ -25,7 +25,8 @@ struct Tile {
     morph_end: f32,
     // Lower bound of the distance from the camera to the ground.
     clearance: f32,
-    level: f32,
+    // Height of the camera above the terrain's datum, metres.
+    camera_height: f32,
 }
 
 @group(1) @binding(0) var<storage, read> vertices: array<TileVertex>;
@@ -58,7 +59,7 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     let k = clamp((distance - tile.morph_start) / (tile.morph_end - tile.morph_start), 0.0, 1.0);
     let height = mix(v.height, v.parent_height, k);
     var out: Varying;
-    out.relative = vec3(xz.x, height - frame.camera.y, xz.y);
+    out.relative = vec3(xz.x, height - tile.camera_height, xz.y);
     out.clip = frame.clip_from_relative * vec4(out.relative, 1.0);
     out.normal = mix(decode_octahedral(v.normal), decode_octahedral(v.parent_normal), k);
     return out;

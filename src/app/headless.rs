@@ -38,10 +38,11 @@ use super::{
 };
 use crate::{
     assets::Stage,
+    components::{Sun, SunRefresh},
     plugin::CanopyPlugins,
     progress::Progress,
     render::{
-        components::CanopyCamera,
+        components::{CanopyCamera, SunShadowSettings},
         readback::read_rgb,
         report::{FrameReport, PassOutcome},
         shaders::CanopyShaders,
@@ -114,6 +115,7 @@ const LONGEST_WAIT: Duration = Duration::from_secs(120);
 pub struct Renderer {
     app: App,
     camera: Entity,
+    sun: Entity,
     target: Handle<Image>,
     size: (u32, u32),
     warm: bool,
@@ -168,10 +170,10 @@ impl Renderer {
                 RenderTarget::from(target.clone()),
                 CanopyCamera,
                 Msaa::from_samples(msaa),
-                camera::TONEMAPPING,
             ))
             .id();
-        Ok(Self { app, camera, target, size, warm: false, fault })
+        let sun = app.world_mut().spawn(SunShadowSettings::default()).id();
+        Ok(Self { app, camera, sun, target, size, warm: false, fault })
     }
 
     /// Fails with the first error that the device reported since the last time.
@@ -192,14 +194,24 @@ impl Renderer {
         let world = self.app.world_mut();
         stage.show(&mut world.commands());
         world.flush();
+        self.set_shadow(stage.shadow());
+    }
+
+    /// Sets how shadows are drawn.
+    pub fn set_shadow(&mut self, shadow: SunShadowSettings) {
+        self.app.world_mut().entity_mut(self.sun).insert(shadow);
     }
 
     /// Sets the light's place and instant, as the scene has them.
     pub fn set_instant(&mut self, stage: &Stage, instant: DateTime<Utc>) {
-        let sky = stage.sky(instant);
-        let world = self.app.world_mut();
-        if world.get_resource() != Some(&sky) {
-            world.insert_resource(sky);
+        self.set_sun(stage.sun(instant));
+    }
+
+    /// Sets the light; the next frame has it.
+    pub fn set_sun(&mut self, sun: Sun) {
+        let mut entity = self.app.world_mut().entity_mut(self.sun);
+        if entity.get() != Some(&sun) {
+            entity.insert((sun, SunRefresh::Immediate));
         }
     }
 

@@ -34,9 +34,9 @@ const KEEP_EVERY: Duration = Duration::from_secs(30);
 pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Result<PathBuf, AppError> {
     let stage = Stage::build(&options.overrides.applied(options.scene.read()?), progress)?;
     let frame = frame(options, &stage)?;
-    let sky = stage.sky(frame.instant);
-    let atmosphere = Atmosphere::new(AtmosphereParams::with_visibility_km(sky.visibility_km))?;
-    let light = sky.light(&atmosphere)?;
+    let sun = stage.sun(frame.instant);
+    let atmosphere = Atmosphere::new(AtmosphereParams::with_visibility_km(sun.visibility_km))?;
+    let light = sun.light(&atmosphere)?;
 
     progress.begin("Trees of rays", 0);
     let scene = scene(&stage)?;

@@ -14,7 +14,7 @@ use half::f16;
 use super::error::AppError;
 use crate::reference::ToneTable;
 
-/// The table behind [`super::camera::TONEMAPPING`]. No device is needed: Bevy keeps its tables in the main world.
+/// The table behind [`TONEMAPPING`](crate::render::components::TONEMAPPING). No device is needed: Bevy keeps its tables in the main world.
 ///
 /// # Errors
 /// [`AppError::Render`] where Bevy has no such table, or in another format than half floats.

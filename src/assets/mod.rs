@@ -2,16 +2,14 @@
 //!
 //! ```text
 //!  scene --> ground ----------------------------------+
-//!       \--> plants --> bake (cached), a few at a time  +--> Stage --> Ground, Forest, SunShadowSettings, SkySettings
+//!       \--> plants --> bake (cached), a few at a time  +--> Stage --> Ground, Forest, SunShadowSettings
 //!       \--> trees (stand) --> trees lit together -----+
 //! ```
 //!
-//! [`Stage::build`] blocks, reports to a [`Progress`](crate::progress::Progress) and can be cancelled;
-//! [`CanopyScenePlugin`] runs it beside a Bevy program's frames, on threads of its own.
+//! [`Stage::build`] blocks, reports to a [`Progress`](crate::progress::Progress) and can be cancelled.
 
 mod error;
 pub(crate) mod ground;
-mod load;
 pub(crate) mod plants;
 mod stage;
 pub(crate) mod threads;
@@ -19,6 +17,5 @@ mod together;
 pub(crate) mod trees;
 
 pub use error::StageError;
-pub use load::{CanopyScenePlugin, LoadScene, LoadedScene, SceneFailed, SceneProgress, SceneReady, SceneState};
+pub use stage::Stage;
 pub(crate) use stage::observer;
-pub use stage::{Shown, Stage};

@@ -2,23 +2,17 @@
 
 use std::{ops::Range, sync::Arc, time::Instant};
 
-use bevy::{
-    ecs::{entity::Entity, system::Commands},
-    render::renderer::RenderDevice,
-};
+use bevy::render::renderer::RenderDevice;
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{StageError, ground, plants, together, trees};
 use crate::{
     bake::{BakeSource, BakedPlant, bake_plant, cache::Cache},
-    light::{MoonSetting, sun::Observer},
+    light::sun::Observer,
     lod::{FadeBand, Levels},
     progress::Progress,
-    render::{
-        components::{Forest, Ground, SunLight, SunShadowSettings},
-        daylight::SkySettings,
-    },
+    render::components::{Forest, Ground, SunLight, SunShadowSettings},
     scatter::{CoverMap, PackedStand, PackedTree, PlantSize, cover_map, packed::DEFAULT_CELL_SIZE},
     scene::{self, Quality, Scene},
     terrain::Terrain,
@@ -49,24 +43,6 @@ pub struct Stage {
     pub observer: Observer,
     /// The scene as written.
     pub scene: Scene,
-}
-
-/// Entities that show a stage.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shown {
-    /// Its ground.
-    pub ground: Entity,
-    /// Its forest, where it has trees.
-    pub forest: Option<Entity>,
-}
-
-impl Shown {
-    /// Takes them out of the world, those that are still there.
-    pub fn despawn(self, commands: &mut Commands) {
-        for entity in self.forest.into_iter().chain([self.ground]) {
-            commands.entity(entity).try_despawn();
-        }
-    }
 }
 
 impl Stage {
@@ -116,15 +92,6 @@ impl Stage {
         Ok(Self { terrain, stand, plants, variants, suns, cover, observer, scene: scene.clone() })
     }
 
-    /// Puts ground, forest and shadows into a world. The light is another matter, as time passes: see [`sky`](Self::sky).
-    pub fn show(&self, commands: &mut Commands) -> Shown {
-        commands.insert_resource(self.shadow());
-        Shown {
-            ground: commands.spawn(self.ground()).id(),
-            forest: self.forest().map(|forest| commands.spawn(forest).id()),
-        }
-    }
-
     /// Whether `device` can hold the trees, all of which lie in one storage buffer.
     ///
     /// # Errors
@@ -170,21 +137,6 @@ impl Stage {
             // A billboard's level plane would draw a line across the crowns of full models.
             proxy_distance: quality.near_distance + quality.fade_band,
             ..SunShadowSettings::default()
-        }
-    }
-
-    /// Sun, moon and air at an instant.
-    pub fn sky(&self, instant: chrono::DateTime<chrono::Utc>) -> SkySettings {
-        SkySettings {
-            observer: self.observer,
-            instant,
-            moon: match self.scene.place.moon {
-                scene::Moon::Full => MoonSetting::FullOpposite,
-                scene::Moon::Astronomical => MoonSetting::Astronomical,
-                scene::Moon::None => MoonSetting::None,
-            },
-            visibility_km: self.scene.place.visibility * 1e-3,
-            ..SkySettings::default()
         }
     }
 }

@@ -23,7 +23,9 @@ const FULL_MOON_LUX: f64 = 0.313;
 const MOON_COLOR: Vec3 = Vec3::new(1.213, 0.961, 0.760);
 
 /// Which moon a scene has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Hash, serde::Serialize, serde::Deserialize, bevy::reflect::Reflect,
+)]
 pub enum MoonSetting {
     /// The real one at the scene's instant and place. A scene that gives its sun by angles has no instant, and no moon.
     #[default]

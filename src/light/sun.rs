@@ -17,7 +17,7 @@ use super::error::{LightError, check_range};
 pub const SUN_ANGULAR_RADIUS: f64 = 0.266_6 * PI / 180.0;
 
 /// Where the observer stands, and the air there (for refraction).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, bevy::reflect::Reflect)]
 pub struct Observer {
     /// Geographic latitude in degrees, north positive, -90 to 90.
     pub latitude_deg: f64,

@@ -4,11 +4,15 @@ use std::sync::Arc;
 
 use bevy::{
     app::{App, Plugin},
-    camera::{Camera3d, Hdr},
-    ecs::{component::Component, resource::Resource},
+    camera::{Camera3d, Exposure, Hdr, visibility::Visibility},
+    core_pipeline::tonemapping::Tonemapping,
+    ecs::{component::Component, reflect::ReflectComponent, resource::Resource},
+    prelude::{ReflectDefault, ReflectResource},
+    reflect::Reflect,
     render::extract_component::{ExtractComponent, ExtractComponentPlugin},
+    transform::components::Transform,
 };
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use crate::{
     bake::BakedPlant,
@@ -18,20 +22,47 @@ use crate::{
     terrain::Terrain,
 };
 
+/// From the camera's exposed radiance to what a screen shows: the tone curve for which Canopy's light is made.
+pub const TONEMAPPING: Tonemapping = Tonemapping::BlenderFilmic;
+
 /// A camera that sees Canopy's sky, ground and forests. One camera at a time; a second one is refused with a message.
-#[derive(Component, Clone, Copy, Debug, Default, ExtractComponent)]
-#[require(Camera3d, Hdr)]
+///
+/// Its exposure follows the light of the moment, its [`Tonemapping`] is [`TONEMAPPING`] unless the program gives another.
+#[derive(Component, Clone, Copy, Debug, Default, ExtractComponent, Reflect)]
+#[reflect(Component, Default)]
+#[require(Camera3d, Hdr, Exposure, Tonemapping = TONEMAPPING, ViewOptions)]
 pub struct CanopyCamera;
 
 /// The scene position, in f64 metres, of the Bevy world's origin.
 ///
 /// Bevy's transforms are f32. A program that roams far moves this origin along with the camera, so that what Bevy
-/// sees stays small; Canopy's own positions are f64 up to the camera and never jitter.
-#[derive(Resource, Clone, Copy, Debug, Default, PartialEq)]
+/// sees stays small ([`FloatingOrigin`](crate::components::FloatingOrigin) does it); Canopy's own positions are f64 up to
+/// the camera and never jitter.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Reflect)]
+#[reflect(Resource, Default)]
 pub struct CanopyOrigin(pub DVec3);
 
+impl CanopyOrigin {
+    /// Metres to which [`near`](Self::near) rounds: f32 has steps of 0.06 mm there.
+    const STEP: f64 = 1024.0;
+
+    /// An origin near `position` (scene metres).
+    pub fn near(position: DVec3) -> Self {
+        Self((position / Self::STEP).round() * Self::STEP)
+    }
+
+    /// The Bevy translation of `position` (scene metres).
+    pub fn translation(&self, position: DVec3) -> Vec3 {
+        (position - self.0).as_vec3()
+    }
+}
+
 /// A forest: trees of one packed stand, each an instance of one of the baked plants.
+///
+/// Its global translation, in the scene's frame (not moved by [`CanopyOrigin`]), is added to `origin`; it is drawn where its
+/// inherited visibility and its render layers let the camera see it. Rotation and scale have no effect.
 #[derive(Component, Clone, Debug)]
+#[require(Transform, Visibility)]
 pub struct Forest {
     /// Where the trees stand.
     pub stand: Arc<PackedStand>,
@@ -58,8 +89,11 @@ pub enum SunLight {
     Harmonics,
 }
 
-/// The ground under everything.
+/// The ground under everything. One at a time is drawn, the first that can be seen.
+///
+/// As for a [`Forest`], its global translation, inherited visibility and render layers take effect.
 #[derive(Component, Clone, Debug)]
+#[require(Transform, Visibility)]
 pub struct Ground {
     /// Heights; scene metres, origin at the terrain's centre.
     pub terrain: Arc<Terrain>,
@@ -75,8 +109,9 @@ pub struct Ground {
 #[derive(Resource, Clone, Debug)]
 pub struct Daylight(pub Arc<LightState>);
 
-/// The sun's shadow.
-#[derive(Resource, Clone, Copy, Debug, PartialEq)]
+/// The shadow maps of the sun and the moon: beside a [`Sun`](crate::components::Sun), which has the defaults.
+#[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Component, Default)]
 pub struct SunShadowSettings {
     /// Texels along a side of each map, 256 to 8192. Twice the size halves the texel and quadruples the fill.
     pub map_size: u32,
@@ -96,15 +131,17 @@ impl Default for SunShadowSettings {
     }
 }
 
-/// How a view is drawn, for looking and for measuring.
-#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// How a camera draws, for looking and for measuring.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, ExtractComponent, Reflect)]
+#[reflect(Component, Default)]
 pub struct ViewOptions {
-    /// Tints trees by their level of detail: full models green, crosses blue.
+    /// Tints trees by their level of detail, each level in a colour of its own.
     pub tint_levels: bool,
 }
 
 /// An ordinary Bevy mesh that casts its shadow onto Canopy's trees and ground.
-#[derive(Component, Clone, Copy, Debug, Default)]
+#[derive(Component, Clone, Copy, Debug, Default, Reflect)]
+#[reflect(Component, Default)]
 pub struct CastsCanopyShadow;
 
 /// Registers the components that the render world needs.
@@ -112,9 +149,11 @@ pub struct ComponentsPlugin;
 
 impl Plugin for ComponentsPlugin {
     fn build(&self, app: &mut App) {
-        app.add_plugins(ExtractComponentPlugin::<CanopyCamera>::default())
-            .init_resource::<CanopyOrigin>()
-            .init_resource::<SunShadowSettings>()
-            .init_resource::<ViewOptions>();
+        app.add_plugins((
+            ExtractComponentPlugin::<CanopyCamera>::default(),
+            ExtractComponentPlugin::<ViewOptions>::default(),
+        ))
+        .register_type::<(CanopyCamera, CanopyOrigin, SunShadowSettings, ViewOptions, CastsCanopyShadow)>()
+        .init_resource::<CanopyOrigin>();
     }
 }

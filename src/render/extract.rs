@@ -2,6 +2,10 @@
 
 use bevy::{
     asset::{AssetEvent, AssetId},
+    camera::{
+        Camera,
+        visibility::{InheritedVisibility, RenderLayers},
+    },
     ecs::{
         entity::Entity,
         message::MessageReader,
@@ -9,15 +13,16 @@ use bevy::{
         resource::Resource,
         system::{Query, Res, ResMut},
     },
+    log::{error_once, warn_once},
     math::Affine3A,
     mesh::{Mesh, Mesh3d},
     platform::collections::HashMap,
     render::Extract,
     transform::components::GlobalTransform,
 };
-use glam::DVec3;
+use glam::{DVec3, Quat, Vec3};
 
-use super::components::{CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, SunShadowSettings, ViewOptions};
+use super::components::{CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, SunShadowSettings};
 
 /// The main world's side of a frame.
 #[derive(Resource, Default)]
@@ -26,8 +31,8 @@ pub struct ExtractedScene {
     pub origin: DVec3,
     /// Forests by main-world entity, in the entities' order.
     pub forests: Vec<(Entity, Forest)>,
-    /// The first ground, if any.
-    pub ground: Option<(Entity, Ground)>,
+    /// The first ground that the camera can see, if any, and the scene position of its terrain's own origin.
+    pub ground: Option<(Entity, Ground, DVec3)>,
     /// The light, if it has been set.
     pub daylight: Option<Daylight>,
     /// Meshes that cast onto Canopy's passes, with their place in the Bevy world.
@@ -36,27 +41,45 @@ pub struct ExtractedScene {
     pub mesh_revisions: HashMap<AssetId<Mesh>, u64>,
     /// Shadow settings.
     pub shadow: SunShadowSettings,
-    /// View options.
-    pub options: ViewOptions,
 }
+
+/// What decides where an entity is drawn, and whether.
+type Placed = (&'static GlobalTransform, &'static InheritedVisibility, Option<&'static RenderLayers>);
 
 /// Fills [`ExtractedScene`].
 pub fn extract_scene(
     mut scene: ResMut<ExtractedScene>,
     origin: Extract<Res<CanopyOrigin>>,
-    forests: Extract<Query<(Entity, &Forest)>>,
-    grounds: Extract<Query<(Entity, &Ground)>>,
+    cameras: Extract<Query<(Entity, &Camera, Option<&RenderLayers>), With<CanopyCamera>>>,
+    forests: Extract<Query<(Entity, &Forest, Placed)>>,
+    grounds: Extract<Query<(Entity, &Ground, Placed)>>,
     casters: Extract<Query<(Entity, &Mesh3d, &GlobalTransform), With<CastsCanopyShadow>>>,
     mut changes: Extract<MessageReader<AssetEvent<Mesh>>>,
     daylight: Extract<Option<Res<Daylight>>>,
-    shadow: Extract<Res<SunShadowSettings>>,
-    options: Extract<Res<ViewOptions>>,
+    shadows: Extract<Query<(Entity, &SunShadowSettings)>>,
 ) {
     scene.origin = origin.0;
+    // The camera that is drawn: the order is that of `prepare_view`.
+    let camera = cameras
+        .iter()
+        .filter(|(_, camera, _)| camera.is_active)
+        .min_by_key(|(entity, camera, _)| (camera.order, *entity));
+    let layers = camera.and_then(|(.., layers)| layers).cloned().unwrap_or_default();
+    let seen = |(_, visibility, own): &(&GlobalTransform, &InheritedVisibility, Option<&RenderLayers>)| {
+        visibility.get() && own.unwrap_or(&RenderLayers::default()).intersects(&layers)
+    };
     scene.forests.clear();
-    scene.forests.extend(forests.iter().map(|(entity, forest)| (entity, forest.clone())));
+    for (entity, forest, placed) in forests.iter().filter(|(.., placed)| seen(placed)) {
+        let origin = forest.origin + translation(placed.0);
+        scene.forests.push((entity, Forest { origin, ..forest.clone() }));
+    }
     scene.forests.sort_by_key(|(entity, _)| *entity);
-    scene.ground = grounds.iter().min_by_key(|(entity, _)| *entity).map(|(entity, ground)| (entity, ground.clone()));
+    let visible = || grounds.iter().filter(|(.., placed)| seen(placed));
+    if visible().count() > 1 {
+        error_once!("{} grounds can be seen, but one is drawn: hide or despawn the others", visible().count());
+    }
+    let ground = visible().min_by_key(|(entity, ..)| *entity);
+    scene.ground = ground.map(|(entity, ground, placed)| (entity, ground.clone(), translation(placed.0)));
     scene.daylight = daylight.as_ref().map(|light| Daylight(light.0.clone()));
     let mut meshes: Vec<_> = casters.iter().collect();
     meshes.sort_by_key(|(entity, ..)| *entity);
@@ -67,6 +90,19 @@ pub fn extract_scene(
     }
     scene.casters.clear();
     scene.casters.extend(meshes.into_iter().map(|(_, mesh, place)| (mesh.0.id(), place.affine())));
-    scene.shadow = **shadow;
-    scene.options = **options;
+    let shadow = shadows.iter().min_by_key(|(entity, _)| *entity);
+    scene.shadow = shadow.map(|(_, settings)| *settings).unwrap_or_default();
+}
+
+/// Where a transform moves the origin of what has it; nowhere where that is not finite.
+fn translation(transform: &GlobalTransform) -> DVec3 {
+    let (scale, rotation, translation) = transform.to_scale_rotation_translation();
+    if !translation.is_finite() {
+        warn_once!("the transform of a forest or a ground is not finite: it is drawn where it would be without");
+        return DVec3::ZERO;
+    }
+    if !scale.abs_diff_eq(Vec3::ONE, 1e-4) || rotation.angle_between(Quat::IDENTITY) > 1e-3 {
+        warn_once!("a forest or a ground is rotated or scaled, which has no effect: only its translation has");
+    }
+    translation.as_dvec3()
 }

@@ -17,7 +17,6 @@
 
 pub mod bindings;
 pub mod components;
-pub mod daylight;
 pub mod extract;
 pub mod forest;
 pub mod gpu;

@@ -28,7 +28,11 @@ use bevy::{
 };
 use glam::{DVec3, Mat4, Vec2};
 
-use super::{components::CanopyCamera, extract::ExtractedScene, sets::CanopyRenderSystems};
+use super::{
+    components::{CanopyCamera, ViewOptions},
+    extract::ExtractedScene,
+    sets::CanopyRenderSystems,
+};
 use crate::cull::Frustum;
 
 /// The camera's colour attachment, on which the pipelines of all passes depend.
@@ -84,6 +88,8 @@ pub struct PreparedView {
     pub focal_pixels: f32,
     /// Factor from radiance to the attachment's values.
     pub exposure: f32,
+    /// How the camera draws.
+    pub options: ViewOptions,
 }
 
 /// The one view that Canopy draws, if a camera asks for it.
@@ -107,7 +113,15 @@ impl Plugin for ViewPlugin {
 fn prepare_view(
     scene: Res<ExtractedScene>,
     cameras: Query<
-        (Entity, &ExtractedView, &ExtractedCamera, &Msaa, Has<MotionVectorPrepass>, Has<DeferredPrepass>),
+        (
+            Entity,
+            &ExtractedView,
+            &ExtractedCamera,
+            &Msaa,
+            Option<&ViewOptions>,
+            Has<MotionVectorPrepass>,
+            Has<DeferredPrepass>,
+        ),
         With<CanopyCamera>,
     >,
     mut frame: ResMut<PreparedFrame>,
@@ -122,7 +136,9 @@ fn prepare_view(
             views.len()
         );
     }
-    let Some((entity, view, camera, msaa, motion_vectors, deferred)) = views.into_iter().next() else { return };
+    let Some((entity, view, camera, msaa, options, motion_vectors, deferred)) = views.into_iter().next() else {
+        return;
+    };
     if motion_vectors {
         error_once!(
             "a CanopyCamera asks for motion vectors (temporal anti-aliasing or motion blur), which Canopy's passes do \
@@ -159,5 +175,6 @@ fn prepare_view(
         attachment: ViewFormat { color: view.target_format, samples: msaa.samples() },
         focal_pixels: 0.5 * size.y * view.clip_from_view.y_axis.y.abs(),
         exposure: camera.exposure,
+        options: options.copied().unwrap_or_default(),
     });
 }

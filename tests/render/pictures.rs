@@ -145,7 +145,7 @@ fn changing_at(stage: &Stage, distance: f32, at: &str) -> Picture {
         levels: Levels::model_and_cross(FadeBand::new(distance, 0.1)),
         ..stage.forest().expect("a forest")
     });
-    world.insert_resource(stage.shadow());
+    renderer.set_shadow(stage.shadow());
     super::again(&mut renderer)
 }
 
@@ -213,8 +213,11 @@ fn moved(stage: &Stage, offset: DVec3, cascades: usize) -> Picture {
     let forest = Forest { origin: offset, ..stage.forest().expect("a forest") };
     let world = renderer.app().world_mut();
     world.spawn(forest);
-    world.insert_resource(SunShadowSettings { cascades, ..stage.shadow() });
-    assert!((world.resource::<CanopyOrigin>().0 - view.position).length() < 2048.0, "the origin follows the camera");
+    renderer.set_shadow(SunShadowSettings { cascades, ..stage.shadow() });
+    assert!(
+        (renderer.app().world().resource::<CanopyOrigin>().0 - view.position).length() < 2048.0,
+        "the origin follows the camera"
+    );
     super::again(&mut renderer)
 }
 

@@ -35,7 +35,7 @@ fn from_above(stage: &Stage) -> Viewpoint {
 fn lit(renderer: &mut Renderer, view: &Viewpoint, light: Daylight, shadow: SunShadowSettings) -> Picture {
     renderer.set_view(view);
     renderer.app().world_mut().insert_resource(light);
-    renderer.app().world_mut().insert_resource(shadow);
+    renderer.set_shadow(shadow);
     again(renderer)
 }
 

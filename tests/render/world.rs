@@ -113,12 +113,7 @@ fn a_mesh_casts_its_shadow_onto_the_ground() {
     let stage = &built.stage;
     let from = view(stage, (0.0, 40.0, 30.0), 0.0, -50.0);
     let mut renderer = showing(stage);
-    renderer.app().world_mut().insert_resource(SunShadowSettings {
-        map_size: 1024,
-        cascades: 1,
-        distance: 80.0,
-        ..Default::default()
-    });
+    renderer.set_shadow(SunShadowSettings { map_size: 1024, cascades: 1, distance: 80.0, ..Default::default() });
     let cube = cube(&mut renderer, 4.0, DVec3::new(0.0, 12.0, 0.0));
     let without = settled(&mut renderer, stage, &from);
     renderer.app().world_mut().entity_mut(cube).insert(CastsCanopyShadow);

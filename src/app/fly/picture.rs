@@ -17,14 +17,24 @@ use bevy::{
 use chrono::{DateTime, Utc};
 
 use super::{light::LightPanel, session::Session};
-use crate::app::{error::AppError, notes::notes, picture::Picture};
+use crate::{
+    app::{error::AppError, notes::notes, picture::Picture},
+    components::DrawnSun,
+};
 
 /// Captures this frame where the session asks for it.
-pub fn take_picture(mut commands: Commands, session: ResMut<Session>, panel: Res<LightPanel>) {
+pub fn take_picture(
+    mut commands: Commands,
+    session: Res<Session>,
+    panel: Res<LightPanel>,
+    drawn: Option<Res<DrawnSun>>,
+) {
     if !session.picturing {
         return;
     }
-    let mut notes = notes(&session.stage, &session.view(), session.lit());
+    // The light may lag behind the clock.
+    let instant = drawn.map_or_else(|| session.clock.now().to_utc(), |sun| sun.0.instant);
+    let mut notes = notes(&session.stage, &session.view(), instant);
     if session.tinted {
         notes.push(("View", "trees tinted by level of detail".to_owned()));
     }

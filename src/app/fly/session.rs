@@ -1,6 +1,6 @@
 //! The state of a flight and what changes it: commands, held keys, time.
 
-use chrono::{DateTime, TimeDelta, Utc};
+use chrono::TimeDelta;
 
 use super::{
     clock::SceneClock,
@@ -16,9 +16,6 @@ use crate::{
 
 use bevy::ecs::resource::Resource;
 
-/// Simulated seconds that the drawn light may lag behind a running clock: the sun moves 0.02 degrees in them, and
-/// the shadow of a tree of 20 m some 7 mm. Computing the light anew costs more than a frame of a fast device.
-const LIGHT_LAG: TimeDelta = TimeDelta::seconds(5);
 /// Seconds for which a message stays.
 const MESSAGE_SECONDS: f64 = 6.0;
 
@@ -48,7 +45,6 @@ pub struct Session {
     /// Whether this frame becomes a picture, so that nothing may lie over it.
     pub picturing: bool,
     message: Option<(String, f64)>,
-    lit: Option<DateTime<Utc>>,
     start: Start,
 }
 
@@ -87,7 +83,6 @@ impl Session {
             help: false,
             picturing: false,
             message: None,
-            lit: None,
             start,
             stage,
         };
@@ -104,23 +99,6 @@ impl Session {
     /// Metres of the camera above the ground below it.
     pub fn above_ground(&self) -> f64 {
         self.pilot.position.y - self.stage.terrain.height(self.pilot.position.x, self.pilot.position.z)
-    }
-
-    /// The instant whose light is drawn.
-    pub fn lit(&self) -> DateTime<Utc> {
-        self.lit.unwrap_or_else(|| self.clock.now().to_utc())
-    }
-
-    /// The instant whose light is to be drawn now, where it is not the one that is drawn already.
-    pub fn relight(&mut self) -> Option<DateTime<Utc>> {
-        let now = self.clock.now().to_utc();
-        let runs = !self.paused && self.clock.rate() > 0.0;
-        let lag = self.lit.map_or(TimeDelta::MAX, |lit| (now - lit).abs());
-        let due = if runs { lag >= LIGHT_LAG } else { lag > TimeDelta::zero() };
-        due.then(|| {
-            self.lit = Some(now);
-            now
-        })
     }
 
     /// Shows a message for some seconds.
@@ -280,23 +258,6 @@ mod tests {
         session.carry_out(Command::Home);
         session.fly(&Controls::default(), 0.0);
         assert!(session.touring && session.pilot.position.x.abs() < 1e-6);
-        Ok(())
-    }
-
-    #[test]
-    fn light_follows_steps_at_once_and_a_running_clock_in_steps() -> Result<(), Box<dyn std::error::Error>> {
-        let mut session = session(View::Scene, 0.0)?;
-        assert!(session.relight().is_some());
-        assert!(session.relight().is_none());
-        session.carry_out(Command::Minutes(10));
-        assert_eq!(session.relight(), Some(session.clock.now().to_utc()));
-        session.carry_out(Command::Faster);
-        session.fly(&Controls::default(), 1.0);
-        assert!(session.relight().is_none());
-        for _ in 0..4 {
-            session.fly(&Controls::default(), 1.0);
-        }
-        assert_eq!(session.relight(), Some(session.clock.now().to_utc()));
         Ok(())
     }
 }

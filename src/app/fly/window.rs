@@ -6,6 +6,7 @@ use bevy::{
     app::AppExit,
     camera::Camera3d,
     ecs::{
+        change_detection::DetectChangesMut,
         message::{MessageReader, MessageWriter},
         query::With,
         system::{Commands, Local, Res, ResMut, Single},
@@ -29,10 +30,8 @@ use super::{
 };
 use crate::{
     app::camera,
-    render::{
-        components::{CanopyCamera, CanopyOrigin, ViewOptions},
-        daylight::SkySettings,
-    },
+    components::Sun,
+    render::components::{CanopyCamera, CanopyOrigin, ViewOptions},
 };
 
 /// Pixels of a touchpad's scrolling that are one notch of a wheel.
@@ -42,11 +41,11 @@ const PIXELS_A_NOTCH: f64 = 100.0;
 pub fn set_up(mut commands: Commands, session: Res<Session>) {
     let stage = &session.stage;
     stage.show(&mut commands);
+    commands.spawn((stage.sun(session.clock.now().to_utc()), stage.shadow()));
     commands.spawn((
         Camera3d::default(),
         CanopyCamera,
         Msaa::from_samples(stage.scene.quality.msaa),
-        camera::TONEMAPPING,
         camera::projection(session.view().field_of_view),
     ));
 }
@@ -157,28 +156,16 @@ pub fn fly(
 
 /// Brings camera, light and options in step with the flight; what stays the same is not touched.
 pub fn follow(
-    mut commands: Commands,
-    mut session: ResMut<Session>,
+    session: Res<Session>,
     mut origin: ResMut<CanopyOrigin>,
-    mut options: ResMut<ViewOptions>,
-    mut camera: Single<&mut Transform, With<CanopyCamera>>,
-    sky: Option<Res<SkySettings>>,
+    camera: Single<(&mut Transform, &mut ViewOptions), With<CanopyCamera>>,
+    mut sun: Single<&mut Sun>,
 ) {
-    let (place, transform) = camera::place(&session.view());
-    if *origin != place {
-        *origin = place;
-    }
-    if **camera != transform {
-        **camera = transform;
-    }
-    let wanted = ViewOptions { tint_levels: session.tinted };
-    if *options != wanted {
-        *options = wanted;
-    }
-    if let Some(instant) = session.relight() {
-        let wanted = session.stage.sky(instant);
-        if sky.is_none_or(|sky| *sky != wanted) {
-            commands.insert_resource(wanted);
-        }
-    }
+    let (mut transform, mut options) = camera.into_inner();
+    let (place, moved) = camera::place(&session.view());
+    origin.set_if_neq(place);
+    transform.set_if_neq(moved);
+    options.set_if_neq(ViewOptions { tint_levels: session.tinted });
+    // How often the light follows is the sun's own affair.
+    sun.set_if_neq(session.stage.sun(session.clock.now().to_utc()));
 }

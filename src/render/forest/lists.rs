@@ -19,7 +19,6 @@ use crate::{
     cull::{DrawLists, cull_view},
     lod::{MAX_LEVELS, Representation},
     render::{
-        extract::ExtractedScene,
         gpu::{self, Gpu, GrowingBuffer, UNIFORM_STRIDE},
         report::FrameReport,
         view::PreparedFrame,
@@ -115,7 +114,6 @@ impl ForestStatistics {
 
 /// Culls every forest for the view and uploads the lists.
 pub fn prepare_view_lists(
-    scene: Res<ExtractedScene>,
     frame: Res<PreparedFrame>,
     forests: Res<GpuForests>,
     representations: Res<Representations>,
@@ -151,7 +149,7 @@ pub fn prepare_view_lists(
         };
         for (index, representation) in settings.levels.representations().iter().enumerate() {
             let tint = representations.get(*representation).map(|renderer| renderer.tint()).unwrap_or_default();
-            let amount = if scene.options.tint_levels { TINT_AMOUNT } else { 0.0 };
+            let amount = if view.options.tint_levels { TINT_AMOUNT } else { 0.0 };
             let look = LevelLook {
                 fade_in: settings.levels.fade_in(index),
                 fade_out: settings.levels.fade_out(index),

@@ -145,11 +145,10 @@ pub fn prepare_shadows(
 
 /// Height in scene metres below which nothing within `radius` metres of the camera can be in shadow.
 fn lowest_receiver(scene: &ExtractedScene, camera: DVec3, radius: f64) -> f64 {
-    let middle = DVec2::new(camera.x, camera.z);
-    let ground = scene
-        .ground
-        .as_ref()
-        .map(|(_, ground)| f64::from(ground.terrain.height_bounds(middle - radius, middle + radius).0));
+    let ground = scene.ground.as_ref().map(|(_, ground, origin)| {
+        let middle = DVec2::new(camera.x - origin.x, camera.z - origin.z);
+        f64::from(ground.terrain.height_bounds(middle - radius, middle + radius).0) + origin.y
+    });
     ground.unwrap_or(f64::NEG_INFINITY).max(camera.y - radius)
 }
 

@@ -77,7 +77,7 @@ impl GroundMap {
         Self { view, mean_cover: 0.0, texture, size: (1, 1), extent: DVec2::ONE, wide: None, shows: None }
     }
 
-    /// Camera-relative origin and inverse size of the map, for a camera at `camera` (scene metres).
+    /// Camera-relative origin and inverse size of the map, for a camera at `camera` (metres from the terrain's own origin).
     fn placement(&self, camera: DVec3) -> [f32; 4] {
         let origin = -0.5 * self.extent - DVec2::new(camera.x, camera.z);
         [origin.x as f32, origin.y as f32, (1.0 / self.extent.x) as f32, (1.0 / self.extent.y) as f32]
@@ -99,7 +99,8 @@ pub fn prepare_ground_map(
     textures.ground = map.view.clone();
     placement.mean_cover = map.mean_cover;
     if let Some(view) = &frame.view {
-        placement.ground = map.placement(view.camera);
+        let origin = scene.ground.as_ref().map_or(DVec3::ZERO, |(.., origin)| *origin);
+        placement.ground = map.placement(view.camera - origin);
     }
 }
 
@@ -111,7 +112,7 @@ fn update(
     queue: &RenderQueue,
     report: &FrameReport,
 ) {
-    let Some((_, ground)) = &scene.ground else {
+    let Some((_, ground, _)) = &scene.ground else {
         // A ground that was despawned is let go, its shadow with it.
         if map.shows.is_some() {
             *map = GroundMap::empty(device, queue);

@@ -103,13 +103,15 @@ pub fn prepare_tiles(
     let gpu = &mut *terrain;
     gpu.count = 0;
     *statistics = TerrainStatistics::default();
-    let Some((_, ground)) = &scene.ground else {
+    let Some((_, ground, origin)) = &scene.ground else {
         gpu.cache = None;
         gpu.bind_group = None;
         report.skipped("terrain", "the scene has no ground");
         return;
     };
     let Some(view) = &frame.view else { return };
+    // In the terrain's own metres.
+    let camera = view.camera - *origin;
     let settings = TileSettings {
         finest_spacing: FINEST_SPACING,
         max_distance: ground.view_distance,
@@ -129,9 +131,9 @@ pub fn prepare_tiles(
     gpu.frame += 1;
     let mut chosen: Vec<Tile> = Vec::new();
     let clearance = cache.tree.select(
-        view.camera,
+        camera,
         f64::from(view.focal_pixels),
-        |min: DVec3, max: DVec3| view.frustum.sees_box((min - view.camera).as_vec3(), (max - view.camera).as_vec3()),
+        |min: DVec3, max: DVec3| view.frustum.sees_box((min - camera).as_vec3(), (max - camera).as_vec3()),
         &mut chosen,
     );
     cache.reserve(&device, chosen.len());
@@ -142,15 +144,15 @@ pub fn prepare_tiles(
             error_once!("the view needs more terrain tiles than the device can hold; raise `terrain_error`");
             break;
         };
-        let origin = cache.tree.tile_origin(tile.level, tile.ix, tile.iz);
+        let corner = cache.tree.tile_origin(tile.level, tile.ix, tile.iz);
         tiles.push(GpuTile {
-            origin: [(origin.x - view.camera.x) as f32, (origin.y - view.camera.z) as f32],
+            origin: [(corner.x - camera.x) as f32, (corner.y - camera.z) as f32],
             spacing: cache.tree.spacing(tile.level) as f32,
             first: (slot * TILE_VERTICES) as u32,
             morph_start: tile.morph_start,
             morph_end: tile.morph_end,
             clearance: clearance as f32,
-            level: tile.level as f32,
+            camera_height: camera.y as f32,
         });
     }
     gpu.tiles.write(&device, &queue, &tiles);

@@ -45,6 +45,6 @@ pub struct GpuTile {
     pub morph_end: f32,
     /// Lower bound of the distance from the camera to the ground, metres.
     pub clearance: f32,
-    /// Level of detail.
-    pub level: f32,
+    /// Height of the camera above the terrain's datum, metres.
+    pub camera_height: f32,
 }

@@ -1,16 +1,16 @@
 //! How far a scene is, for whoever looks.
 
-use bevy::ecs::resource::Resource;
-
-use crate::scene::SceneSource;
+use bevy::{
+    ecs::{component::Component, reflect::ReflectComponent},
+    prelude::ReflectDefault,
+    reflect::Reflect,
+};
 
 /// Where a scene stands.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Reflect)]
 pub enum SceneState {
-    /// Nobody has asked for one.
-    #[default]
-    Idle,
     /// It is being built.
+    #[default]
     Building,
     /// It is shown.
     Ready,
@@ -18,12 +18,11 @@ pub enum SceneState {
     Failed,
 }
 
-/// How far the scene is that was asked for last. A plain value, which changes at most once a frame: cheap to look at, and
-/// Bevy's change detection holds.
-#[derive(Resource, Clone, Debug, Default, PartialEq)]
+/// How far a [`CanopyScene`](super::CanopyScene) is, on the same entity. It changes at most once a frame, and Bevy's change
+/// detection holds.
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, Default)]
 pub struct SceneProgress {
-    /// What was asked for; an empty path while nobody has.
-    pub scene: SceneSource,
     /// Where it stands.
     pub state: SceneState,
     /// Name of the step that it is at, or ended with: "Terrain", "Plants", "Trees" ...; empty before the first.
@@ -42,11 +41,6 @@ impl SceneProgress {
     /// Share of the step that is done, 0..=1; `None` where it is unknown.
     pub fn share(&self) -> Option<f32> {
         (self.total > 0).then(|| self.done.min(self.total) as f32 / self.total as f32)
-    }
-
-    /// Starts anew with `scene`.
-    pub(super) fn begin(&mut self, scene: SceneSource) {
-        *self = Self { scene, state: SceneState::Building, ..Self::default() };
     }
 
     /// Takes in what the builder said.
@@ -82,12 +76,7 @@ mod tests {
 
     #[test]
     fn steps_are_counted_and_lines_kept() {
-        let mut progress = SceneProgress { warnings: vec!["of another scene".to_owned()], ..SceneProgress::default() };
-        progress.begin("a.ron".into());
-        assert_eq!(
-            progress,
-            SceneProgress { scene: "a.ron".into(), state: SceneState::Building, ..SceneProgress::default() }
-        );
+        let mut progress = SceneProgress::default();
         assert_eq!(progress.share(), None);
         progress.hear(Said::Begin("Plants".to_owned(), 4));
         assert_eq!(progress.share(), Some(0.0));

@@ -10,7 +10,9 @@ use std::{
     thread::{self, JoinHandle},
 };
 
-use super::{LoadScene, progress::Said};
+use bevy::ecs::component::Component;
+
+use super::{CanopyScene, progress::Said};
 use crate::{
     assets::{Stage, StageError, threads::spare_cores},
     progress::Progress,
@@ -21,11 +23,11 @@ type Line = Arc<Mutex<Vec<Said>>>;
 
 /// A scene that is being built. Dropped, it is given up: the threads end after the plants that they are at, and nobody
 /// waits for them.
+#[derive(Component)]
 pub struct Job {
-    /// What is built.
-    pub request: LoadScene,
     line: Line,
-    thread: JoinHandle<Result<Stage, StageError>>,
+    /// Until its end was taken.
+    thread: Option<JoinHandle<Result<Stage, StageError>>>,
 }
 
 impl Job {
@@ -33,24 +35,24 @@ impl Job {
     ///
     /// # Errors
     /// [`StageError::Background`] where the system has no thread for it.
-    pub fn start(request: LoadScene) -> Result<Self, StageError> {
+    pub fn start(request: &CanopyScene) -> Result<Self, StageError> {
         let line = Line::default();
         let mut speaker = Speaker(line.clone());
-        let LoadScene { scene, overrides } = request.clone();
+        let CanopyScene { source, overrides } = request.clone();
         let work = move || {
             let name = |index| format!("canopy bake {index}");
             let pool = rayon::ThreadPoolBuilder::new().num_threads(spare_cores()).thread_name(name).build();
             let pool = pool.map_err(|error| StageError::Background(format!("no threads for bakes: {error}")))?;
-            pool.install(|| Stage::build(&overrides.applied(scene.read()?), &mut speaker))
+            pool.install(|| Stage::build(&overrides.applied(source.read()?), &mut speaker))
         };
         let thread = thread::Builder::new().name("canopy scene".to_owned()).spawn(work);
         let thread = thread.map_err(|error| StageError::Background(format!("no thread: {error}")))?;
-        Ok(Self { request, line, thread })
+        Ok(Self { line, thread: Some(thread) })
     }
 
     /// Whether [`finish`](Self::finish) has not to wait.
     pub fn is_finished(&self) -> bool {
-        self.thread.is_finished()
+        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
     /// What was said since the last call.
@@ -62,8 +64,9 @@ impl Job {
     ///
     /// # Errors
     /// Those of [`Stage::build`]; [`StageError::Background`] where the thread broke off.
-    pub fn finish(self) -> Result<Stage, StageError> {
-        self.thread.join().unwrap_or_else(|panic| Err(StageError::Background(broken_off(&*panic))))
+    pub fn finish(&mut self) -> Result<Stage, StageError> {
+        let Some(thread) = self.thread.take() else { return Err(StageError::Cancelled) };
+        thread.join().unwrap_or_else(|panic| Err(StageError::Background(broken_off(&*panic))))
     }
 }
 
@@ -125,7 +128,9 @@ mod tests {
             quality: Quality { cross_resolution: 64, ..Quality::default() },
             ..Scene::new(GroundFlat { size: 100.0 })
         };
-        let Job { line, thread, .. } = Job::start(LoadScene::new(scene))?;
+        let Job { line, thread: Some(thread) } = Job::start(&CanopyScene::new(scene))? else {
+            return Err("no thread".into());
+        };
         let at_plants = |line: &Line| {
             let said = line.lock().unwrap_or_else(PoisonError::into_inner);
             said.iter().any(|said| matches!(said, Said::Begin(step, _) if step == "Plants"))

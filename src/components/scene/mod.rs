@@ -1,0 +1,247 @@
+//! Scenes in a Bevy program: built beside it with progress, shown as children of their entity when they are ready.
+//!
+//! The bakes run in parallel on threads of their own, all cores but one, and come from the cache where it has them. Until a
+//! scene is ready a frame pays for a look at a list; then for uploading the scene. A program that closes meanwhile does not
+//! wait: what is under way is given up, and as the cache's files appear whole or not at all, nothing half stays in it.
+
+mod job;
+mod progress;
+
+use std::{fmt, sync::Arc};
+
+use bevy::{
+    app::{App, First, Plugin},
+    camera::visibility::Visibility,
+    ecs::{
+        change_detection::DetectChanges,
+        component::Component,
+        entity::Entity,
+        event::EntityEvent,
+        hierarchy::ChildOf,
+        lifecycle::Remove,
+        observer::On,
+        query::{Changed, Has, With},
+        schedule::IntoScheduleConfigs,
+        system::{Commands, Query, Res},
+        world::Ref,
+    },
+    render::renderer::RenderDevice,
+    transform::components::Transform,
+};
+use tracing::{error, info, warn};
+
+use super::{Sun, sets::CanopySystems};
+use crate::{
+    assets::{Stage, StageError},
+    light::MoonSetting,
+    scene::{self, Overrides, SceneSource},
+};
+use job::Job;
+use progress::Said;
+pub use progress::{SceneProgress, SceneState};
+
+/// A scene on an entity: a file ([scene files](crate::scene)), or a [`Scene`](crate::scene::Scene) that was made in code.
+///
+/// It is built beside the program. When it is ready, its ground, its forest and, where the world has no [`Sun`] yet, its sun
+/// become children of the entity, which gets a [`LoadedScene`], and [`SceneReady`] is triggered on it; [`SceneFailed`]
+/// where it cannot be shown, and the program goes on as it was. The log has both. [`SceneProgress`] says how far it is.
+///
+/// Another value on the same entity replaces what is shown when it is ready, not before. The entity's transform and
+/// visibility act on all of the scene. Several scenes can be in a world, of which one ground at a time is drawn.
+#[derive(Component, Clone, Debug, Default, PartialEq)]
+#[require(Transform, Visibility, SceneProgress)]
+pub struct CanopyScene {
+    /// The scene: a file, or a value.
+    pub source: SceneSource,
+    /// What replaces values in it.
+    pub overrides: Overrides,
+}
+
+impl CanopyScene {
+    /// `source`, a file or a [`Scene`](crate::scene::Scene), as it is.
+    pub fn new(source: impl Into<SceneSource>) -> Self {
+        Self { source: source.into(), overrides: Overrides::default() }
+    }
+}
+
+/// A scene is in the world, from this very frame on. Triggered on its entity.
+#[derive(EntityEvent, Clone)]
+pub struct SceneReady {
+    /// The entity of the [`CanopyScene`].
+    pub entity: Entity,
+    /// What it is made of.
+    pub stage: Arc<Stage>,
+}
+
+/// A scene cannot be shown. Triggered on its entity. [`Display`](fmt::Display) has the whole message: what is wrong, where, and
+/// the remedy.
+#[derive(EntityEvent, Debug)]
+pub struct SceneFailed {
+    /// The entity of the [`CanopyScene`].
+    pub entity: Entity,
+    /// What is wrong.
+    pub error: StageError,
+}
+
+impl fmt::Display for SceneFailed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.error.fmt(f)
+    }
+}
+
+/// The scene that an entity shows, beside its [`CanopyScene`] from when it is ready.
+#[derive(Component, Clone)]
+pub struct LoadedScene {
+    /// What it is made of.
+    pub stage: Arc<Stage>,
+    /// Its entities, children of this one.
+    pub shown: Shown,
+}
+
+/// Entities that show a stage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shown {
+    /// Its ground.
+    pub ground: Entity,
+    /// Its forest, where it has trees.
+    pub forest: Option<Entity>,
+    /// Its sun, where the world had none.
+    pub sun: Option<Entity>,
+}
+
+impl Shown {
+    /// Takes them out of the world, those that are still there.
+    pub fn despawn(self, commands: &mut Commands) {
+        for entity in self.sun.into_iter().chain(self.forest).chain([self.ground]) {
+            commands.entity(entity).try_despawn();
+        }
+    }
+}
+
+impl Stage {
+    /// Puts ground and forest into a world. The sun is another matter, as a world has one: see [`sun`](Self::sun).
+    pub fn show(&self, commands: &mut Commands) -> Shown {
+        Shown {
+            ground: commands.spawn(self.ground()).id(),
+            forest: self.forest().map(|forest| commands.spawn(forest).id()),
+            sun: None,
+        }
+    }
+
+    /// Sun, moon and air at an instant. [`shadow`](Self::shadow) belongs beside it.
+    pub fn sun(&self, instant: chrono::DateTime<chrono::Utc>) -> Sun {
+        Sun {
+            observer: self.observer,
+            instant,
+            moon: match self.scene.place.moon {
+                scene::Moon::Full => MoonSetting::FullOpposite,
+                scene::Moon::Astronomical => MoonSetting::Astronomical,
+                scene::Moon::None => MoonSetting::None,
+            },
+            visibility_km: self.scene.place.visibility * 1e-3,
+            ..Sun::default()
+        }
+    }
+}
+
+/// Builds and shows [`CanopyScene`]s.
+pub struct ScenePlugin;
+
+impl Plugin for ScenePlugin {
+    fn build(&self, app: &mut App) {
+        app.register_type::<SceneProgress>()
+            .add_systems(First, (begin, follow).chain().in_set(CanopySystems::Load))
+            .add_observer(give_up);
+    }
+}
+
+/// Begins to build the scenes that are new or have changed.
+fn begin(mut commands: Commands, scenes: Query<(Entity, Ref<CanopyScene>, Has<Job>), Changed<CanopyScene>>) {
+    for (entity, scene, building) in &scenes {
+        if building && !scene.is_added() {
+            info!("another scene is given up for {}", scene.source);
+        }
+        let mut entity_commands = commands.entity(entity);
+        entity_commands.remove::<Job>();
+        match Job::start(&scene) {
+            Ok(job) => {
+                entity_commands.insert((job, SceneProgress::default()));
+            }
+            Err(error) => {
+                let progress = SceneProgress { state: SceneState::Failed, ..SceneProgress::default() };
+                entity_commands.insert(progress);
+                fail(&mut commands, entity, &scene, error);
+            }
+        }
+    }
+}
+
+/// Takes in how far the scenes are, and shows those that are ready.
+fn follow(
+    mut commands: Commands,
+    mut scenes: Query<(Entity, &CanopyScene, &mut Job, &mut SceneProgress, Option<&LoadedScene>)>,
+    suns: Query<Entity, With<Sun>>,
+    device: Option<Res<RenderDevice>>,
+) {
+    // Two scenes may become ready in the same frame.
+    let mut lit = false;
+    for (entity, scene, mut job, mut progress, loaded) in &mut scenes {
+        // The builder says its last before it ends, so nothing is lost if its end is asked for first.
+        let finished = job.is_finished();
+        for said in job.said() {
+            match &said {
+                Said::Note(note) => info!("{}: {note}", scene.source),
+                Said::Warning(warning) => warn!("{}: {warning}", scene.source),
+                Said::Begin(..) | Said::Advance(_) | Said::End => {}
+            }
+            progress.hear(said);
+        }
+        if !finished {
+            continue;
+        }
+        commands.entity(entity).remove::<Job>();
+        let checked = job.finish().and_then(|stage| {
+            device.as_ref().map_or(Ok(()), |device| stage.check_device(device))?;
+            Ok(Arc::new(stage))
+        });
+        let stage = match checked {
+            Ok(stage) => stage,
+            Err(error) => {
+                progress.state = SceneState::Failed;
+                fail(&mut commands, entity, scene, error);
+                continue;
+            }
+        };
+        let own_sun = loaded.and_then(|loaded| loaded.shown.sun);
+        if let Some(loaded) = loaded {
+            loaded.shown.despawn(&mut commands);
+        }
+        let mut shown = stage.show(&mut commands);
+        if !lit && suns.iter().all(|sun| Some(sun) == own_sun) {
+            let sun = stage.sun(stage.scene.place.time.utc());
+            shown.sun = Some(commands.spawn((sun, stage.shadow())).id());
+            lit = true;
+        }
+        for child in shown.sun.into_iter().chain(shown.forest).chain([shown.ground]) {
+            commands.entity(child).insert(ChildOf(entity));
+        }
+        info!("{}: ready, {} trees", scene.source, stage.stand.trees.len());
+        progress.state = SceneState::Ready;
+        commands.entity(entity).insert(LoadedScene { stage: stage.clone(), shown });
+        commands.trigger(SceneReady { entity, stage });
+    }
+}
+
+/// A scene that is taken from its entity is built no further, and shown no more.
+fn give_up(removed: On<Remove, CanopyScene>, loaded: Query<&LoadedScene>, mut commands: Commands) {
+    let entity = removed.entity;
+    if let Ok(loaded) = loaded.get(entity) {
+        loaded.shown.despawn(&mut commands);
+    }
+    commands.entity(entity).try_remove::<(Job, LoadedScene)>();
+}
+
+fn fail(commands: &mut Commands, entity: Entity, scene: &CanopyScene, error: StageError) {
+    error!("{}: {error}", scene.source);
+    commands.trigger(SceneFailed { entity, error });
+}

@@ -1,0 +1,16 @@
+//! The order of Canopy's work in the main world, as public system sets.
+
+use bevy::ecs::schedule::SystemSet;
+
+/// What happens in a frame of the main world.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum CanopySystems {
+    /// Scenes, terrains and forests that have become ready enter the world, in `First`.
+    Load,
+    /// Clocks run, in `PreUpdate`.
+    Clock,
+    /// Light, exposure and the lights that follow, in `PostUpdate`, before transforms are propagated.
+    Light,
+    /// The origin of the Bevy world follows the camera, in `PostUpdate`, before transforms are propagated.
+    Origin,
+}

@@ -1,0 +1,349 @@
+//! The sun: a place, an instant and the air as one entity, and the light that follows from them.
+
+use std::sync::Arc;
+
+use bevy::{
+    app::{App, Plugin, PostUpdate, PreUpdate},
+    ecs::{
+        component::Component,
+        entity::Entity,
+        reflect::ReflectComponent,
+        resource::Resource,
+        schedule::{IntoScheduleConfigs, common_conditions::any_with_component},
+        system::{Commands, Query, Res, ResMut},
+    },
+    log::error_once,
+    prelude::ReflectDefault,
+    reflect::Reflect,
+    tasks::{AsyncComputeTaskPool, Task, block_on, poll_once},
+    time::Time,
+    transform::TransformSystems,
+};
+use chrono::{DateTime, TimeDelta, Utc};
+
+use super::{
+    daylight::{FollowsDaylight, expose_cameras, light_meshes},
+    sets::CanopySystems,
+};
+use crate::{
+    light::{
+        ExposureSettings, LightError, LightSettings, LightState,
+        atmosphere::{Atmosphere, AtmosphereParams},
+        moon::{MoonSetting, celestial_rotation},
+        sun::{Observer, SunPosition},
+    },
+    render::components::{Daylight, SunShadowSettings},
+    scene::LocalTime,
+};
+
+/// Why a [`Sun`] cannot be.
+#[derive(Debug, thiserror::Error)]
+pub enum SunError {
+    /// The place is not on earth.
+    #[error(transparent)]
+    Place(#[from] LightError),
+    /// The time cannot be read; the text says why, and how to write one.
+    #[error("{0}")]
+    Time(String),
+}
+
+/// When the light follows a [`Sun`] that has changed.
+#[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Component, Default)]
+pub enum SunRefresh {
+    /// In the same frame, which waits for it: some 25 ms, more where the air has changed. For images and tests.
+    Immediate,
+    /// Beside the frames. While the clock runs, a new light is begun when the drawn one lags by so many of the clock's
+    /// seconds; when it stands still, the light catches up.
+    Background {
+        /// Seconds, 0 or more. In the default of 5 the sun moves by 0.02 degrees, and the shadow of a tree of 20 m by some
+        /// 7 mm.
+        lag: f32,
+    },
+}
+
+impl Default for SunRefresh {
+    fn default() -> Self {
+        Self::Background { lag: 5.0 }
+    }
+}
+
+/// The sun and, at night, the moon over a place on earth at an instant: the light of everything. One entity of a world has
+/// it; a second one is refused with a message.
+///
+/// The light is computed beside the frames as often as [`SunRefresh`] says, however often the instant changes. Bevy's
+/// [`DirectionalLight`](bevy::light::DirectionalLight) on the same entity follows it, so that ordinary meshes are lit like
+/// the forest. A program that makes its light otherwise inserts a [`Daylight`] of its own and spawns no `Sun`.
+#[derive(Component, Clone, Debug, PartialEq, Reflect)]
+#[reflect(Component, Default)]
+#[require(SunRefresh, SunShadowSettings, FollowsDaylight)]
+pub struct Sun {
+    /// Place on earth.
+    pub observer: Observer,
+    /// Universal Time.
+    #[reflect(ignore)]
+    pub instant: DateTime<Utc>,
+    /// Seconds that the clock runs on in a second of the app's virtual time; 0: it stands.
+    pub rate: f64,
+    /// Which moon the night has.
+    pub moon: MoonSetting,
+    /// Meteorological visibility at sea level in kilometres, 2 to 250. Lower is hazier.
+    pub visibility_km: f64,
+    /// Stops by which pictures are brighter than the exposure curve has them, -10 to 10. A forest is darker than the
+    /// middle grey that the curve is made for; the default is 0.9.
+    pub compensation_ev: f32,
+}
+
+impl Default for Sun {
+    /// The June noon of 2026 in the middle of Europe, with a full moon at night.
+    fn default() -> Self {
+        Self {
+            observer: Observer {
+                latitude_deg: 48.0,
+                longitude_deg: 11.0,
+                height_m: 500.0,
+                pressure_mbar: 955.0,
+                temperature_c: 12.0,
+            },
+            instant: DateTime::from_timestamp(1_782_040_500, 0).unwrap_or_default(),
+            rate: 0.0,
+            moon: MoonSetting::FullOpposite,
+            visibility_km: 40.0,
+            compensation_ev: 0.9,
+        }
+    }
+}
+
+impl Sun {
+    /// The sun over a place (degrees, north and east positive) at a local time with its offset from UTC, such as
+    /// `"2026-06-21T15:30-04:00"`, or in UTC, `"2026-06-21T19:30Z"`.
+    ///
+    /// # Errors
+    /// [`SunError`] for a place or a time that is out of range or cannot be read.
+    pub fn at(latitude_deg: f64, longitude_deg: f64, time: &str) -> Result<Self, SunError> {
+        let observer = Observer::new(latitude_deg, longitude_deg, 0.0)?;
+        let instant = time.parse::<LocalTime>().map_err(|error| SunError::Time(error.to_string()))?.utc();
+        Ok(Self { observer, instant, ..Self::default() })
+    }
+
+    /// The same with a clock that runs `rate` seconds in a second.
+    #[must_use]
+    pub fn running(self, rate: f64) -> Self {
+        Self { rate, ..self }
+    }
+
+    /// Whether `other` has the same light but for its instant.
+    fn same_but_for_time(&self, other: &Self) -> bool {
+        Self { instant: other.instant, rate: other.rate, ..self.clone() } == *other
+    }
+
+    /// The light of these settings; `atmosphere` has their visibility.
+    ///
+    /// # Errors
+    /// [`LightError`] for an impossible place or instant.
+    pub fn light(&self, atmosphere: &Atmosphere) -> Result<LightState, LightError> {
+        let sun = SunPosition::at(self.instant, &self.observer)?;
+        let moon = self.moon.moon(Some((self.instant, &self.observer)), &sun)?;
+        let settings = LightSettings {
+            observer_height_m: self.observer.height_m.clamp(-500.0, 9000.0),
+            star_rotation: celestial_rotation(self.instant, &self.observer),
+            exposure: ExposureSettings { compensation: self.compensation_ev, ..ExposureSettings::default() },
+            ..LightSettings::default()
+        };
+        LightState::new(atmosphere, sun, moon, &settings)
+    }
+}
+
+/// The sun whose light is drawn, which may lag behind the entity's ([`SunRefresh`]). Not there before the first light.
+#[derive(Resource, Clone, Debug, PartialEq)]
+pub struct DrawnSun(pub Sun);
+
+/// Light that was computed: the air that it needed, and its state.
+type Computed = Result<(Arc<Atmosphere>, LightState), LightError>;
+
+/// What is known of the light, and what is under way.
+#[derive(Resource, Default)]
+struct LightWork {
+    /// The air, which is laborious to compute, and its visibility in kilometres.
+    air: Option<(f64, Arc<Atmosphere>)>,
+    /// The sun whose light is drawn, or was found to be impossible.
+    shown: Option<Sun>,
+    /// The sun of the last frame.
+    last: Option<Sun>,
+    task: Option<(Sun, Task<Computed>)>,
+}
+
+impl LightWork {
+    /// Whether the light of `sun` is wanted now.
+    fn is_due(&self, sun: &Sun, refresh: SunRefresh) -> bool {
+        let Some(shown) = &self.shown else { return true };
+        if !shown.same_but_for_time(sun) {
+            return true;
+        }
+        let lag = (sun.instant - shown.instant).abs();
+        let moves = self.last.as_ref().is_some_and(|last| last.instant != sun.instant);
+        match refresh {
+            SunRefresh::Background { lag: allowed } if moves => {
+                lag >= seconds(allowed.max(0.0).into()) && !lag.is_zero()
+            }
+            _ => !lag.is_zero(),
+        }
+    }
+
+    /// What computes the light of `sun`.
+    fn computation(&self, sun: &Sun) -> impl FnOnce() -> Computed + Send + 'static {
+        let known = self.air.clone().filter(|(visibility, _)| *visibility == sun.visibility_km);
+        let sun = sun.clone();
+        move || {
+            let air = match known {
+                Some((_, air)) => air,
+                None => Arc::new(Atmosphere::new(AtmosphereParams::with_visibility_km(sun.visibility_km))?),
+            };
+            let light = sun.light(&air)?;
+            Ok((air, light))
+        }
+    }
+
+    /// Takes in the light of `sun`; what cannot be computed is told once and not tried again.
+    fn accept(&mut self, sun: Sun, computed: Computed, commands: &mut Commands) {
+        match computed {
+            Ok((air, light)) => {
+                self.air = Some((sun.visibility_km, air));
+                commands.insert_resource(Daylight(Arc::new(light)));
+                commands.insert_resource(DrawnSun(sun.clone()));
+            }
+            Err(error) => error_once!("the light cannot be computed: {error}"),
+        }
+        self.shown = Some(sun);
+    }
+}
+
+/// A span of time; beyond what a clock can hold, the longest one.
+fn seconds(seconds: f64) -> TimeDelta {
+    let nanoseconds = seconds * 1e9;
+    if nanoseconds.is_finite() && nanoseconds.abs() < 9e18 {
+        TimeDelta::nanoseconds(nanoseconds as i64)
+    } else {
+        TimeDelta::nanoseconds(if nanoseconds < 0.0 { i64::MIN } else { i64::MAX })
+    }
+}
+
+/// Keeps [`Daylight`], the cameras' exposure and the lights that follow in step with the [`Sun`].
+pub struct SunPlugin;
+
+impl Plugin for SunPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<LightWork>()
+            .register_type::<(Sun, SunRefresh, FollowsDaylight)>()
+            .add_systems(PreUpdate, run_clocks.in_set(CanopySystems::Clock).run_if(any_with_component::<Sun>))
+            .add_systems(
+                PostUpdate,
+                (update_light, expose_cameras, light_meshes)
+                    .chain()
+                    .in_set(CanopySystems::Light)
+                    .before(TransformSystems::Propagate),
+            );
+    }
+}
+
+/// Moves the clocks that run.
+fn run_clocks(time: Option<Res<Time>>, mut suns: Query<&mut Sun>) {
+    let Some(time) = time else { return };
+    for mut sun in &mut suns {
+        let step = seconds(sun.rate * time.delta_secs_f64());
+        if !step.is_zero()
+            && let Some(instant) = sun.instant.checked_add_signed(step)
+        {
+            sun.instant = instant;
+        }
+    }
+}
+
+fn update_light(
+    mut commands: Commands,
+    suns: Query<(Entity, &Sun, &SunRefresh)>,
+    daylight: Option<Res<Daylight>>,
+    mut work: ResMut<LightWork>,
+) {
+    if suns.count() > 1 {
+        error_once!("{} entities have a Sun, but there is one light: the first one counts", suns.count());
+    }
+    let sun = suns.iter().min_by_key(|(entity, ..)| *entity);
+    if let Some((of, mut task)) = work.task.take() {
+        match block_on(poll_once(&mut task)) {
+            // Light that was asked for by a sun that is gone comes too late.
+            Some(computed) if sun.is_some() => work.accept(of, computed, &mut commands),
+            Some(_) => {}
+            None => work.task = Some((of, task)),
+        }
+    }
+    let Some((_, sun, refresh)) = sun else {
+        work.shown = None;
+        work.last = None;
+        return;
+    };
+    if work.is_due(sun, *refresh) {
+        let pool = AsyncComputeTaskPool::try_get();
+        match (refresh, pool) {
+            // The first light is waited for: without one nothing is drawn.
+            (SunRefresh::Background { .. }, Some(pool)) if daylight.is_some() => {
+                if work.task.is_none() {
+                    let compute = work.computation(sun);
+                    work.task = Some((sun.clone(), pool.spawn(async move { compute() })));
+                }
+            }
+            _ => {
+                work.task = None;
+                let computed = work.computation(sun)();
+                work.accept(sun.clone(), computed, &mut commands);
+            }
+        }
+    }
+    work.last = Some(sun.clone());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shown(sun: &Sun) -> LightWork {
+        LightWork { shown: Some(sun.clone()), last: Some(sun.clone()), ..LightWork::default() }
+    }
+
+    #[test]
+    fn light_follows_steps_at_once_and_a_running_clock_in_steps() {
+        let refresh = SunRefresh::default();
+        let start = Sun::default();
+        let mut work = shown(&start);
+        assert!(!work.is_due(&start, refresh));
+        let later = |seconds| Sun { instant: start.instant + TimeDelta::seconds(seconds), ..start.clone() };
+        // A clock that runs is followed when it lags by five seconds ...
+        assert!(!work.is_due(&later(4), refresh) && work.is_due(&later(5), refresh));
+        assert!(work.is_due(&later(1), SunRefresh::Immediate));
+        // ... and as soon as it stands still.
+        work.last = Some(later(4));
+        assert!(work.is_due(&later(4), refresh));
+        // Anything else is followed at once.
+        assert!(work.is_due(&Sun { visibility_km: 10.0, ..start.clone() }, refresh));
+        // The rate of the clock is nothing that could be seen.
+        assert!(!work.is_due(&start.clone().running(60.0), refresh));
+    }
+
+    #[test]
+    fn clocks_of_any_rate_stay_in_the_calendar() {
+        for rate in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, -1e300] {
+            assert_eq!(seconds(rate).num_days().abs(), i64::MAX / 86_400_000_000_000, "{rate}");
+        }
+        assert_eq!(seconds(1.5), TimeDelta::milliseconds(1500));
+    }
+
+    #[test]
+    fn a_sun_is_placed_by_degrees_and_a_local_time() -> Result<(), SunError> {
+        let sun = Sun::at(36.5, -84.2, "2026-06-21T15:30-04:00")?;
+        assert_eq!(sun.instant.to_rfc3339(), "2026-06-21T19:30:00+00:00");
+        assert!(matches!(Sun::at(91.0, 0.0, "2026-06-21T15:30Z"), Err(SunError::Place(_))));
+        let message = Sun::at(0.0, 0.0, "noon").map_err(|error| error.to_string());
+        assert!(message.is_err_and(|message| message.contains("noon")));
+        Ok(())
+    }
+}
