@@ -1,5 +1,5 @@
 //! What a level of detail must be able to do to be drawn: the renderer's side of a
-//! [`Representation`](crate::lod::Representation).
+//! [`Representation`].
 //!
 //! ```text
 //!   Levels of a forest ── by name ──> LevelRenderer ── upload ──> GpuLevel, one a forest
@@ -9,7 +9,7 @@
 //! ```
 //!
 //! A new level is one file that bakes it (in `bake/levels`, if it needs a bake), one that implements both traits, one
-//! shader, and one line in [`levels::built_in`](super::levels). A program adds its own with [`RegisterRepresentation`];
+//! shader, and one line in `levels::built_in`. A program adds its own with [`RegisterRepresentation`];
 //! `examples/box_level.rs` is one of some eighty lines. What all levels share (lists of trees, thresholds, tints,
 //! statistics, reports) goes over the list and knows none of them.
 

@@ -96,7 +96,7 @@ pub struct ShadowMaps {
     pub cascade_bind_group: Option<BindGroup>,
     /// Texels along a side.
     pub map_size: u32,
-    /// One [`CascadeViewUniform`] a cascade.
+    /// One [`CascadeViewUniform`](crate::render::bindings::uniforms::CascadeViewUniform) a cascade.
     pub cascade_uniforms: Buffer,
     /// Buffers of the forests that cast.
     pub casters: HashMap<Entity, CasterBuffers>,
