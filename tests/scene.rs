@@ -3,10 +3,13 @@
 use std::path::Path as FilePath;
 
 use canopy::app::parse_lighting;
+use canopy::bake::lighting::SunLight;
+use canopy::light::MoonSetting;
+use canopy::plant::Gloss;
+use canopy::scatter::{LengthUnit, Sequence};
 use canopy::scene::{
-    GltfPlants, Ground, GroundFile, GrownForm, GrownPlants, InventoryTrees, LeafGloss, LengthUnit, Lighting, Moon,
-    Overrides, Path, PlantSource, Position, ScatteredTrees, Scene, SceneError, Sequence, Species, SunLight, Transfer,
-    Trees,
+    GltfPlants, Ground, GroundFile, GrownForm, GrownPlants, InventoryTrees, Lighting, Overrides, Path, PlantSource,
+    Position, ScatteredTrees, Scene, SceneError, Species, Transfer, Trees,
 };
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
@@ -136,8 +139,8 @@ fn everything_is_read() -> Outcome {
     let PlantSource::Grown(grown) = &birch.plant else { return Err("not grown".into()) };
     assert_eq!(grown.form, GrownForm::File("folder/birch.ron".into()));
     let Trees::Scattered(rules) = &scene.trees else { return Err("not scattered".into()) };
-    assert_eq!((rules.sequence, rules.area.map(|area| area.east)), (Sequence::Hammersley, Some(80.0)));
-    assert_eq!((scene.place.latitude, scene.place.moon), (Some(47.5), Moon::Astronomical));
+    assert_eq!((rules.sequence, rules.area.map(|area| area.max.x)), (Sequence::Hammersley, Some(80.0)));
+    assert_eq!((scene.place.latitude, scene.place.moon), (Some(47.5), MoonSetting::Astronomical));
     let path = Path::new(&scene.camera.path).ok_or("no path")?;
     assert_eq!(path.at(5.0), scene.camera.path[1].pose());
     assert_eq!((scene.quality.cascades, scene.quality.near_distance), (3, 40.0));
@@ -147,11 +150,11 @@ fn everything_is_read() -> Outcome {
 #[test]
 fn gloss_and_the_way_of_the_sun_are_read() -> Outcome {
     let plain = parse(FULL)?;
-    assert_eq!(plain.species[0].gloss, LeafGloss { share: 0.045, roughness: 0.4 });
+    assert_eq!(plain.species[0].gloss, Gloss { reflectance: 0.045, roughness: 0.4 });
     let text =
         FULL.replace("weight: 3,", "weight: 3, gloss: (roughness: 0.2), lighting: Transfer(bands: 4, sun: Harmonics),");
     let oak = &parse(&text)?.species[0];
-    assert_eq!(oak.gloss, LeafGloss { share: 0.045, roughness: 0.2 });
+    assert_eq!(oak.gloss, Gloss { reflectance: 0.045, roughness: 0.2 });
     assert_eq!(
         oak.lighting,
         Some(Lighting::Transfer(Transfer { bands: 4, sun: SunLight::Harmonics, ..Transfer::default() }))

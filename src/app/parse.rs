@@ -1,6 +1,9 @@
 //! Texts of the command line to values.
 
-use crate::scene::{Expressive, Lighting, Pose, SunLight, Transfer};
+use crate::{
+    bake::lighting::SunLight,
+    scene::{Expressive, Lighting, Pose, Transfer},
+};
 
 /// Why an argument is not what it should be.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

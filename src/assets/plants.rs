@@ -7,8 +7,8 @@ use crate::{
     bake::{
         BakeSettings,
         billboard::CrossSettings,
-        implicit::{AmbientField, ImplicitSettings, NormalSource},
-        lighting::LightingSettings,
+        implicit::ImplicitSettings,
+        lighting::{LightingSettings, SunLight},
         transfer::{Channels, Interior, TransferSettings},
     },
     plant::{
@@ -16,9 +16,8 @@ use crate::{
         gltf::{GltfOptions, load_plant},
         grow::{GrowParameters, grow},
     },
-    render::components::SunLight,
     scatter::packed::MAX_VARIANTS,
-    scene::{self, AmbientTerm, CrownNormals, GrownForm, Lighting, PlantSource, Quality, Scene, Species},
+    scene::{GrownForm, Lighting, PlantSource, Quality, Scene, Species},
 };
 
 /// How one individual is made.
@@ -106,8 +105,7 @@ pub fn plan(scene: &Scene) -> Result<PlantPlan, StageError> {
     for species in &scene.species {
         let first = plan.individuals.len();
         let lighting = lighting_settings(species.lighting.as_ref());
-        let gloss =
-            Gloss { reflectance: species.gloss.share as f32, roughness: species.gloss.roughness as f32 }.in_range();
+        let gloss = species.gloss.in_range();
         let individuals = sources(species)?.into_iter().map(|source| Individual { source, gloss, lighting });
         plan.individuals.extend(individuals);
         plan.variants.push(first as u16..plan.individuals.len() as u16);
@@ -160,8 +158,8 @@ fn sources(species: &Species) -> Result<Vec<IndividualSource>, StageError> {
 /// What a species' light asks of the pass.
 pub fn sun_light(lighting: Option<&Lighting>) -> SunLight {
     match lighting {
-        Some(Lighting::Transfer(scene::Transfer { sun: scene::SunLight::Harmonics, .. })) => SunLight::Harmonics,
-        _ => SunLight::LeafShader,
+        Some(Lighting::Transfer(transfer)) => transfer.sun,
+        _ => SunLight::default(),
     }
 }
 
@@ -186,19 +184,13 @@ pub fn lighting_settings(lighting: Option<&Lighting>) -> LightingSettings {
             LightingSettings::Expressive(ImplicitSettings {
                 radius: number(expressive.radius),
                 threshold: number(expressive.threshold),
-                ambient: match expressive.ambient {
-                    AmbientTerm::Depth => AmbientField::Depth,
-                    AmbientTerm::Published => AmbientField::Published,
-                },
+                ambient: expressive.ambient,
                 ambient_radius: number(expressive.ambient_radius),
                 least: number(expressive.least),
                 core: number(expressive.core),
                 exponent: number(expressive.exponent),
                 generator_share: number(expressive.share).unwrap_or(default.generator_share),
-                normals: match expressive.normals {
-                    CrownNormals::Nearest => NormalSource::NearestVertex,
-                    CrownNormals::Smooth => NormalSource::Gradient,
-                },
+                normals: expressive.normals,
                 own_normal: number(expressive.own_normal).unwrap_or(default.own_normal),
                 ..default
             })

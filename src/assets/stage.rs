@@ -11,12 +11,12 @@ use rayon::prelude::*;
 
 use super::{StageError, ground, plants, together, trees};
 use crate::{
-    bake::{BakeSource, BakedPlant, bake_plant, cache::Cache},
-    light::{MoonSetting, sun::Observer},
+    bake::{BakeSource, BakedPlant, bake_plant, cache::Cache, lighting::SunLight},
+    light::sun::Observer,
     lod::FadeBand,
     progress::Progress,
     render::{
-        components::{Forest, Ground, SunLight, SunShadowSettings},
+        components::{Forest, Ground, SunShadowSettings},
         daylight::SkySettings,
     },
     scatter::{CoverMap, PackedStand, PackedTree, VariantBounds, cover_map, packed::DEFAULT_CELL_SIZE},
@@ -177,11 +177,7 @@ impl Stage {
         SkySettings {
             observer: self.observer,
             instant,
-            moon: match self.scene.place.moon {
-                scene::Moon::Full => MoonSetting::FullOpposite,
-                scene::Moon::Astronomical => MoonSetting::Astronomical,
-                scene::Moon::None => MoonSetting::None,
-            },
+            moon: self.scene.place.moon,
             visibility_km: self.scene.place.visibility * 1e-3,
             ..SkySettings::default()
         }

@@ -2,9 +2,13 @@
 
 use std::ops::RangeInclusive;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::check::Check;
+use crate::bake::{
+    implicit::{AmbientField, NormalSource},
+    lighting::SunLight,
+};
 
 /// The light of a species' foliage. Each choice has its own fields, all of which may be left out: `Transfer()`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -29,20 +33,8 @@ pub struct Transfer {
     pub rays: u32,
     /// How often light is followed from leaf to leaf, 0 to 8; 0: straight through leaves only. Default 3.
     pub bounces: u32,
-    /// How the sun lights full models; costs no bake of its own. Default `LeafShader`.
+    /// How the sun lights full models, `LeafShader` or `Harmonics`; costs no bake of its own. Default `LeafShader`.
     pub sun: SunLight,
-}
-
-/// How the sun lights foliage whose sky comes by radiance transfer.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-pub enum SunLight {
-    /// Each leaf by the angle of its own normal to the sun [Franzke 2005, 4.2.2]: sharp, and true.
-    #[default]
-    LeafShader,
-    /// As published for landscapes [Franzke 2005, 4.3.3]: through the transfer as the sky, and dimmed by the shadow map. A
-    /// few bands hold no disc, and the plant's own shadow counts twice: soft and dark, to compare with. Crosses keep
-    /// `LeafShader`.
-    Harmonics,
 }
 
 impl Default for Transfer {
@@ -59,8 +51,9 @@ pub struct Expressive {
     pub radius: Option<f64>,
     /// Density at the surface, tau, in leaves, 0 to 1000000. Larger: a surface closer to the densest foliage.
     pub threshold: Option<f64>,
-    /// What the ambient light is a function of. Default `Depth`.
-    pub ambient: AmbientTerm,
+    /// What the ambient light is a function of: `Depth`, how many leaves a ray meets on its way out, on average (near to what
+    /// the path tracer finds), or `Published`, the density within rho less tau. Default `Depth`.
+    pub ambient: AmbientField,
     /// First radius of `Depth` in metres, 0 to 1000. Larger: gaps between twigs no longer count.
     pub ambient_radius: Option<f64>,
     /// Ambient light of the crown's core, k_a_min, 0 to 1.
@@ -72,34 +65,15 @@ pub struct Expressive {
     pub exponent: Option<f64>,
     /// Share of the leaves that make the surface, 0.001 to 1. Smaller: a faster bake, a little off. Default 1.
     pub share: Option<f64>,
-    /// Where normals come from. Default `Nearest`.
-    pub normals: CrownNormals,
+    /// Where normals come from: `Nearest`, the nearest point of the surface, as published (they jump between lobes of the
+    /// crown), or `Smooth`, the gradient of the density. Default `Nearest`.
+    pub normals: NormalSource,
     /// Share of a leaf's own normal, 0 to 1. Default 0.
     pub own_normal: Option<f64>,
     /// Whether all trees of such species are lit together, so that a small tree is darkened by its tall neighbour [Luft
     /// 2007, 5]. Each tree then is a model of its own, of which a scene has at most 64. The first such species' values
     /// count for all. Default false.
     pub together: bool,
-}
-
-/// What the ambient light of an implicit surface's light is a function of.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-pub enum AmbientTerm {
-    /// How many leaves a ray meets on its way out, on average. Near to what the path tracer finds.
-    #[default]
-    Depth,
-    /// The density within rho less tau, as published.
-    Published,
-}
-
-/// Where the normals of an implicit surface's light come from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-pub enum CrownNormals {
-    /// The nearest point of the surface, as published; jumps between lobes of the crown.
-    #[default]
-    Nearest,
-    /// The gradient of the density: smooth.
-    Smooth,
 }
 
 impl Expressive {
@@ -115,6 +89,11 @@ impl Expressive {
     pub const SHARE: RangeInclusive<f64> = 1e-3..=1.0;
     /// Range of [`least`](Self::least) and [`own_normal`](Self::own_normal).
     pub const UNIT: RangeInclusive<f64> = 0.0..=1.0;
+}
+
+/// A choice without fields, as a scene file writes it.
+pub(crate) fn word(choice: &impl Serialize) -> String {
+    ron::to_string(choice).unwrap_or_default()
 }
 
 impl Lighting {
@@ -137,11 +116,11 @@ impl Lighting {
                 ] {
                     fields.extend(value.map(|value| format!("{name}: {value}")));
                 }
-                if expressive.ambient != AmbientTerm::default() {
-                    fields.push(format!("ambient: {:?}", expressive.ambient));
+                if expressive.ambient != AmbientField::default() {
+                    fields.push(format!("ambient: {}", word(&expressive.ambient)));
                 }
-                if expressive.normals != CrownNormals::default() {
-                    fields.push(format!("normals: {:?}", expressive.normals));
+                if expressive.normals != NormalSource::default() {
+                    fields.push(format!("normals: {}", word(&expressive.normals)));
                 }
                 if expressive.together {
                     fields.push("together: true".to_owned());
@@ -155,7 +134,7 @@ impl Lighting {
                 field(transfer.color != default.color, format!("color: {}", transfer.color));
                 field(transfer.rays != default.rays, format!("rays: {}", transfer.rays));
                 field(transfer.bounces != default.bounces, format!("bounces: {}", transfer.bounces));
-                field(transfer.sun != default.sun, format!("sun: {:?}", transfer.sun));
+                field(transfer.sun != default.sun, format!("sun: {}", word(&transfer.sun)));
                 "Transfer"
             }
         };

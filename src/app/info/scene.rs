@@ -20,7 +20,7 @@ use crate::{
     light::sun::{Observer, SunPosition},
     plant::{PartKind, Plant, grow::GrowParameters},
     progress::Progress,
-    scatter::{InventoryOptions, LengthUnit, Stand, read_inventory},
+    scatter::{InventoryOptions, Stand, read_inventory},
     scene::{self, PlantSource, Scene, Species, Trees},
     terrain::Terrain,
 };
@@ -205,12 +205,7 @@ fn describe_trees(
             page.row("of species", format!("{}: {}", species.name, grouped(count)));
         }
         if let Trees::Inventory(file) = &scene.trees {
-            let unit = |unit: scene::LengthUnit| match unit {
-                scene::LengthUnit::Metres => LengthUnit::Metre,
-                scene::LengthUnit::Centimetres => LengthUnit::Centimetre,
-                scene::LengthUnit::Millimetres => LengthUnit::Millimetre,
-            };
-            let options = InventoryOptions { dbh_unit: unit(file.dbh_unit), height_unit: unit(file.height_unit) };
+            let options = InventoryOptions { dbh_unit: file.dbh_unit, height_unit: file.height_unit };
             inventory::describe(page, &read_inventory(&file.path, options)?);
         }
         Ok(())

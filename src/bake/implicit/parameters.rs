@@ -10,6 +10,7 @@
 //!   were fitted to the traced visibility of ten plants, which `benches/implicit.rs` prints beside what they give.
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use super::density::DensityField;
 use super::generators::{Generator, Weighting, even_share};
@@ -27,7 +28,7 @@ const THRESHOLD_SHARE: f32 = 0.25;
 const SAMPLES: usize = 4096;
 
 /// What the ambient term is a function of.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 pub enum AmbientField {
     /// F - τ of the field with the radius ρ, as published: the surface of the normals is where the crown begins to
     /// darken. What lies beyond ρ casts no shade.
@@ -58,12 +59,14 @@ impl AmbientField {
 }
 
 /// Where the normals of the foliage come from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 pub enum NormalSource {
-    /// The nearest vertex of the surface, as published. Jumps between lobes of the crown.
+    /// The nearest vertex of the surface, as published. Jumps between lobes of the crown. In a scene file: `Nearest`.
     #[default]
+    #[serde(rename = "Nearest")]
     NearestVertex,
-    /// The gradient of the density field: smooth.
+    /// The gradient of the density field: smooth. In a scene file: `Smooth`.
+    #[serde(rename = "Smooth")]
     Gradient,
 }
 

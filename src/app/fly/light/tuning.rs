@@ -6,8 +6,8 @@
 use std::ops::RangeInclusive;
 
 use crate::{
-    bake::implicit::ImplicitParameters,
-    scene::{AmbientTerm, CrownNormals, Expressive, Lighting},
+    bake::implicit::{AmbientField, ImplicitParameters, NormalSource},
+    scene::{Expressive, Lighting, word},
 };
 
 /// Something that can be turned.
@@ -195,8 +195,10 @@ impl Tuning {
         match line {
             Line::Light => self.is_expressive = up || matches!(self.scene, Lighting::Expressive(_)),
             _ if !self.is_expressive => {}
-            Line::Ambient => self.expressive.ambient = if up { AmbientTerm::Depth } else { AmbientTerm::Published },
-            Line::Normals => self.expressive.normals = if up { CrownNormals::Smooth } else { CrownNormals::Nearest },
+            Line::Ambient => self.expressive.ambient = if up { AmbientField::Depth } else { AmbientField::Published },
+            Line::Normals => {
+                self.expressive.normals = if up { NormalSource::Gradient } else { NormalSource::NearestVertex }
+            }
             _ => {
                 let (Some((range, step)), Some(field)) = (line.number(), line.field(&mut self.expressive)) else {
                     return false;
@@ -215,8 +217,8 @@ impl Tuning {
         let before = self.clone();
         match line {
             Line::Light => *self = Self::new(self.scene.clone()),
-            Line::Ambient => self.expressive.ambient = AmbientTerm::default(),
-            Line::Normals => self.expressive.normals = CrownNormals::default(),
+            Line::Ambient => self.expressive.ambient = AmbientField::default(),
+            Line::Normals => self.expressive.normals = NormalSource::default(),
             _ => {
                 if let Some(field) = line.field(&mut self.expressive) {
                     *field = None;
@@ -239,8 +241,8 @@ impl Tuning {
                 let whose = if self.is_turned() { "for this session" } else { "the scene's" };
                 format!("{name} ({whose})")
             }
-            (Line::Ambient, _) => format!("{:?}", self.expressive.ambient).to_lowercase(),
-            (_, None) => format!("{:?}", self.expressive.normals).to_lowercase(),
+            (Line::Ambient, _) => word(&self.expressive.ambient).to_lowercase(),
+            (_, None) => word(&self.expressive.normals).to_lowercase(),
             (_, Some(Some(value))) => format!("{}{}", three_digits(*value), line.unit()),
             (_, Some(None)) => line
                 .automatic(used)
