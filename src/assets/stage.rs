@@ -161,15 +161,7 @@ impl Stage {
 
     /// Shadows as the scene's quality asks for them.
     pub fn shadow(&self) -> SunShadowSettings {
-        let quality = &self.scene.quality;
-        SunShadowSettings {
-            map_size: quality.shadow_map_size,
-            cascades: quality.cascades as usize,
-            distance: quality.shadow_distance,
-            // A billboard's level plane would draw a line across the crowns of full models.
-            proxy_distance: quality.near_distance + quality.fade_band,
-            ..SunShadowSettings::default()
-        }
+        SunShadowSettings::from(&self.scene.quality)
     }
 
     /// Sun, moon and air at an instant.

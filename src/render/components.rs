@@ -15,10 +15,14 @@ use crate::{
     light::LightState,
     lod::FadeBand,
     scatter::{CoverMap, PackedStand},
+    scene::Quality,
     terrain::Terrain,
 };
 
 pub use crate::bake::lighting::SunLight;
+
+/// Metres around the camera that the finest shadow cascade serves unless stated.
+const FINEST_RADIUS: f64 = 30.0;
 
 /// A camera that sees Canopy's sky, ground and forests. One camera at a time; a second one is refused with a message.
 #[derive(Component, Clone, Copy, Debug, Default, ExtractComponent)]
@@ -82,8 +86,23 @@ pub struct SunShadowSettings {
 }
 
 impl Default for SunShadowSettings {
+    /// As a scene with the default [`Quality`] has them.
     fn default() -> Self {
-        Self { map_size: 2048, cascades: 3, finest_radius: 30.0, distance: 500.0, proxy_distance: 30.0 }
+        Self::from(&Quality::default())
+    }
+}
+
+impl From<&Quality> for SunShadowSettings {
+    /// Shadows as the quality of a scene asks for them.
+    fn from(quality: &Quality) -> Self {
+        Self {
+            map_size: quality.shadow_map_size,
+            cascades: quality.cascades as usize,
+            finest_radius: FINEST_RADIUS,
+            distance: quality.shadow_distance,
+            // A billboard's level plane would draw a line across the crowns of full models.
+            proxy_distance: quality.near_distance + quality.fade_band,
+        }
     }
 }
 
