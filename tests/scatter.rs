@@ -508,7 +508,7 @@ fn text_in_number_columns_is_listed_by_line_column_and_value() {
         "{message}"
     );
     assert!(parse("x;y\n1.000,5;2\n").unwrap_err().to_string().contains("1.000,5"), "thousands are not guessed");
-    assert!(parse("lon,lat\n8,95\n").unwrap_err().to_string().contains("no latitude"));
+    assert!(parse("lon,lat\n8,95\n").unwrap_err().to_string().contains("not a latitude"));
 }
 
 #[test]

@@ -283,8 +283,8 @@ fn broken_texts_are_refused_with_a_place() {
 #[test]
 fn impossible_values_are_placed() {
     faulty("size: 400", "size: -400", 6, &["`terrain.size` is -400 m", "from 20 to 100000"]);
-    faulty("amplitude: 20", "amplitude: NaN", 11, &["`terrain.amplitude` is NaN, which is no finite number"]);
-    faulty("wavelength: 150", "wavelength: inf", 12, &["no finite number"]);
+    faulty("amplitude: 20", "amplitude: NaN", 11, &["`terrain.amplitude` is NaN, which is not a finite number"]);
+    faulty("wavelength: 150", "wavelength: inf", 12, &["not a finite number"]);
     faulty("octaves: 5", "octaves: 0", 9, &["whole number from 1 to 16"]);
     faulty("weight: 3", "weight: -1", 8, &["`species[0].weight`"]);
     faulty("individuals: 4", "individuals: 17", 13, &["`species[0].plant.individuals` is 17", "1 to 16"]);
@@ -401,7 +401,7 @@ fn files_that_are_no_scenes_are_refused() -> Outcome {
     let latin = folder.path().join("latin.ron");
     std::fs::write(&latin, b"(\n  name: \"B\xe4ume\",\n)")?;
     let error = Scene::read(&latin).err().ok_or("read")?.to_string();
-    assert!(error.contains("latin.ron:2:11: the text is no UTF-8"), "{error}");
+    assert!(error.contains("latin.ron:2:11: the text is not UTF-8"), "{error}");
 
     let large = folder.path().join("large.ron");
     std::fs::write(&large, vec![b' '; 5 << 20])?;

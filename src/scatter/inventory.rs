@@ -345,8 +345,8 @@ impl Columns {
             }
             // Longitudes are counted from -180 to 180 or from 0 to 360.
             Coordinates::Geographic => (
-                Limit { largest: 360.0, reason: "is no longitude: give degrees within ±360" },
-                Limit { largest: 90.0, reason: "is no latitude: give degrees within ±90" },
+                Limit { largest: 360.0, reason: "is not a longitude (expected degrees within ±360)" },
+                Limit { largest: 90.0, reason: "is not a latitude (expected degrees within ±90)" },
             ),
         }
     }

@@ -25,7 +25,7 @@ impl<'a> Check<'a> {
         Self { text: None, problems: Vec::new() }
     }
 
-    /// Notes that the value at `field` is impossible.
+    /// Notes what is wrong with the value at `field`.
     pub(super) fn problem(&mut self, field: &str, message: impl Into<String>, remedy: impl Into<String>) {
         let position = self
             .text
@@ -49,9 +49,9 @@ impl<'a> Check<'a> {
             let (low, high) = range.into_inner();
             let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
             let message = if value.into().is_finite() {
-                format!("is {value}{unit}, which is impossible")
+                format!("is {value}{unit}, which is out of range")
             } else {
-                format!("is {value}, which is no finite number")
+                format!("is {value}, which is not a finite number")
             };
             self.problem(field, message, format!("write a value from {low} to {high}{unit}"));
         }

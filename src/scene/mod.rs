@@ -203,7 +203,7 @@ impl Scene {
                 Err(SceneError::Syntax {
                     path: path.to_owned(),
                     position: Position::of_offset(&before, before.len()),
-                    message: "the text is no UTF-8 from here on".to_owned(),
+                    message: "the text is not UTF-8 from here on".to_owned(),
                     remedy: "save the file as UTF-8; a scene file is a RON text".to_owned(),
                 })
             }
