@@ -1,8 +1,8 @@
 //! Texts of the command line to values.
 
 use crate::{
-    bake::lighting::SunLight,
-    scene::{Expressive, Lighting, Pose, Transfer},
+    bake::{implicit::ImplicitSettings, lighting::SunLight},
+    scene::{Lighting, Pose, Transfer},
 };
 
 /// Why an argument is not what it should be.
@@ -53,7 +53,7 @@ pub fn parse_lighting(text: &str) -> Result<Lighting, ArgumentError> {
         "local" => Ok(Lighting::Local),
         "transfer" => Ok(Lighting::Transfer(Transfer::default())),
         "harmonics" => Ok(Lighting::Transfer(Transfer { sun: SunLight::Harmonics, ..Transfer::default() })),
-        "expressive" => Ok(Lighting::Expressive(Expressive::default())),
+        "expressive" => Ok(Lighting::Expressive(ImplicitSettings::default())),
         _ => Err(ArgumentError::Lighting(text.to_owned())),
     }
 }

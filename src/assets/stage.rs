@@ -20,7 +20,7 @@ use crate::{
         daylight::SkySettings,
     },
     scatter::{CoverMap, PackedStand, PackedTree, VariantBounds, cover_map, packed::DEFAULT_CELL_SIZE},
-    scene::{self, Quality, Scene},
+    scene::{self, Lighting, Quality, Scene},
     terrain::Terrain,
 };
 
@@ -108,7 +108,7 @@ impl Stage {
             progress.warn("the scene's rules leave no place for any tree: only the ground is drawn");
         }
         let sun = |(species, variants): (&scene::Species, &Range<u16>)| {
-            std::iter::repeat_n(plants::sun_light(species.lighting.as_ref()), variants.len())
+            std::iter::repeat_n(species.lighting.as_ref().map_or(SunLight::default(), Lighting::sun), variants.len())
         };
         let suns = scene.species.iter().zip(&species.variants).flat_map(sun).collect();
         let (stand, plants, variants) = (Arc::new(packed), Arc::new(plants), species.variants);

@@ -58,7 +58,7 @@ pub use camera::{Camera, PathKey, Pose, Viewpoint};
 pub use error::{Problem, SceneError};
 pub use ground::{Ground, GroundFile, GroundFlat, GroundImage, GroundNoise};
 pub(crate) use lighting::word;
-pub use lighting::{Expressive, Lighting, Transfer};
+pub use lighting::{Lighting, Transfer};
 pub use locate::Position;
 pub use overrides::Overrides;
 pub use path::Path;

@@ -7,6 +7,7 @@ use std::collections::HashSet;
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::partition;
 use crate::bake::geometry;
@@ -25,7 +26,7 @@ pub struct Generator {
 }
 
 /// What a generator counts in the density field.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Weighting {
     /// Each primitive counts 1, as published. A finer tessellation of the same leaves makes the crown darker.
     Primitives,
