@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     app::AppError,
-    assets::{ground::build_terrain, observer, plants, trees},
+    assets::{ground::build_terrain, plants, stage::observer, trees},
     bake::{
         BakedPlant,
         billboard::{Cross, CrossTextures, SPREAD_LEVELS},

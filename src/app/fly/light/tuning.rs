@@ -7,7 +7,7 @@ use std::ops::RangeInclusive;
 
 use crate::{
     bake::implicit::{AmbientField, ImplicitParameters, ImplicitSettings, NormalSource},
-    scene::{Lighting, word},
+    scene::{Lighting, lighting::word},
 };
 
 /// Something that can be turned.
