@@ -16,10 +16,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use canopy::bake::implicit::{ImplicitBake, ImplicitSettings, NormalSource, bake_implicit};
-use canopy::bake::transfer::direction_set;
-use canopy::light::atmosphere::luminance;
+use canopy::bake::lighting::implicit::{ImplicitBake, ImplicitSettings, NormalSource, bake_implicit};
+use canopy::bake::lighting::transfer::direction_set;
 use canopy::light::{Atmosphere, AtmosphereParams, LightSettings, LightState, SunPosition, sh};
+use canopy::math::luminance;
 use canopy::plant::gltf::{GltfOptions, load_plant};
 use canopy::plant::grow::{GrowParameters, grow};
 use canopy::plant::{PartKind, Plant};

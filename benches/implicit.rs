@@ -18,14 +18,14 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use canopy::bake::implicit::ambient_term::ambient_term;
-use canopy::bake::implicit::density::DensityField;
-use canopy::bake::implicit::depth_field::DepthField;
-use canopy::bake::implicit::generators::{Generator, generators};
-use canopy::bake::implicit::{
+use canopy::bake::lighting::implicit::ambient_term::ambient_term;
+use canopy::bake::lighting::implicit::density::DensityField;
+use canopy::bake::lighting::implicit::depth_field::DepthField;
+use canopy::bake::lighting::implicit::generators::{Generator, generators};
+use canopy::bake::lighting::implicit::{
     AmbientField, ImplicitBake, ImplicitParameters, ImplicitSettings, NormalSource, Weighting, bake_implicit,
 };
-use canopy::bake::transfer::direction_set;
+use canopy::bake::lighting::transfer::direction_set;
 use canopy::plant::gltf::{GltfOptions, load_plant};
 use canopy::plant::grow::{GrowParameters, grow};
 use canopy::plant::{PartKind, Plant};

@@ -19,7 +19,7 @@ use anyhow::Context;
 use canopy::{
     app::{LightGroup, Picture, ReferenceOptions, Renderer, View, parse_lighting, parse_size, reference},
     assets::Stage,
-    plant::texture::srgb_to_linear,
+    math::srgb_to_linear,
     progress::Silent,
     render::components::Ground,
     scene::{LocalTime, Overrides, Scene},

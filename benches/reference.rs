@@ -16,14 +16,14 @@ use std::time::Instant;
 
 use canopy::light::moon::MoonSetting;
 use canopy::light::{Atmosphere, AtmosphereParams, LightSettings, LightState, Observer, SunPosition};
+use canopy::math::{halton, hash::unit_f64};
 use canopy::plant::Plant;
 use canopy::plant::grow::{GrowParameters, grow};
 use canopy::reference::{
     Camera, Film, Ground, GroundColor, GroundShape, Instance, Light, PathTracer, ReferenceScene, Shot, TraceSettings,
     WorldRay,
 };
-use canopy::scatter::halton;
-use canopy::scatter::hash::{Stream, unit_f64};
+use canopy::scatter::Stream;
 use canopy::scene::Viewpoint;
 use canopy::terrain::{HeightField, Surroundings, Terrain};
 use clap::Parser;

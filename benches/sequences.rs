@@ -11,11 +11,12 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use canopy::scatter::hash::{Stream, unit_f32};
-use canopy::scatter::radical_inverse::{radical_inverse_2, radical_inverse_3};
+use canopy::math::hash::unit_f32;
+use canopy::math::radical_inverse::{radical_inverse_2, radical_inverse_3};
+use canopy::math::{HaltonSequence, RadicalInverse, halton, hammersley, star_discrepancy};
 use canopy::scatter::{
-    Area, ClearingNoise, Ground, HaltonSequence, PackedStand, PlacementRules, RadicalInverse, Sequence, SizeRule,
-    SpeciesRule, VariantBounds, cover_map, halton, hammersley, place, random, star_discrepancy,
+    Area, ClearingNoise, Ground, PackedStand, PlacementRules, PlantSize, Sequence, SizeRule, SpeciesRule, Stream,
+    cover_map, place, random,
 };
 use glam::{DVec2, DVec3};
 
@@ -185,7 +186,7 @@ fn stand_building() {
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread pool");
     let placed = |rules: &PlacementRules| place(rules, &ground).expect("the rules can be met");
     let stand = placed(&rules(30.0)).stand;
-    let bounds = vec![VariantBounds { radius: 3.5, height: 20.0 }; 8];
+    let bounds = vec![PlantSize { radius: 3.5, height: 20.0 }; 8];
 
     let mut contestants: Vec<(&str, Box<dyn FnMut()>)> = vec![
         ("obvious loop, one thread", Box::new(|| obvious_stand(1_000_000, &one_million, &ground))),

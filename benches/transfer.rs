@@ -31,7 +31,7 @@ mod vertices;
 use std::sync::Arc;
 use std::time::Instant;
 
-use canopy::bake::transfer::{Interior, TransferSettings};
+use canopy::bake::lighting::transfer::{Interior, TransferSettings};
 use canopy::light::{Atmosphere, AtmosphereParams, LightSettings, LightState, SunPosition};
 use canopy::plant::grow::{GrowParameters, grow};
 use canopy::trace::PlantTracer;

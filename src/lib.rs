@@ -35,7 +35,7 @@
 //! Another scene takes its place when a [`LoadScene`](assets::LoadScene) asks for it. A program that would rather wait calls
 //! [`Stage::build`](assets::Stage::build) itself, and [`Stage::show`](assets::Stage::show).
 //!
-//! The rooms: [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`bake`], [`light`], [`lod`],
+//! The rooms: [`math`], [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`bake`], [`light`], [`lod`],
 //! [`trace`] and [`mod@reference`] know no App and no GPU; [`assets`] builds scenes from them, and [`render`] draws what they
 //! make. ARCHITECTURE.md in the repository shows how a tree gets from a file to a pixel.
 //!
@@ -49,10 +49,13 @@
 pub mod app;
 pub mod assets;
 pub mod bake;
+pub mod cull;
 mod files;
 pub mod light;
 pub mod lod;
+pub mod math;
 pub mod plant;
+mod plugin;
 pub mod progress;
 pub mod reference;
 pub mod render;
@@ -61,16 +64,7 @@ pub mod scene;
 pub mod terrain;
 pub mod trace;
 
-use bevy::app::{PluginGroup, PluginGroupBuilder};
-
-/// All of Canopy for a Bevy program that has its `DefaultPlugins`.
-pub struct CanopyPlugins;
-
-impl PluginGroup for CanopyPlugins {
-    fn build(self) -> PluginGroupBuilder {
-        PluginGroupBuilder::start::<Self>().add(render::daylight::DaylightPlugin).add(render::CanopyRenderPlugin)
-    }
-}
+pub use plugin::CanopyPlugins;
 
 /// What most programs need.
 pub mod prelude {
@@ -79,7 +73,7 @@ pub mod prelude {
         assets::{
             CanopyScenePlugin, LoadScene, LoadedScene, SceneFailed, SceneProgress, SceneReady, SceneState, Stage,
         },
-        lod::FadeBand,
+        lod::{FadeBand, Levels, Representation},
         progress::{Progress, Silent},
         render::{
             components::{

@@ -4,13 +4,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use canopy::bake::billboard::{Cross, CrossSettings, bake_cross};
 use canopy::bake::cache::{Cache, CacheKey};
-use canopy::bake::implicit::{ImplicitSettings, NoSurface};
+use canopy::bake::levels::cross::{Cross, CrossSettings, bake_cross};
+use canopy::bake::levels::rasterize::{View, projected_area};
+use canopy::bake::levels::shadow_proxy::{shadow_proxy, simplify_foliage};
+use canopy::bake::lighting::implicit::{ImplicitSettings, NoSurface};
 use canopy::bake::lighting::{BakedLighting, ExpressiveLighting, LightingSettings};
-use canopy::bake::rasterize::{View, projected_area};
-use canopy::bake::shadow_proxy::{shadow_proxy, simplify_foliage};
 use canopy::bake::{BakeError, BakeSettings, BakeSource, BakedPlant, bake_plant};
+use canopy::math::octahedral;
 use canopy::plant::{PartKind, Plant, PlantMaterial, PlantMesh, PlantPart};
 use glam::{Mat3, Quat, Vec2, Vec3};
 use image::{Rgba, RgbaImage};
@@ -122,10 +123,7 @@ fn same(a: &BakedPlant, b: &BakedPlant) -> bool {
 }
 
 fn decode_octahedral(code: [u8; 2]) -> Vec3 {
-    let f = Vec2::new(f32::from(code[0]), f32::from(code[1])) / 255.0 * 2.0 - 1.0;
-    let z = 1.0 - f.x.abs() - f.y.abs();
-    let t = (-z).max(0.0);
-    Vec3::new(f.x - t * f.x.signum(), f.y - t * f.y.signum(), z).normalize()
+    octahedral::decode_z(Vec2::new(f32::from(code[0]), f32::from(code[1])) / 255.0 * 2.0 - 1.0)
 }
 
 /// Area that a level of a plane's picture shows with an alpha test at one half, square metres, bilinear as on the GPU.

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use canopy::bake::implicit::{
+use canopy::bake::lighting::implicit::{
     AmbientField, ImplicitBake, ImplicitSettings, NoSurface, NormalSource, StandPlant, SurfaceMesh, Weighting,
     bake_implicit, bake_implicit_stand,
 };
@@ -292,7 +292,7 @@ fn the_number_of_threads_does_not_matter() {
 fn a_share_of_the_surface_is_closed_and_small_enough() {
     let tree = grow(&GrowParameters::broadleaf(), 1, 20_000).expect("a tree");
     let leaves = tree.triangle_count(PartKind::Foliage) as f32;
-    for share in [canopy::bake::implicit::COARSE_SHARE, canopy::bake::implicit::FINE_SHARE] {
+    for share in [canopy::bake::lighting::implicit::COARSE_SHARE, canopy::bake::lighting::implicit::FINE_SHARE] {
         let settings = ImplicitSettings { surface_share: Some(share), ..ImplicitSettings::default() };
         let surface = bake(&tree, &settings).surface.expect("a surface");
         assert!(surface.triangles.len() as f32 <= share * leaves + 1.0, "{}", surface.triangles.len());

@@ -3,12 +3,11 @@
 use std::f32::consts::{FRAC_PI_2, PI};
 use std::sync::LazyLock;
 
-use canopy::light::atmosphere::luminance;
 use canopy::light::moon::celestial_rotation;
-use canopy::light::quadrature::SphereQuadrature;
 use canopy::light::sh;
 use canopy::light::sun::{direction_from, disc_fraction, refraction_deg};
 use canopy::light::*;
+use canopy::math::{SphereQuadrature, luminance};
 use chrono::{DateTime, Utc};
 use glam::{Quat, Vec3};
 use proptest::prelude::*;

@@ -1,144 +1,13 @@
-//! The room `scatter`: sequences against exact arithmetic, stands against their rules, packing against its bounds.
+//! The room `scatter`: stands against their rules, packing against its bounds.
 
 use std::collections::HashSet;
 use std::f64::consts::PI;
 use std::path::PathBuf;
 
 use canopy::scatter::packed::{DEFAULT_CELL_SIZE, MAX_VARIANTS};
-use canopy::scatter::radical_inverse::{radical_inverse_2, radical_inverse_3};
 use canopy::scatter::*;
 use glam::{DVec2, DVec3};
 use proptest::prelude::*;
-
-// ---------------------------------------------------------------- radical inverse
-
-/// Φ_base(i) as an exact fraction (numerator, denominator), digit by digit; base <= 1000.
-fn exact(base: u32, mut i: u64) -> (u128, u128) {
-    let (mut n, mut d) = (0u128, 1u128);
-    while i > 0 {
-        n = n * u128::from(base) + u128::from(i % u64::from(base));
-        d *= u128::from(base);
-        i /= u64::from(base);
-    }
-    (n, d)
-}
-
-/// Asserts `0 <= n/d - value < 2⁻⁵³` in integers.
-fn assert_floor(value: f64, (n, d): (u128, u128), what: &str) {
-    assert!((0.0..1.0).contains(&value), "{what}: {value} is outside [0, 1)");
-    let steps = value * (1u64 << 53) as f64;
-    assert_eq!(steps.fract(), 0.0, "{what}: {value} is no multiple of 2^-53");
-    let steps = steps as u128;
-    assert!(steps * d <= n << 53 && n << 53 < (steps + 1) * d, "{what}: {value} instead of {n}/{d}");
-}
-
-#[test]
-fn radical_inverses_are_exact_at_the_corners() {
-    let mut indices: Vec<u64> = (0..3000).collect();
-    for bits in [7, 16, 23, 24, 25, 31, 32, 33, 52, 53, 54, 63] {
-        indices.extend([-1i64, 0, 1].map(|k| (1u64 << bits).wrapping_add_signed(k)));
-    }
-    indices.extend((1..41).flat_map(|k| [-1i64, 0, 1].map(|d| 3u64.pow(k).wrapping_add_signed(d))));
-    indices.push(u64::MAX);
-    for i in indices {
-        assert_floor(radical_inverse_2(i), exact(2, i), &format!("base 2, {i}"));
-        assert_floor(radical_inverse_3(i), exact(3, i), &format!("base 3, {i}"));
-    }
-}
-
-proptest! {
-    #[test]
-    fn radical_inverses_are_exact(base in 2u32..=1000, i: u64, short: u32) {
-        let table = RadicalInverse::new(base).unwrap();
-        for i in [i, short.into()] {
-            let value = radical_inverse(base, i).unwrap();
-            assert_floor(value, exact(base, i), &format!("base {base}, {i}"));
-            prop_assert_eq!(table.value(i), value);
-        }
-        assert_floor(radical_inverse_3(short.into()), exact(3, short.into()), &format!("base 3, {short}"));
-    }
-
-    #[test]
-    fn any_base_and_index_stay_in_the_unit_interval(base in 2u32.., i: u64) {
-        prop_assert!((0.0..1.0).contains(&radical_inverse(base, i).unwrap()));
-        prop_assert!((0.0..1.0).contains(&RadicalInverse::new(base).unwrap().value(i)));
-    }
-}
-
-#[test]
-fn floats_of_32_bits_fail_past_two_to_the_24() {
-    let in_f32 = |mut i: u64| {
-        let (mut sum, mut weight) = (0f32, 0.5f32);
-        while i > 0 {
-            sum += (i % 2) as f32 * weight;
-            i /= 2;
-            weight *= 0.5;
-        }
-        sum
-    };
-    let i = (1 << 24) + 1;
-    assert_eq!(in_f32(i), in_f32(1), "the 25th digit is lost in f32");
-    assert!(radical_inverse_2(i) > radical_inverse_2(1));
-    // And all-ones indices reach 1, outside of the half-open interval.
-    assert_eq!(in_f32((1 << 25) - 1), 1.0);
-    assert!(radical_inverse_2((1 << 25) - 1) < 1.0);
-}
-
-#[test]
-fn every_elementary_interval_holds_one_halton_point() {
-    let (columns, rows) = (1u64 << 5, 3u64.pow(3));
-    for start in [0, 17, 1_000_000_007, u64::from(u32::MAX) - 100] {
-        let mut seen = HashSet::new();
-        for point in HaltonSequence::new(start).take((columns * rows) as usize) {
-            // Multiples of 1/27 are rounded down by less than 2^-53, so just below their interval.
-            seen.insert(((point.x * columns as f64) as u64, (point.y * rows as f64 + 1e-9) as u64));
-        }
-        assert_eq!(seen.len() as u64, columns * rows, "from {start}");
-    }
-}
-
-// ---------------------------------------------------------------- discrepancy
-
-/// The supremum over all boxes with sides at coordinates of points, open and closed.
-fn brute_force_discrepancy(points: &[DVec2]) -> f64 {
-    let sides = |coordinate: fn(&DVec2) -> f64| points.iter().map(coordinate).chain([1.0]).collect::<Vec<_>>();
-    let (xs, ys) = (sides(|p| p.x), sides(|p| p.y));
-    let count = |inside: &dyn Fn(&&DVec2) -> bool| points.iter().filter(inside).count() as f64 / points.len() as f64;
-    let mut worst = 0f64;
-    for &x in &xs {
-        for &y in &ys {
-            worst = worst.max(count(&|p| p.x <= x && p.y <= y) - x * y).max(x * y - count(&|p| p.x < x && p.y < y));
-        }
-    }
-    worst
-}
-
-proptest! {
-    #[test]
-    fn discrepancy_equals_brute_force(lattice in prop::collection::vec((0u8..=12, 0u8..=12), 1..25), seed: u64) {
-        // Points of a coarse lattice have many equal coordinates.
-        let tied: Vec<DVec2> = lattice.iter().map(|&(x, y)| DVec2::new(x.into(), y.into()) / 12.0).collect();
-        let free: Vec<DVec2> = (0..lattice.len() as u64).map(|i| random(i, seed)).collect();
-        for points in [tied, free] {
-            let fast = star_discrepancy(&points).unwrap();
-            prop_assert!((fast - brute_force_discrepancy(&points)).abs() < 1e-12);
-        }
-    }
-}
-
-#[test]
-fn even_sequences_beat_chance() {
-    for n in [256u64, 1024] {
-        let of = |point: &dyn Fn(u64) -> DVec2| star_discrepancy(&(0..n).map(point).collect::<Vec<_>>()).unwrap();
-        let (even, set) = (of(&halton), of(&|i| hammersley(i, n)));
-        let chance = (0..5).map(|seed| of(&|i| random(i, seed))).fold(f64::MAX, f64::min);
-        assert!(set < even && even < 0.4 * chance, "{n}: Hammersley {set}, Halton {even}, random {chance}");
-        // [Niederreiter 1992], theorem 3.6 for bases 2 and 3, and the Hammersley bound of base 2.
-        let ln = (n as f64).ln();
-        let bound = (2.0 + (0.5 * ln / 2f64.ln() + 1.5) * (ln / 3f64.ln() + 2.0)) / n as f64;
-        assert!(even < bound && set * (n as f64) < n.ilog2() as f64 / 2.0 + 2.0);
-    }
-}
 
 // ---------------------------------------------------------------- stands
 
@@ -255,7 +124,7 @@ fn stands_do_not_depend_on_the_number_of_threads() {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
                 let stand = place(&rules, &hilly).unwrap().stand;
-                let bounds = [VariantBounds { radius: 3.0, height: 20.0 }];
+                let bounds = [PlantSize { radius: 3.0, height: 20.0 }];
                 let packed = PackedStand::new(&stand, DEFAULT_CELL_SIZE, &bounds).unwrap();
                 let cover = cover_map(&stand, &bounds, 5.0, None).unwrap();
                 (stand, packed, cover)
@@ -686,7 +555,7 @@ fn a_packed_tree_is_sixteen_bytes_with_the_documented_bits() {
 
 #[test]
 fn what_does_not_fit_is_refused_with_its_tree() {
-    let bounds = [VariantBounds { radius: 2.0, height: 10.0 }];
+    let bounds = [PlantSize { radius: 2.0, height: 10.0 }];
     let pack =
         |bad: Tree| PackedStand::new(&Stand { trees: vec![tree(0.0, 0.0, 0.0), bad] }, 64.0, &bounds).unwrap_err();
     for (what, bad) in [
@@ -705,10 +574,10 @@ fn what_does_not_fit_is_refused_with_its_tree() {
     }
     let unknown = pack(Tree { variant: 1, ..tree(0.0, 0.0, 0.0) });
     assert!(matches!(unknown, ScatterError::UnknownVariant { tree: 1, variant: 1, count: 1 }));
-    let many = PackedStand::new(&Stand::default(), 64.0, &vec![VariantBounds::default(); MAX_VARIANTS + 1]);
+    let many = PackedStand::new(&Stand::default(), 64.0, &vec![PlantSize::default(); MAX_VARIANTS + 1]);
     assert!(many.unwrap_err().to_string().contains("fewer"));
-    let bad_bounds = PackedStand::new(&Stand::default(), 64.0, &[VariantBounds { radius: f32::NAN, height: 1.0 }]);
-    assert!(matches!(bad_bounds, Err(ScatterError::VariantBounds { variant: 0, .. })));
+    let bad_bounds = PackedStand::new(&Stand::default(), 64.0, &[PlantSize { radius: f32::NAN, height: 1.0 }]);
+    assert!(matches!(bad_bounds, Err(ScatterError::PlantSize { variant: 0, .. })));
     assert!(matches!(PackedStand::new(&Stand::default(), 0.0, &[]), Err(ScatterError::Size { .. })));
     assert!(PackedStand::new(&Stand::default(), 64.0, &[]).unwrap().cells.is_empty());
 }
@@ -719,7 +588,7 @@ fn cells_partition_the_trees_and_hold_their_crowns() {
     let species = vec![SpeciesRule { variants: 0..2, size: sizes, ..Default::default() }];
     let slope = Plane { height: 0.0, east: 0.3, south: 0.2, reach: f64::INFINITY };
     let stand = place(&PlacementRules { species, ..rules() }, &slope).unwrap().stand;
-    let bounds = [VariantBounds { radius: 4.0, height: 25.0 }, VariantBounds { radius: 1.0, height: 5.0 }];
+    let bounds = [PlantSize { radius: 4.0, height: 25.0 }, PlantSize { radius: 1.0, height: 5.0 }];
     let packed = PackedStand::new(&stand, 50.0, &bounds).unwrap();
     assert_eq!(packed.trees.len(), stand.trees.len());
     let mut seen = HashSet::new();
@@ -768,7 +637,7 @@ fn one_crown_covers_its_own_area_wherever_it_stands() {
         for i in 0..40 {
             let foot = (random(i, k as u64) - 0.5) * 1000.0;
             let stand = Stand { trees: vec![Tree { scale: 1.5, ..tree(foot.x, 3.0, foot.y) }] };
-            let map = cover_map(&stand, &[VariantBounds { radius, height: 1.0 }], 2.0, None).unwrap();
+            let map = cover_map(&stand, &[PlantSize { radius, height: 1.0 }], 2.0, None).unwrap();
             let area = PI * f64::from(radius * 1.5).powi(2);
             // One step of 8 bits for each texel of the map, rounded to nearest, is the least that can be promised.
             let rounding = map.cover.len() as f64 * 0.5 / 255.0 * 4.0;
@@ -785,7 +654,7 @@ fn cover_agrees_with_a_fine_raster() {
     let area = Area { min: DVec2::ZERO, max: DVec2::splat(80.0) };
     let rules = PlacementRules { area, species, sequence: Sequence::Random, ..rules() };
     let stand = place(&rules, &FLAT).unwrap().stand;
-    let bounds = [VariantBounds { radius: 3.0, height: 10.0 }];
+    let bounds = [PlantSize { radius: 3.0, height: 10.0 }];
     let map = cover_map(&stand, &bounds, 4.0, Some(area)).unwrap();
     assert_eq!((map.columns, map.rows, map.origin), (20, 20, DVec2::ZERO));
     let mut total_error = 0.0;
@@ -816,7 +685,7 @@ fn cover_agrees_with_a_fine_raster() {
 #[test]
 fn cover_maps_refuse_what_they_cannot_hold() {
     let stand = Stand { trees: vec![tree(0.0, 0.0, 0.0), tree(1e6, 0.0, 1e6)] };
-    let bounds = [VariantBounds { radius: 3.0, height: 10.0 }];
+    let bounds = [PlantSize { radius: 3.0, height: 10.0 }];
     for texel in [0.0, -1.0, f64::NAN, f64::INFINITY, 1.0] {
         assert!(matches!(cover_map(&stand, &bounds, texel, None), Err(ScatterError::Size { .. })), "{texel}");
     }

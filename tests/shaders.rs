@@ -9,17 +9,15 @@ use std::{
 };
 
 use canopy::{
-    bake::billboard::LIGHT_SCALE,
-    light::atmosphere::SkyView,
     render::{
+        bindings::uniforms::{
+            CascadeUniform, CascadeViewUniform, FrameUniform, LightUniform, NOISE_PERIOD, ShadowUniform,
+        },
         forest::{ForestViewUniform, PartUniform, PlaneUniform, PlantVertex, TransferUniform, VariantUniform},
-        frame::uniforms::{CascadeUniform, FrameUniform, LightUniform, MAX_CASCADES, NOISE_PERIOD, ShadowUniform},
-        shaders::SOURCES,
-        sun_shadow::CascadeViewUniform,
+        shaders::{ShaderFile, sources},
         terrain::{GpuTile, GpuTileVertex},
     },
     scatter::PackedTree,
-    terrain::tiles::TILE_QUADS,
 };
 use naga::{
     Module, ScalarKind, ShaderStage, TypeInner,
@@ -49,9 +47,9 @@ fn compose(path: &str, source: &str, defines: &[&str]) -> Result<Module, String>
     let defs: HashMap<String, ShaderDefValue> =
         defines.iter().map(|define| ((*define).to_owned(), ShaderDefValue::Bool(true))).collect();
     let mut composer = Composer::default();
-    for &(library, source) in SOURCES.iter().filter(|(_, source)| is_library(source)) {
+    for (library, source) in sources().iter().filter(|(_, source)| is_library(source)) {
         let added = composer.add_composable_module(ComposableModuleDescriptor {
-            source,
+            source: source.as_ref(),
             file_path: library,
             shader_defs: defs.clone(),
             ..Default::default()
@@ -67,9 +65,10 @@ fn compose(path: &str, source: &str, defines: &[&str]) -> Result<Module, String>
 /// Every shader with entry points in every variant.
 fn modules() -> Vec<(String, Module)> {
     let mut modules = Vec::new();
-    for &(path, source) in SOURCES.iter().filter(|(_, source)| !is_library(source)) {
+    for file in ShaderFile::ALL.into_iter().filter(|file| !is_library(file.source())) {
+        let path = file.path();
         for defines in variants() {
-            match compose(path, source, &defines) {
+            match compose(path, file.source(), &defines) {
                 Ok(module) => modules.push((format!("{path} {defines:?}"), module)),
                 Err(message) => panic!("{message}"),
             }
@@ -103,10 +102,11 @@ fn the_table_of_sources_is_the_folder_of_shaders() {
         .filter(|path| path.extension().is_some_and(|extension| extension == "wgsl"))
         .filter_map(|path| path.strip_prefix(&folder).ok().map(|path| path.display().to_string()))
         .collect();
-    let embedded: BTreeSet<String> = SOURCES.iter().map(|(path, _)| (*path).to_owned()).collect();
+    let embedded: BTreeSet<String> = ShaderFile::ALL.iter().map(|file| file.path().to_owned()).collect();
     assert_eq!(embedded, on_disk);
-    for (path, source) in SOURCES {
-        for line in source.lines().filter_map(|line| line.trim().strip_prefix("#if")) {
+    for file in ShaderFile::ALL {
+        let path = file.path();
+        for line in file.source().lines().filter_map(|line| line.trim().strip_prefix("#if")) {
             let name = line.trim_start_matches("def").trim_start_matches("ndef").trim();
             assert!(
                 DEFINES.contains(&name),
@@ -182,37 +182,80 @@ fn member_size<T: bytemuck::Zeroable>(size: impl Fn(&T) -> usize) -> usize {
 #[test]
 fn gpu_structs_are_what_the_shaders_think() {
     let layouts = layouts();
-    twin!(layouts, "Frame", FrameUniform { clip_from_relative, relative_from_clip, camera, viewport, flags });
+    twin!(
+        layouts,
+        "Frame",
+        FrameUniform { clip_from_relative, relative_from_clip, camera, focal_length_pixels, mean_cover }
+    );
     twin!(
         layouts,
         "Light",
         LightUniform {
             key_direction,
+            exposure,
             key_illuminance,
+            scotopic_strength,
             sun_direction,
+            sun_disc_cosine,
             sun_radiance,
+            star_cells,
             moon_direction,
+            moon_disc_cosine,
             moon_radiance,
+            star_density,
             sky,
-            fog,
-            sky_frame,
-            night,
+            fog_extinction,
+            fog_inverse_scale_height,
+            scotopic_tint,
+            scotopic_amount,
             star_frame,
-            stars,
+            sky_axis,
+            star_seed,
         }
     );
-    twin!(layouts, "Cascade", CascadeUniform { map_from_relative, size });
-    twin!(layouts, "Shadow", ShadowUniform { cascades, count, ground });
+    twin!(layouts, "Cascade", CascadeUniform { map_from_relative, texel, radius });
+    twin!(layouts, "Shadow", ShadowUniform { cascades, ground, cascade_count, inverse_map_size });
     twin!(layouts, "CascadeView", CascadeViewUniform { clip_from_anchor, direction });
     twin!(
         layouts,
         "ForestView",
-        ForestViewUniform { anchor_cell, anchor_offset, anchor_y, cell_size, fade_start, fade_end }
+        ForestViewUniform { anchor_cell, anchor_offset, anchor_y, cell_size, fade_in, fade_out, tint }
     );
     twin!(layouts, "Plane", PlaneUniform { center, u, v, normal });
-    twin!(layouts, "Variant", VariantUniform { planes, size, transmission, spread, gloss, scattered, scattered_rise });
-    twin!(layouts, "Part", PartUniform { base_color, transmission, gloss });
-    twin!(layouts, "Transfer", TransferUniform { scale, form, scattered });
+    twin!(
+        layouts,
+        "Variant",
+        VariantUniform {
+            planes,
+            height,
+            crown_radius,
+            first_layer,
+            first_light_layer,
+            transmission,
+            radiance_transfer,
+            isotropic_fraction,
+            specular_reflectance,
+            roughness,
+            realigned,
+            indirect_sun_zenith,
+            indirect_sun_color,
+            indirect_sun_mean,
+        }
+    );
+    twin!(layouts, "Part", PartUniform { base_color, realigned, transmission, specular_reflectance, roughness });
+    twin!(
+        layouts,
+        "Transfer",
+        TransferUniform {
+            scale,
+            vertex_words,
+            mean_words,
+            side_words,
+            indirect_sun_start,
+            indirect_sun_color,
+            indirect_sun_scale,
+        }
+    );
     twin!(layouts, "Tree", PackedTree { xz, y, cell, look });
     twin!(layouts, "Tile", GpuTile { origin, spacing, first, morph_start, morph_end, clearance, level });
     twin!(layouts, "TileVertex", GpuTileVertex { height, parent_height, normal, parent_normal });
@@ -221,7 +264,7 @@ fn gpu_structs_are_what_the_shaders_think() {
 
 #[test]
 fn every_bound_struct_has_its_twin_tested() {
-    // Structs that no buffer holds, or (MeshPlace) that are one matrix.
+    // Structs that no buffer holds, or (MeshPosition) that are one matrix.
     let twins = [
         "Frame",
         "Light",
@@ -234,7 +277,7 @@ fn every_bound_struct_has_its_twin_tested() {
         "Tree",
         "Tile",
         "TileVertex",
-        "MeshPlace",
+        "MeshPosition",
     ];
     for (place, module) in modules() {
         for (_, variable) in module.global_variables.iter().filter(|(_, variable)| variable.binding.is_some()) {
@@ -291,24 +334,7 @@ fn plant_vertices_are_what_the_shaders_read() {
     assert!(inputs > 0);
 }
 
-/// Numbers of `const NAME: TYPE = ...;` in the shader at `path`.
-fn constant(path: &str, name: &str) -> Vec<f64> {
-    let source = SOURCES.iter().find(|(known, _)| *known == path).unwrap_or_else(|| panic!("no shader {path}")).1;
-    let start = format!("const {name}:");
-    let line = source.lines().find(|line| line.starts_with(&start)).unwrap_or_else(|| panic!("{path}: no `{start}`"));
-    let value = line.split_once('=').map_or("", |(_, value)| value);
-    let value = value.split_once('(').map_or(value, |(_, inner)| inner);
-    value.split(|c: char| !(c.is_ascii_digit() || ".-e".contains(c))).filter_map(|word| word.parse().ok()).collect()
-}
-
 #[test]
-fn constants_that_stand_twice_agree() {
-    assert_eq!(constant("common/sky.wgsl", "SKY_SIZE"), [SkyView::WIDTH as f64, SkyView::HEIGHT as f64]);
-    assert_eq!(constant("common/sky.wgsl", "HORIZON_ROW"), [SkyView::HORIZON_ROW as f64]);
-    assert_eq!(constant("common/frame.wgsl", "NOISE_PERIOD"), [NOISE_PERIOD]);
-    assert_eq!(constant("terrain/terrain.wgsl", "SIDE"), [(TILE_QUADS + 1) as f64]);
-    assert_eq!(constant("forest/cross.wgsl", "LIGHT_SCALE"), [f64::from((LIGHT_SCALE * 1e6).round()) / 1e6]);
-    let frame = SOURCES.iter().find(|(path, _)| *path == "common/frame.wgsl").expect("frame.wgsl").1;
-    assert!(frame.contains(&format!("const MAX_CASCADES: i32 = {MAX_CASCADES};")));
-    assert!(NOISE_PERIOD.log2().fract() == 0.0, "not a power of two: the noise would have a seam");
+fn the_grounds_noise_has_no_seam() {
+    assert!(NOISE_PERIOD.log2().fract() == 0.0, "not a power of two");
 }

@@ -3,9 +3,9 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use canopy::math::radical_inverse::{radical_inverse_2, radical_inverse_3};
 use canopy::plant::grow::{GrowParameters, grow};
 use canopy::plant::{PartKind, Plant, PlantMaterial, PlantMesh, PlantPart};
-use canopy::scatter::radical_inverse::{radical_inverse_2, radical_inverse_3};
 use canopy::trace::{LineCrossing, PlantTracer, Ray, offset_origin};
 use glam::{DVec3, Vec2, Vec3};
 use image::{Rgba, RgbaImage};

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use canopy::bake::transfer::{
+use canopy::bake::lighting::transfer::{
     Channels, Interior, Projection, TransferBake, TransferFormat, TransferSettings, bake_transfer, exitant_radiance,
     scattered_share, share,
 };

@@ -4,13 +4,10 @@ use std::{fmt::Write, path::Path, sync::Arc};
 
 use canopy::{
     bake::BakedPlant,
+    cull::cascades::{CascadeBox, cascade_radii},
     light::sun::SunPosition,
-    plant::texture::srgb_to_linear,
-    render::{
-        components::SunShadowSettings,
-        daylight::SkySettings,
-        sun_shadow::cascades::{CascadeBox, cascade_radii},
-    },
+    math::srgb_to_linear,
+    render::{components::SunShadowSettings, daylight::SkySettings},
 };
 use chrono::TimeDelta;
 use glam::DVec3;

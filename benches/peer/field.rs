@@ -14,7 +14,7 @@ use canopy::{
     },
     render::daylight::SkySettings,
     scatter::{
-        Area, CoverMap, PackedStand, PlacementRules, Sequence, SizeRule, SpeciesRule, VariantBounds, cover_map,
+        Area, CoverMap, PackedStand, PlacementRules, PlantSize, Sequence, SizeRule, SpeciesRule, cover_map,
         packed::DEFAULT_CELL_SIZE, place,
     },
     scene::Viewpoint,
@@ -125,9 +125,9 @@ impl Field {
             tree.tint = 0.0;
         }
         let size = plant.plant.bounds().map_or(glam::Vec3::ONE, |bounds| bounds.size());
-        let bounds = VariantBounds { radius: plant.plant.reach(), height: plant.plant.height() };
+        let bounds = plant.size();
         let stand = PackedStand::new(&stand, DEFAULT_CELL_SIZE, &[bounds])?;
-        let crown = VariantBounds { radius: 0.8 * 0.5 * size.x.max(size.z), ..bounds };
+        let crown = PlantSize { radius: 0.8 * 0.5 * size.x.max(size.z), ..bounds };
         let cover = cover_map(&stand, &[crown], 8.0, None)?;
         Ok(Self {
             plant: plant.clone(),

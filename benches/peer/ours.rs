@@ -6,7 +6,7 @@ use anyhow::Context;
 use canopy::{
     app::Renderer,
     bake::BakedPlant,
-    lod::FadeBand,
+    lod::{FadeBand, Levels},
     render::{
         components::{Forest, Ground, SunShadowSettings},
         daylight::SkySettings,
@@ -57,7 +57,7 @@ impl Ours {
                 plants: Arc::new(vec![plant]),
                 suns: Arc::default(),
                 origin: DVec3::ZERO,
-                fade,
+                levels: Levels::model_and_cross(fade),
                 view_distance: EVERYWHERE,
             });
         }

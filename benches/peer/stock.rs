@@ -38,11 +38,12 @@ use bevy::{
     winit::WinitPlugin,
 };
 use canopy::{
-    bake::billboard::Cross,
-    light::{LightState, atmosphere::luminance},
+    bake::levels::cross::Cross,
+    light::LightState,
+    math::{MipChain, luminance},
     plant::{
         PartKind, PlantMaterial, PlantMesh,
-        texture::{MipChain, color_mips, leaf_mips},
+        texture::{color_mips, leaf_mips},
     },
     render::readback::read_rgb,
     scene::Viewpoint,

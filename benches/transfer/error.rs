@@ -3,10 +3,10 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use canopy::bake::transfer::{
+use canopy::bake::lighting::transfer::{
     Channels, Interior, TransferBake, TransferFormat, TransferSettings, bake_transfer, share,
 };
-use canopy::light::atmosphere::luminance;
+use canopy::math::luminance;
 use canopy::plant::Plant;
 
 use crate::DAY;

@@ -1,8 +1,8 @@
 //! How wrong a transfer is.
 
-use canopy::bake::transfer::{TransferBake, exitant_radiance, share};
+use canopy::bake::lighting::transfer::{TransferBake, exitant_radiance, share};
 use canopy::light::LightState;
-use canopy::light::atmosphere::luminance;
+use canopy::math::luminance;
 use glam::Vec3;
 
 use crate::truth::Truth;

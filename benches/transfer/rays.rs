@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use canopy::bake::transfer::{Channels, Interior, TransferSettings, bake_transfer, direction_set};
+use canopy::bake::lighting::transfer::{Channels, Interior, TransferSettings, bake_transfer, direction_set};
 use canopy::plant::{PartKind, Plant};
 use canopy::trace::{PlantTracer, Ray};
 use glam::{Vec2, Vec3};

@@ -1,10 +1,10 @@
 //! What vertices truly send out: paths from each vertex, with the same number of bounces as the bake.
 
-use canopy::bake::transfer::{Projection, direction_set};
+use canopy::bake::lighting::transfer::{Projection, direction_set};
 use canopy::light::LightState;
-use canopy::light::atmosphere::luminance;
+use canopy::math::hash::mix64;
+use canopy::math::luminance;
 use canopy::plant::PartKind;
-use canopy::scatter::hash::mix64;
 use canopy::trace::{PlantTracer, Ray, SurfacePoint};
 use glam::Vec3;
 

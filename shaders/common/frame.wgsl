@@ -1,44 +1,58 @@
 // What every pass of a view shares: bind group 0. Rust twins in src/render/frame/uniforms.rs.
 #define_import_path canopy::frame
 
+#import canopy::constants::MAX_CASCADES
+
 struct Frame {
     // Camera-relative metres (world axes, camera at the origin) to clip space, reversed depth.
     clip_from_relative: mat4x4<f32>,
     relative_from_clip: mat4x4<f32>,
-    // xz: camera position modulo NOISE_PERIOD in metres, y: metres above the datum, w: focal length in pixels.
-    camera: vec4<f32>,
-    // Width, height in pixels and their inverses.
-    viewport: vec4<f32>,
-    // x: 1 where alpha to coverage is on, y: 1 where trees are tinted by level of detail, z: mean canopy cover.
-    flags: vec4<f32>,
+    // Camera position: x and z modulo the period of the ground's noise, y above the datum; metres.
+    camera: vec3<f32>,
+    focal_length_pixels: f32,
+    // Mean canopy cover where the terrain is known, 0..1.
+    mean_cover: f32,
 }
 
 // The light of the moment, premultiplied by the exposure.
 struct Light {
-    // To the light that casts shadows; w: sine of its elevation.
-    key_direction: vec4<f32>,
-    // Illuminance normal to its direction.
-    key_illuminance: vec4<f32>,
-    // To the sun; w: cosine of the disc's angular radius.
-    sun_direction: vec4<f32>,
+    // Unit vector to the key light: the one that casts shadows, sun or moon.
+    key_direction: vec3<f32>,
+    // Factor from radiance in nits to the attachment's values.
+    exposure: f32,
+    // Illuminance of the key light, normal to its direction.
+    key_illuminance: vec3<f32>,
+    // The most colour that night sight takes, 0..1.
+    scotopic_strength: f32,
+    sun_direction: vec3<f32>,
+    // Cosine of the disc's angular radius.
+    sun_disc_cosine: f32,
     // Radiance of the sun's disc.
-    sun_radiance: vec4<f32>,
-    // To the moon; w: cosine of the disc's angular radius.
-    moon_direction: vec4<f32>,
-    // Radiance of the moon's disc; w: lit fraction.
-    moon_radiance: vec4<f32>,
+    sun_radiance: vec3<f32>,
+    // Cells of the star field along a cube face's edge.
+    star_cells: f32,
+    moon_direction: vec3<f32>,
+    // Cosine of the disc's angular radius.
+    moon_disc_cosine: f32,
+    // Radiance of the moon's disc.
+    moon_radiance: vec3<f32>,
+    // Share of the star field's cells with a star, 0..1.
+    star_density: f32,
     // Radiance that a white Lambertian surface sends back under the sky: spherical harmonics, bands 0 to 2.
     sky: array<vec4<f32>, 9>,
-    // Extinction per metre at the datum, rgb; w: one over the scale height in metres.
-    fog: vec4<f32>,
-    // xy: unit vector to the sun in the ground plane (x, z), z: exposure, w: the most colour that night sight takes.
-    sky_frame: vec4<f32>,
-    // rgb: night tint, w: its amount 0..1.
-    night: vec4<f32>,
-    // World axes to the stars' frame, by columns.
-    star_frame: array<vec4<f32>, 3>,
-    // x: cells along a cube face's edge, y: seed, z: share of cells with a star.
-    stars: vec4<f32>,
+    // Extinction per metre at the datum.
+    fog_extinction: vec3<f32>,
+    // 1/m.
+    fog_inverse_scale_height: f32,
+    // Colour of night sight, luminance 1.
+    scotopic_tint: vec3<f32>,
+    // Share of night sight that the adaptation to the whole picture allows, 0..1.
+    scotopic_amount: f32,
+    // World axes to the stars' frame.
+    star_frame: mat3x3<f32>,
+    // Unit vector to the sun in the ground plane (x, z).
+    sky_axis: vec2<f32>,
+    star_seed: u32,
 }
 
 // Where the ground map lies: u = (x - origin.x) * inverse_size.x in camera-relative metres.
@@ -50,20 +64,20 @@ struct GroundMap {
 struct Cascade {
     // Camera-relative metres to the map: xy in -1..1, z the reversed depth 0..1.
     map_from_relative: mat4x4<f32>,
-    // x: metres a texel, y: radius around the camera that it serves in metres, z: depth range in metres.
-    size: vec4<f32>,
+    // Metres a texel.
+    texel: f32,
+    // Radius around the camera within which the map is read, metres.
+    radius: f32,
 }
-
-const MAX_CASCADES: i32 = 4;
 
 struct Shadow {
     cascades: array<Cascade, MAX_CASCADES>,
-    // x: number of cascades, y: one over the map's size in texels.
-    count: vec4<f32>,
     ground: GroundMap,
+    // How many of the cascades there are.
+    cascade_count: i32,
+    // One over the map's size in texels.
+    inverse_map_size: f32,
 }
-
-const NOISE_PERIOD: f32 = 1024.0;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> light: Light;

@@ -14,49 +14,53 @@ struct Surface {
     normal: vec3<f32>,
     // Linear factor on the albedo for light from behind; zero for wood and ground.
     transmission: vec3<f32>,
-    // Gloss of a leaf: share that its surface reflects (0: matt), roughness, and how far the gloss is that of many leaves
-    // that face everywhere, 0..1.
-    gloss: vec3<f32>,
-    // Share of the surroundings that the surface sees, 0..1.
-    ambient: f32,
-    // Unit vector to the viewer, and how far the surface is many leaves that face everywhere: 0 one normal, 1 all alike.
+    // Share of the light that the surface of a leaf reflects without letting it in; 0: matt.
+    specular_reflectance: f32,
+    // Root mean square slope of its facets.
+    roughness: f32,
+    // How far the gloss is that of many leaves with isotropic normals, 0..1.
+    gloss_isotropy: f32,
+    // Visibility of the surroundings, 0..1: what ambient occlusion leaves of them.
+    ambient_visibility: f32,
+    // Unit vector to the viewer.
     viewer: vec3<f32>,
-    spread: f32,
+    // Fraction of leaf area with isotropic normals, which averaging the normals hides (cf. Toksvig 2005): 0 one normal.
+    isotropic_fraction: f32,
 }
 
-// Mean cosine to the light over the leaves that face a viewer, where leaves face everywhere alike and each counts by the
-// area that it shows him: the phase function of a diffuse sphere [Lambert 1760; Schoenberg 1925]. `cosine` is that of the
+// Mean cosine to the light over the leaves that face a viewer, where normals are isotropic and each leaf counts by its
+// projected area: the phase function of a diffuse sphere [Lambert 1760; Schoenberg 1925]. `cosine` is that of the
 // angle between light and viewer.
 fn sphere_cosine(cosine: f32) -> f32 {
     let c = clamp(cosine, -1.0, 1.0);
     return (sqrt(1.0 - c * c) + acos(-c) * c) * 0.21220659;
 }
 
-// What the surroundings bring to a surface in a stand that sees the share `ambient` of them evenly, over pi.
+// Irradiance over pi of the surroundings on a surface in a stand that sees `ambient_visibility` of them evenly.
 fn even_sky(surface: Surface, stand: StandLight) -> vec3<f32> {
     let n = surface.normal;
     let through = surface.transmission * in_stand(sky_irradiance(-n), -n.y, stand);
-    return (in_stand(sky_irradiance(n), n.y, stand) + through) * surface.ambient;
+    return (in_stand(sky_irradiance(n), n.y, stand) + through) * surface.ambient_visibility;
 }
 
-// Share of the reflected light that has been inside a leaf, which reflects the share `reflectance` at its surface: the rest
-// is gloss. src/plant/gloss.rs derives it.
-fn inside_share(albedo: vec3<f32>, reflectance: f32) -> vec3<f32> {
+// Share of the reflected light that has been inside a leaf (its subsurface albedo over its albedo), which reflects the share
+// `reflectance` at its surface: the rest is specular. src/plant/gloss.rs derives it.
+fn subsurface_share(albedo: vec3<f32>, reflectance: f32) -> vec3<f32> {
     return albedo / max(sqrt(albedo * albedo + reflectance * reflectance) + reflectance, vec3(1e-6));
 }
 
 // Light through a leaf as a factor on its base colour: the twin of PlantMaterial::transmitted in src/plant/gloss.rs.
 fn leaf_transmission(base_color: vec3<f32>, factor: vec3<f32>, reflectance: f32) -> vec3<f32> {
     let c = clamp(base_color, vec3(0.0), vec3(1.0));
-    return min(factor * inside_share(c, reflectance), (1.0 - c) / max(c, vec3(1e-6)));
+    return min(factor * subsurface_share(c, reflectance), (1.0 - c) / max(c, vec3(1e-6)));
 }
 
-// The specular term of the leaf shader [Franzke 2005, 4.2.2], times pi and the cosine, for the share `sheen` that the surface
-// reflects in the mean over all directions: microfacets [Walter et al. 2007, GGX; the masking of Hammon 2017], of whose
-// Fresnel factor half is constant and half rises as Schlick's [1994]: a mean of (1 - cosine)^5 is 1/21. Leaves that face
-// everywhere reflect like a ball, alike in all directions but for that factor.
-fn leaf_gloss(surface: Surface, sheen: vec3<f32>) -> vec3<f32> {
-    let to_light = light.key_direction.xyz;
+// The specular term of the leaf shader [Franzke 2005, 4.2.2], times pi and the cosine, for the albedo
+// `specular_albedo` of the surface, its mean over all directions: microfacets [Walter et al. 2007, GGX; the masking of Hammon 2017], of whose
+// Fresnel factor half is constant and half rises as Schlick's [1994]: a mean of (1 - cosine)^5 is 1/21. Leaves with
+// isotropic normals reflect like a ball, alike in all directions but for that factor.
+fn leaf_gloss(surface: Surface, specular_albedo: vec3<f32>) -> vec3<f32> {
+    let to_light = light.key_direction;
     // Between two opposite directions lies every direction: any will do.
     let between = surface.viewer + to_light;
     let middle = between * inverseSqrt(max(dot(between, between), 1e-8));
@@ -66,12 +70,12 @@ fn leaf_gloss(surface: Surface, sheen: vec3<f32>) -> vec3<f32> {
     let nl = saturate(dot(surface.normal, to_light));
     let nv = max(abs(dot(surface.normal, surface.viewer)), 1e-3);
     let nm = saturate(dot(surface.normal, middle));
-    let width = surface.gloss.y;
-    let spread = nm * nm * (width * width - 1.0) + 1.0;
+    let width = surface.roughness;
+    let falloff = nm * nm * (width * width - 1.0) + 1.0;
     // Distribution times pi; masking over four times the cosines.
-    let distribution = width * width / (spread * spread);
+    let distribution = width * width / (falloff * falloff);
     let masking = 0.5 / max(mix(2.0 * nl * nv, nl + nv, width), 1e-4);
-    return sheen * fresnel * mix(distribution * masking * nl, 0.25, surface.gloss.z);
+    return specular_albedo * fresnel * mix(distribution * masking * nl, 0.25, surface.gloss_isotropy);
 }
 
 // Exitant radiance towards the viewer. `near` and `far`: what the key light brings to the viewer's side and to the other
@@ -82,20 +86,20 @@ fn leaf_gloss(surface: Surface, sheen: vec3<f32>) -> vec3<f32> {
 fn exitant(surface: Surface, near: vec3<f32>, far: vec3<f32>, visibility: f32, sky: vec3<f32>) -> vec3<f32> {
     var reflected = near;
     var gloss = vec3(0.0);
-    if surface.gloss.x > 0.0 {
-        let inside = inside_share(surface.albedo, surface.gloss.x);
-        reflected *= inside;
-        gloss = leaf_gloss(surface, surface.albedo * (1.0 - inside)) * light.key_illuminance.rgb * INVERSE_PI;
+    if surface.specular_reflectance > 0.0 {
+        let subsurface = subsurface_share(surface.albedo, surface.specular_reflectance);
+        reflected *= subsurface;
+        gloss = leaf_gloss(surface, surface.albedo * (1.0 - subsurface)) * light.key_illuminance * INVERSE_PI;
     }
     return surface.albedo * ((reflected + far * surface.transmission) * visibility + sky) + gloss * visibility;
 }
 
 // Exitant radiance of a surface that the key light reaches by the angle to its normal.
 fn shade(surface: Surface, visibility: f32, sky: vec3<f32>) -> vec3<f32> {
-    let cosine = dot(surface.normal, light.key_direction.xyz);
-    let between = dot(surface.viewer, light.key_direction.xyz);
-    let front = mix(max(cosine, 0.0), sphere_cosine(between), surface.spread);
-    let back = mix(max(-cosine, 0.0), sphere_cosine(-between), surface.spread);
-    let full = light.key_illuminance.rgb * INVERSE_PI;
+    let cosine = dot(surface.normal, light.key_direction);
+    let between = dot(surface.viewer, light.key_direction);
+    let front = mix(max(cosine, 0.0), sphere_cosine(between), surface.isotropic_fraction);
+    let back = mix(max(-cosine, 0.0), sphere_cosine(-between), surface.isotropic_fraction);
+    let full = light.key_illuminance * INVERSE_PI;
     return exitant(surface, front * full, back * full, visibility, sky);
 }

@@ -1,28 +1,25 @@
 // Sky radiance from the look-up table of src/light/atmosphere [Hillaire 2020, 5.3], and the fog that fits it.
 #define_import_path canopy::sky
 
+#import canopy::constants::{SKY_COLUMNS, SKY_ROWS, SKY_HORIZON_ROW}
 #import canopy::frame::{frame, light, sky_texture, sky_sampler}
 
 const PI: f32 = 3.14159265;
 
-// Columns and rows of the table, and the row of the horizon: src/light/atmosphere/sky_view.rs.
-const SKY_SIZE: vec2<f32> = vec2(129.0, 97.0);
-const HORIZON_ROW: f32 = 72.0;
-
 // Radiance of the sky without sun and moon, exposed. `direction` has unit length.
 fn sky_radiance(direction: vec3<f32>) -> vec3<f32> {
-    let a = light.sky_frame.xy;
+    let a = light.sky_axis;
     let h = direction.xz;
     var phi = 0.0;
     if dot(h, h) > 1e-12 {
         phi = atan2(a.x * h.y - a.y * h.x, dot(h, a));
     }
     let u = sign(phi) * sqrt(min(abs(phi) / PI, 1.0));
-    let column = (0.5 + 0.5 * u) * (SKY_SIZE.x - 1.0);
+    let column = (0.5 + 0.5 * u) * (SKY_COLUMNS - 1.0);
     let steepness = sqrt(min(abs(asin(clamp(direction.y, -1.0, 1.0))) / (0.5 * PI), 1.0));
-    let below = HORIZON_ROW + (SKY_SIZE.y - 1.0 - HORIZON_ROW) * steepness;
-    let row = select(below, HORIZON_ROW * (1.0 - steepness), direction.y >= 0.0);
-    return textureSampleLevel(sky_texture, sky_sampler, (vec2(column, row) + 0.5) / SKY_SIZE, 0.0).rgb;
+    let below = SKY_HORIZON_ROW + (SKY_ROWS - 1.0 - SKY_HORIZON_ROW) * steepness;
+    let row = select(below, SKY_HORIZON_ROW * (1.0 - steepness), direction.y >= 0.0);
+    return textureSampleLevel(sky_texture, sky_sampler, (vec2(column, row) + 0.5) / vec2(SKY_COLUMNS, SKY_ROWS), 0.0).rgb;
 }
 
 // Radiance that a white Lambertian surface returns under the sky: src/light/sh.rs fixes signs and order.
@@ -36,18 +33,19 @@ fn sky_irradiance(n: vec3<f32>) -> vec3<f32> {
     return max(sum, vec3(0.0));
 }
 
-// Irradiance over pi that the sky brings to what has these two bands of transfer: a vector, and in w the first coefficient.
-fn sky_transfer(side: vec4<f32>) -> vec3<f32> {
+// Irradiance over pi that the sky brings to what has these two bands of transfer: the first coefficient `mean`, and the second
+// band's `vector`.
+fn sky_transfer(mean: f32, vector: vec3<f32>) -> vec3<f32> {
     let s = &light.sky;
     // The light is kept as a Lambertian surface returns it: its second band times 2/3.
-    let band = side.y * (*s)[2].rgb - side.x * (*s)[1].rgb - side.z * (*s)[3].rgb;
-    return max(side.w * (*s)[0].rgb + 1.5 * band, vec3(0.0));
+    let band = vector.y * (*s)[2].rgb - vector.x * (*s)[1].rgb - vector.z * (*s)[3].rgb;
+    return max(mean * (*s)[0].rgb + 1.5 * band, vec3(0.0));
 }
 
 // Optical depth of a haze whose density falls exponentially with height, along a straight ray.
 fn fog_optical_depth(relative: vec3<f32>) -> f32 {
     let distance = length(relative);
-    let inverse_scale = light.fog.w;
+    let inverse_scale = light.fog_inverse_scale_height;
     let start = exp(-max(frame.camera.y, 0.0) * inverse_scale);
     let rise = clamp(relative.y * inverse_scale, -20.0, 20.0);
     // (1 - e^-x) / x, by its series where x vanishes.
@@ -59,26 +57,11 @@ fn fog_optical_depth(relative: vec3<f32>) -> f32 {
 // that side: the bright rim around a low sun belongs to the whole path to the horizon, most of which is not there, or lies
 // in the shadow of the land.
 fn apply_fog(color: vec3<f32>, relative: vec3<f32>) -> vec3<f32> {
-    let transmittance = exp(-light.fog.rgb * fog_optical_depth(relative));
+    let transmittance = exp(-light.fog_extinction * fog_optical_depth(relative));
     let direction = relative / max(length(relative), 1e-3);
     let mean = sky_irradiance(normalize(vec3(direction.x, max(direction.y, 0.4), direction.z)));
     let rim = sky_radiance(normalize(vec3(direction.x, max(direction.y, 0.03), direction.z)));
     let amount = 1.0 - transmittance.g;
     let inscatter = mix(mean, min(rim, 6.0 * mean), amount * amount);
     return color * transmittance + inscatter * (1.0 - transmittance);
-}
-
-// The eye's loss of colour in the dark and its shift to blue [Jensen et al. 2000, eq. 4; Larson et al. 1997, eq. 10]:
-// the twin of ScotopicTint::apply in src/light/exposure.rs. `color` is exposed. By day the amount is zero.
-fn night_vision(color: vec3<f32>) -> vec3<f32> {
-    let xyz = mat3x3<f32>(
-        vec3(0.4124564, 0.2126729, 0.0193339),
-        vec3(0.3575761, 0.7151522, 0.1191920),
-        vec3(0.1804375, 0.0721750, 0.9503041),
-    ) * color;
-    let v = max(xyz.y * (1.33 * (1.0 + (xyz.y + xyz.z) / max(xyz.x, 1e-12)) - 1.68) / 2.573, 0.0);
-    let nits = max(xyz.y / light.sky_frame.z, 1e-12);
-    let sigma = clamp((log2(nits) * 0.30103 + 2.0) / 2.6, 0.0, 1.0);
-    let rods = 1.0 - sigma * sigma * (3.0 - 2.0 * sigma);
-    return mix(color, light.night.rgb * v, min(light.night.w, light.sky_frame.w * rods));
 }

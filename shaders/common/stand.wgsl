@@ -1,61 +1,60 @@
-// Light inside a stand of trees: what neighbours leave of sky and sun, and what they send instead. The table is that of
-// src/light/stand.rs, exposed.
+// Light inside a stand of trees: the transmittance of neighbouring crowns for sky and sun, and what they scatter. The table is
+// that of src/light/stand.rs, exposed.
 #define_import_path canopy::stand
 
+#import canopy::constants::{STAND_COVERS, STAND_DEPTHS}
 #import canopy::frame::{stand_texture, sky_sampler}
 
 struct StandLight {
-    // Share of the sky that the neighbours leave, in the mean over the upper half.
-    sky: vec3<f32>,
-    // Share of the key light that they leave.
-    beam: f32,
-    // Radiance from above of what they scatter.
-    down: vec3<f32>,
-    // Radiance from below, less what the surroundings of a lone tree have there of the ground, times `sky`.
-    up: vec3<f32>,
+    // Transmittance of the neighbouring crowns for the light of the sky, in the mean over the upper hemisphere.
+    sky_transmittance: vec3<f32>,
+    // Their transmittance for the key light.
+    key_transmittance: f32,
+    // Downwelling radiance that they scatter.
+    downwelling: vec3<f32>,
+    // Upwelling radiance, less `sky_transmittance` times that of the ground around a lone tree.
+    upwelling: vec3<f32>,
 }
 
-// Covers, depths and rows of the table: the last row is the ground's.
-const COVERS: f32 = 16.0;
-const DEPTHS: f32 = 16.0;
-const ROWS: f32 = 17.0;
-
+// In the row of a depth; the last row is the ground's.
 fn look_up(cover: f32, row: f32) -> StandLight {
-    let u = (clamp(cover, 0.0, 1.0) * (COVERS - 1.0) + 0.5) / COVERS;
-    let v = (row + 0.5) / (3.0 * ROWS);
+    let u = (clamp(cover, 0.0, 1.0) * (STAND_COVERS - 1.0) + 0.5) / STAND_COVERS;
+    let v = (row + 0.5) / (3.0 * (STAND_DEPTHS + 1.0));
     let first = textureSampleLevel(stand_texture, sky_sampler, vec2(u, v), 0.0);
     var stand: StandLight;
-    stand.sky = first.rgb;
-    stand.beam = first.a;
-    stand.down = textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 1.0 / 3.0), 0.0).rgb;
-    stand.up = textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 2.0 / 3.0), 0.0).rgb;
+    stand.sky_transmittance = first.rgb;
+    stand.key_transmittance = first.a;
+    stand.downwelling = textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 1.0 / 3.0), 0.0).rgb;
+    stand.upwelling = textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 2.0 / 3.0), 0.0).rgb;
     return stand;
 }
 
 // Where crowns cover the share `cover` of the ground, at a depth of 0 (the tops) to 1 (the ground).
 fn stand_light(cover: f32, depth: f32) -> StandLight {
-    return look_up(cover, clamp(depth, 0.0, 1.0) * (DEPTHS - 1.0));
+    return look_up(cover, clamp(depth, 0.0, 1.0) * (STAND_DEPTHS - 1.0));
 }
 
 // On the ground.
 fn ground_light(cover: f32) -> StandLight {
-    return look_up(cover, DEPTHS);
+    return look_up(cover, STAND_DEPTHS);
 }
 
-// Share of a beam that is brought by two bands of scattered light: the first coefficient, and the second band's vector times
-// the beam's direction.
-fn two_bands(first: f32, band: f32) -> f32 {
-    return max(0.28209479 * first + 0.48860251 * band, 0.0);
+// Spherical harmonics of the first two bands in a direction, not below zero: the first coefficient, and the second band's
+// vector times the direction.
+fn evaluate_two_bands(mean: f32, band: f32) -> f32 {
+    return max(0.28209479 * mean + 0.48860251 * band, 0.0);
 }
 
-// Irradiance over pi on what faces the height `y` of a unit normal and would have `open` of the surroundings alone.
+// Irradiance over pi on what has a unit normal of the height `y`, and `open` without neighbours.
 fn in_stand(open: vec3<f32>, y: f32, stand: StandLight) -> vec3<f32> {
-    return max(stand.sky * open + 0.5 * ((1.0 + y) * stand.down + (1.0 - y) * stand.up), vec3(0.0));
+    let scattered = 0.5 * ((1.0 + y) * stand.downwelling + (1.0 - y) * stand.upwelling);
+    return max(stand.sky_transmittance * open + scattered, vec3(0.0));
 }
 
-// The same on a side whose first coefficient of transfer is `mean` and whose second band rises by `rise` (relative to it)
-// towards the zenith: a hemisphere of radiance 1 has the coefficients sqrt(pi) and 0.4886 pi.
-fn in_stand_by_transfer(open: vec3<f32>, mean: vec3<f32>, rise: vec3<f32>, stand: StandLight) -> vec3<f32> {
-    let others = 1.7724539 * (stand.down + stand.up) + 1.5349901 * rise * (stand.down - stand.up);
-    return max(stand.sky * max(open, vec3(0.0)) + mean * others, vec3(0.0));
+// The same on a side whose first coefficient of transfer is `mean`, and whose second band has the component `zenith` (relative
+// to `mean`) towards the zenith: a hemisphere of radiance 1 has the coefficients sqrt(pi) and 0.4886 pi.
+fn in_stand_by_transfer(open: vec3<f32>, mean: vec3<f32>, zenith: vec3<f32>, stand: StandLight) -> vec3<f32> {
+    let even = 1.7724539 * (stand.downwelling + stand.upwelling);
+    let scattered = even + 1.5349901 * zenith * (stand.downwelling - stand.upwelling);
+    return max(stand.sky_transmittance * max(open, vec3(0.0)) + mean * scattered, vec3(0.0));
 }

@@ -2,19 +2,30 @@
 // horizon that the terrain raises towards the light (src/terrain/sun_horizon.rs).
 #define_import_path canopy::sun_visibility
 
-#import canopy::frame::{frame, light, shadow, shadow_map, shadow_sampler, ground_texture, sky_sampler, MAX_CASCADES}
+#import canopy::constants::MAX_CASCADES
+#import canopy::frame::{frame, light, shadow, shadow_map, shadow_sampler, ground_texture, sky_sampler}
 
-// x: height above the ground that the light clears, y: share of ground under crowns, z: the same in the surroundings.
-fn ground_map(relative: vec3<f32>) -> vec3<f32> {
+// What the ground map has below a point.
+struct GroundSample {
+    // Height above the ground up to which the terrain hides the key light, metres.
+    shadow_height: f32,
+    // Share of ground under crowns, 0..1.
+    cover: f32,
+    // The same in the mean over the surroundings.
+    surrounding_cover: f32,
+}
+
+fn sample_ground(relative: vec3<f32>) -> GroundSample {
     let uv = (relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;
-    return textureSampleLevel(ground_texture, sky_sampler, uv, 0.0).xyz;
+    let texel = textureSampleLevel(ground_texture, sky_sampler, uv, 0.0).xyz;
+    return GroundSample(texel.x, texel.y, texel.z);
 }
 
 // Light that clears the terrain: a penumbra that widens with the distance to the ridge is approximated by one of
 // fixed height, the sun's disc over a kilometre. It lies below the horizon: open ground, whose horizon is itself, once
 // stood in the middle of it and had half its light.
-fn terrain_visibility(map: vec3<f32>, height_above_ground: f32) -> f32 {
-    return smoothstep(-6.0, 0.0, height_above_ground - map.x);
+fn terrain_visibility(ground: GroundSample, height_above_ground: f32) -> f32 {
+    return smoothstep(-6.0, 0.0, height_above_ground - ground.shadow_height);
 }
 
 // Metres.
@@ -22,15 +33,15 @@ const MOST_LEAF_BIAS: f32 = 0.3;
 
 // `bias` is 1 for solid surfaces; less where the position is known to lie off the caster, more among leaves.
 fn cascade_visibility(index: i32, relative: vec3<f32>, normal: vec3<f32>, bias: f32) -> f32 {
-    let texel = shadow.cascades[index].size.x;
-    let slope = 1.0 - abs(dot(normal, light.key_direction.xyz));
+    let texel = shadow.cascades[index].texel;
+    let slope = 1.0 - abs(dot(normal, light.key_direction));
     // Offset along the normal by the reach of the filter, and along the ray by one texel.
-    let offset = normal * (0.6 + 1.6 * slope) + light.key_direction.xyz * 1.2;
+    let offset = normal * (0.6 + 1.6 * slope) + light.key_direction * 1.2;
     // What a bias above 1 adds is a matter of leaves, not of the map: in the coarse ones it would be metres.
     let position = relative + offset * min(texel * bias, max(texel, MOST_LEAF_BIAS));
     let map = shadow.cascades[index].map_from_relative * vec4(position, 1.0);
     let uv = map.xy * vec2(0.5, -0.5) + 0.5;
-    let step = shadow.count.y;
+    let step = shadow.inverse_map_size;
     // Four bilinear comparisons on a rotated cross: a soft edge about three texels wide.
     var sum = textureSampleCompareLevel(shadow_map, shadow_sampler, uv + vec2(0.9, 0.35) * step, index, map.z);
     sum += textureSampleCompareLevel(shadow_map, shadow_sampler, uv + vec2(-0.35, 0.9) * step, index, map.z);
@@ -44,19 +55,24 @@ fn pixel_noise(pixel: vec2<f32>) -> f32 {
     return fract(52.9829189 * fract(dot(floor(pixel), vec2(0.06711056, 0.00583715))));
 }
 
-// x: visibility from the cascades, y: weight of that knowledge (0 beyond the last cascade).
-//
+// What the cascades say of the key light at a point.
+struct CascadeSample {
+    visibility: f32,
+    // How far `visibility` counts: 1 within the cascades, 0 beyond the last one.
+    weight: f32,
+}
+
 // Each pixel reads one cascade: where two meet, noise decides which, over the last 7 % of the finer one's radius. Software
 // rasterisers run both sides of every branch, so the choice is arithmetic.
-fn cascaded_visibility(relative: vec3<f32>, normal: vec3<f32>, bias: f32, pixel: vec2<f32>) -> vec2<f32> {
-    let last = i32(shadow.count.x) - 1;
+fn cascaded_visibility(relative: vec3<f32>, normal: vec3<f32>, bias: f32, pixel: vec2<f32>) -> CascadeSample {
+    let last = shadow.cascade_count - 1;
     let distance = length(relative);
     let jittered = distance / mix(0.93, 1.0, pixel_noise(pixel));
     var index = 0;
     for (var i = 0; i < MAX_CASCADES - 1; i += 1) {
-        index += i32((i < last) & (jittered >= shadow.cascades[i].size.y));
+        index += i32((i < last) & (jittered >= shadow.cascades[i].radius));
     }
-    let radius = shadow.cascades[max(last, 0)].size.y;
-    let known = select(0.0, 1.0 - smoothstep(0.85 * radius, radius, distance), last >= 0);
-    return vec2(cascade_visibility(index, relative, normal, bias), known);
+    let radius = shadow.cascades[max(last, 0)].radius;
+    let weight = select(0.0, 1.0 - smoothstep(0.85 * radius, radius, distance), last >= 0);
+    return CascadeSample(cascade_visibility(index, relative, normal, bias), weight);
 }

@@ -1,20 +1,19 @@
 // Crossed billboards [Franzke 2005, 4.3]: two upright planes and a level one, eighteen pulled vertices a tree.
+#import canopy::constants::{CROSS_VERTICES, PLANES, SPREAD_LEVELS, LIGHT_SCALE, WHOLE, FADE_SPAN, GONE}
 #import canopy::frame::{frame, light}
-#import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, cross_threshold, tint_foliage, scattered, leaf_visibility}
+#import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, leaf_visibility}
 #import canopy::lighting::{Surface, shade, even_sky, leaf_transmission}
-#import canopy::sky::{apply_fog, night_vision, sky_transfer}
-#import canopy::stand::{stand_light, in_stand_by_transfer, two_bands}
-#import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
+#import canopy::output::finish
+#import canopy::sky::sky_transfer
+#import canopy::stand::{stand_light, in_stand_by_transfer, evaluate_two_bands}
+#import canopy::sun_visibility::{sample_ground, terrain_visibility, cascaded_visibility}
 
-@group(2) @binding(0) var color_pictures: texture_2d_array<f32>;
-@group(2) @binding(1) var property_pictures: texture_2d_array<f32>;
-@group(2) @binding(2) var picture_sampler: sampler;
+@group(2) @binding(0) var color_textures: texture_2d_array<f32>;
+@group(2) @binding(1) var property_textures: texture_2d_array<f32>;
+@group(2) @binding(2) var texture_sampler: sampler;
 #ifdef TRANSFER
-// How the sky's light reaches the leaves: src/bake/billboard/light.rs.
-@group(3) @binding(0) var light_pictures: texture_2d_array<f32>;
-
-// What 1 stands for in them.
-const LIGHT_SCALE: f32 = 0.4;
+// How the sky's light reaches the leaves: src/bake/levels/cross/light.rs.
+@group(3) @binding(0) var light_textures: texture_2d_array<f32>;
 #endif
 
 struct Varying {
@@ -22,57 +21,71 @@ struct Varying {
     @location(0) relative: vec3<f32>,
     @location(1) uv: vec2<f32>,
     @location(2) @interpolate(flat) layer: u32,
-    // The picture's right, up and front in world axes; the front turned towards the viewer.
+    // The texture's right, up and front in world axes, the front towards the viewer.
     @location(3) @interpolate(flat) right: vec3<f32>,
     @location(4) @interpolate(flat) up: vec3<f32>,
     @location(7) @interpolate(flat) front: vec3<f32>,
-    // Threshold, height above the foot in metres, relative height, tint.
+    // A packed `Look`.
     @location(5) look: vec4<f32>,
-    // rgb: transmission of the leaves, w: crown's radius in metres.
-    @location(6) @interpolate(flat) crown: vec4<f32>,
+    // Metres.
+    @location(6) @interpolate(flat) crown_radius: f32,
 }
 
-const VERTICES_A_TREE: u32 = 18u;
-const PLANES: u32 = 3u;
-// Mips for which the spread is known: src/bake/billboard/mod.rs.
-const SPREAD_LEVELS: f32 = 8.0;
+struct Look {
+    // Of the alpha test.
+    threshold: f32,
+    // Above the foot, metres.
+    height: f32,
+    // In the crown: 0 at the foot, 1 at the top.
+    relative_height: f32,
+    tint: f32,
+}
+
+// Four numbers are interpolated at the price of one.
+fn pack_look(look: Look) -> vec4<f32> {
+    return vec4(look.threshold, look.height, look.relative_height, look.tint);
+}
+
+fn unpack_look(packed: vec4<f32>) -> Look {
+    return Look(packed.x, packed.y, packed.z, packed.w);
+}
 
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     var corners = array<vec2<f32>, 6>(
         vec2(-1.0, -1.0), vec2(1.0, -1.0), vec2(1.0, 1.0), vec2(-1.0, -1.0), vec2(1.0, 1.0), vec2(-1.0, 1.0),
     );
-    let tree = unpack_tree(trees[visible[index / VERTICES_A_TREE]]);
-    let plane_index = (index % VERTICES_A_TREE) / 6u;
+    let tree = unpack_tree(trees[visible[index / CROSS_VERTICES]]);
+    let plane_index = (index % CROSS_VERTICES) / 6u;
     let corner = corners[index % 6u];
     let plane = variants[tree.variant].planes[plane_index];
-    let height = max(variants[tree.variant].size.x * tree.scale, 0.01);
+    let height = max(variants[tree.variant].height * tree.scale, 0.01);
 
-    let center = tree.position + turn(plane.center.xyz, tree.yaw) * tree.scale;
-    let normal = turn(plane.normal.xyz, tree.yaw);
+    let center = plant_vertex_position(tree, plane.center.xyz).relative;
+    let normal = rotate(plane.normal.xyz, tree.yaw);
     let toward = dot(normal, normalize(center));
-    // A plane goes as it is seen edge-on: its picture is nothing but a streak there. The level plane comes in only
+    // A plane vanishes as it is seen edge-on: its texture is nothing but a streak there. The level plane comes in only
     // when looked down on; from the side it would be a shelf in the crown.
     let level = plane_index == 2u;
-    let edge = 0.5 + 0.51 * (1.0 - smoothstep(select(0.10, 0.42, level), select(0.34, 0.72, level), abs(toward)));
-    let threshold = max(cross_threshold(length(tree.position.xz)), edge);
+    let edge = WHOLE + FADE_SPAN * (1.0 - smoothstep(select(0.10, 0.42, level), select(0.34, 0.72, level), abs(toward)));
+    let threshold = max(level_threshold(length(tree.position.xz)), edge);
 
     var out: Varying;
-    let local = turn(plane.center.xyz + corner.x * plane.u.xyz + corner.y * plane.v.xyz, tree.yaw) * tree.scale;
-    out.relative = tree.position + local;
+    let position = plant_vertex_position(tree, plane.center.xyz + corner.x * plane.u.xyz + corner.y * plane.v.xyz);
+    out.relative = position.relative;
     out.clip = frame.clip_from_relative * vec4(out.relative, 1.0);
-    if threshold >= 1.0 {
+    if threshold >= GONE {
         // Nothing would pass the test: no area, no fragments. Inside the view, as clipping costs more than rejection.
         out.clip = vec4(0.0, 0.0, 0.5, 1.0);
     }
     out.uv = vec2(0.5 + 0.5 * corner.x, 0.5 - 0.5 * corner.y);
-    out.layer = u32(variants[tree.variant].size.z) + plane_index;
-    out.right = turn(plane.u.xyz, tree.yaw) / max(length(plane.u.xyz), 1e-6);
-    out.up = turn(plane.v.xyz, tree.yaw) / max(length(plane.v.xyz), 1e-6);
+    out.layer = variants[tree.variant].first_layer + plane_index;
+    out.right = rotate(plane.u.xyz, tree.yaw) / max(length(plane.u.xyz), 1e-6);
+    out.up = rotate(plane.v.xyz, tree.yaw) / max(length(plane.v.xyz), 1e-6);
     // Seen from behind, the crown's other half stands before the viewer: mirrored across the plane.
     out.front = normal * select(1.0, -1.0, toward > 0.0);
-    out.look = vec4(threshold, local.y, local.y / height, tree.tint);
-    out.crown = vec4(variants[tree.variant].transmission.rgb, variants[tree.variant].size.y * tree.scale);
+    out.look = pack_look(Look(threshold, position.from_foot.y, position.from_foot.y / height, tree.tint));
+    out.crown_radius = variants[tree.variant].crown_radius * tree.scale;
     return out;
 }
 
@@ -87,94 +100,101 @@ fn decode_octahedral(e: vec2<f32>) -> vec3<f32> {
 
 @fragment
 fn fragment(in: Varying) -> @location(0) vec4<f32> {
-    let level = picture_level(in.uv);
-    let texel = textureSampleLevel(color_pictures, picture_sampler, in.uv, in.layer, level);
+    let look = unpack_look(in.look);
+    let variant = in.layer / PLANES;
+    let level = mip_level(in.uv);
+    let texel = textureSampleLevel(color_textures, texture_sampler, in.uv, in.layer, level);
     var coverage = 1.0;
 #ifdef ALPHA_TO_COVERAGE
-    coverage = clamp((texel.a - in.look.x) / max(fwidth(texel.a), 1e-4) + 0.5, 0.0, 1.0);
+    coverage = clamp((texel.a - look.threshold) / max(fwidth(texel.a), 1e-4) + 0.5, 0.0, 1.0);
     if coverage <= 0.0 {
         discard;
     }
 #else
-    if texel.a < in.look.x {
+    if texel.a < look.threshold {
         discard;
     }
 #endif
-    let properties = textureSampleLevel(property_pictures, picture_sampler, in.uv, in.layer, level);
+    let properties = textureSampleLevel(property_textures, texture_sampler, in.uv, in.layer, level);
     let local = decode_octahedral(properties.xy);
     let normal = normalize(in.right * local.x + in.up * local.y + in.front * local.z);
 
     let foliage = properties.a;
     var surface: Surface;
-    surface.albedo = mix(texel.rgb, tint_foliage(texel.rgb, in.look.w), foliage);
+    surface.albedo = mix(texel.rgb, tint_foliage(texel.rgb, look.tint), foliage);
     surface.normal = normal;
-    let gloss = variants[in.layer / PLANES].gloss.xyz;
-    surface.transmission = leaf_transmission(texel.rgb, in.crown.rgb, gloss.x) * foliage;
+    let reflectance = variants[variant].specular_reflectance;
+    surface.transmission = leaf_transmission(texel.rgb, variants[variant].transmission, reflectance) * foliage;
     surface.viewer = -normalize(in.relative);
-    surface.spread = leaf_spread(in.layer / PLANES, level) * foliage;
-    surface.gloss = vec3(gloss.x * foliage, gloss.y, max(surface.spread, gloss.z));
-    let map = ground_map(in.relative);
-    let traced = variants[in.layer / PLANES].transmission.w > 0.5;
-    let stand = stand_light(map.z, 1.0 - in.look.z);
-    var visibility = terrain_visibility(map, in.look.y);
+    surface.isotropic_fraction = isotropic_fraction(variant, level) * foliage;
+    surface.specular_reflectance = reflectance * foliage;
+    surface.roughness = variants[variant].roughness;
+    surface.gloss_isotropy = max(surface.isotropic_fraction, variants[variant].realigned);
+    let ground = sample_ground(in.relative);
+    let by_transfer = variants[variant].radiance_transfer == 1u;
+    let stand = stand_light(ground.surrounding_cover, 1.0 - look.relative_height);
+    var visibility = terrain_visibility(ground, look.height);
 #ifdef TRANSFER
-    let lit_layer = u32(variants[in.layer / PLANES].gloss.w) + in.layer % PLANES;
-    let stored = textureSampleLevel(light_pictures, picture_sampler, in.uv, lit_layer, level) * LIGHT_SCALE;
+    let light_layer = variants[variant].first_light_layer + in.layer % PLANES;
+    let stored = textureSampleLevel(light_textures, texture_sampler, in.uv, light_layer, level) * LIGHT_SCALE;
     let side = in.right * stored.x + in.up * stored.y + in.front * stored.z;
-    // The rise comes multiplied with the mean here.
-    let open = sky_transfer(vec4(side, stored.w));
+    // The second band is not relative to the mean here.
+    let open = sky_transfer(stored.w, side);
     let around = in_stand_by_transfer(open, vec3(stored.w), vec3(side.y / max(stored.w, 1e-3)), stand);
-    let lit_leaves = variants[in.layer / PLANES].scattered;
-    let rise = variants[in.layer / PLANES].scattered_rise.x * light.key_direction.y;
-    let share = two_bands(lit_leaves.w, rise) * stand.beam * visibility;
-    let scattered_sun = light.key_illuminance.rgb * lit_leaves.rgb * share;
-    var sky = (1.0 + surface.transmission) * (around + scattered_sun);
+    let zenith = variants[variant].indirect_sun_zenith * light.key_direction.y;
+    let indirect = evaluate_two_bands(variants[variant].indirect_sun_mean, zenith) * stand.key_transmittance * visibility;
+    let indirect_sun = light.key_illuminance * variants[variant].indirect_sun_color * indirect;
+    var sky = (1.0 + surface.transmission) * (around + indirect_sun);
 #ifdef PLAIN_TOO
-    surface.ambient = scattered(properties.b);
-    sky = select(even_sky(surface, stand), sky, traced);
+    surface.ambient_visibility = with_indirect_ambient(properties.b);
+    sky = select(even_sky(surface, stand), sky, by_transfer);
 #endif
 #else
-    surface.ambient = scattered(properties.b);
+    surface.ambient_visibility = with_indirect_ambient(properties.b);
     let sky = even_sky(surface, stand);
 #endif
     if visibility > 0.0 {
-        // The picture stands for a round crown: what faces the light lies before the plane that casts the shadow, what
+        // The texture stands for a round crown: what faces the light lies before the plane that casts the shadow, what
         // turns away from it behind.
-        let bulge = normal * (0.55 * in.crown.w * foliage);
-        let near = cascaded_visibility(in.relative + bulge, normal, 0.25, in.clip.xy);
-        // The crown's own shadow: its far side lies behind all of its leaves, of which the maps know one picture.
-        let side = dot(normal, light.key_direction.xyz);
+        let bulge = normal * (0.55 * in.crown_radius * foliage);
+        let cascades = cascaded_visibility(in.relative + bulge, normal, 0.25, in.clip.xy);
+        // The crown's own shadow: its far side lies behind all of its leaves, of which the maps have one texture.
+        let side = dot(normal, light.key_direction);
         let own = mix(1.0, smoothstep(-0.6, 0.3, side), foliage);
-        visibility *= mix(own * mix(1.0, stand.beam, foliage), near.x * mix(0.75, 1.0, own), near.y);
+        visibility *= mix(
+            own * mix(1.0, stand.key_transmittance, foliage),
+            cascades.visibility * mix(0.75, 1.0, own),
+            cascades.weight,
+        );
     }
-    let among = select(leaf_visibility(properties.b), mix(1.0, lit_and_seen(surface.viewer), smoothstep(0.25, 0.85, map.z)), traced);
+    let sunlit = mix(1.0, hot_spot(surface.viewer), smoothstep(0.25, 0.85, ground.surrounding_cover));
+    let among = select(leaf_visibility(properties.b), sunlit, by_transfer);
     visibility *= mix(1.0, among, foliage);
     var color = shade(surface, visibility, sky);
-    color = mix(color, vec3(0.2, 0.35, 1.0) * dot(color, vec3(0.5)), 0.6 * frame.flags.y);
-    return vec4(night_vision(apply_fog(color, in.relative)), coverage);
+    color = tint_level(color);
+    return finish(in.relative, color, coverage);
 }
 
-// Share of the leaves that a viewer sees of a crown which the light reaches between the others. What one sees from the
-// light's own side is lit [Kuusk 1991, the hot spot]; the farther apart both are, the more of it lies in shade. Fitted to
-// traced dense stands of oaks and of grown trees, seen with the light and against it (benches/README.md, dense stands); a tree
-// that stands alone is right without it, so it counts by the cover.
-fn lit_and_seen(viewer: vec3<f32>) -> f32 {
-    return 0.725 + 0.275 * dot(viewer, light.key_direction.xyz);
+// Sunlit fraction of the visible leaf area, the hot-spot effect [Kuusk 1991]: what is seen from the light's own side is lit;
+// the farther apart both are, the more of it lies in shade. Fitted to traced dense stands of oaks and of grown trees, seen with
+// the light and against it (benches/README.md, dense stands). A lone tree needs no correction, so it is weighted by the cover.
+fn hot_spot(viewer: vec3<f32>) -> f32 {
+    return 0.725 + 0.275 * dot(viewer, light.key_direction);
 }
 
-// How far the leaves that a texel stands for face everywhere.
-fn leaf_spread(variant: u32, level: f32) -> f32 {
-    let at = clamp(level, 0.0, SPREAD_LEVELS - 1.0);
+// Fraction of a texel's leaf area with isotropic normals.
+fn isotropic_fraction(variant: u32, level: f32) -> f32 {
+    let at = clamp(level, 0.0, f32(SPREAD_LEVELS - 1u));
     let finer = u32(at);
-    let coarser = min(finer + 1u, u32(SPREAD_LEVELS) - 1u);
-    let spread = &variants[variant].spread;
-    return mix((*spread)[finer / 4u][finer % 4u], (*spread)[coarser / 4u][coarser % 4u], fract(at));
+    let coarser = min(finer + 1u, SPREAD_LEVELS - 1u);
+    let fraction = &variants[variant].isotropic_fraction;
+    return mix((*fraction)[finer / 4u][finer % 4u], (*fraction)[coarser / 4u][coarser % 4u], fract(at));
 }
 
-// Level of the pictures: the mean of the two axes' levels. The larger one, as samplers have it, would blur a plane seen
+// Level of the textures: the mean of the two axes' levels. The larger one, as samplers have it, would blur a plane seen
 // askew along its whole height; what little this leaves to alias is leaves, and their coverage is right at any level.
-fn picture_level(uv: vec2<f32>) -> f32 {
-    let size = vec2<f32>(textureDimensions(color_pictures));
+fn mip_level(uv: vec2<f32>) -> f32 {
+    let size = vec2<f32>(textureDimensions(color_textures));
     let dx = dpdx(uv * size);
     let dy = dpdy(uv * size);
     return 0.25 * (log2(max(dot(dx, dx), 1e-8)) + log2(max(dot(dy, dy), 1e-8)));

@@ -1,6 +1,10 @@
 // Trees of 16 bytes: src/scatter/packed.rs packs what this unpacks.
 #define_import_path canopy::instance
 
+#import canopy::constants::{PLACE_STEPS, YAW_BITS, YAWS, SCALE_SHIFT, SCALE_BITS, SCALE_STEPS, SCALE_OCTAVES, LEAST_SCALE_LOG2}
+#import canopy::constants::{VARIANT_SHIFT, VARIANT_BITS, TINT_SHIFT, TINT_BITS, TINT_STEPS}
+#import canopy::constants::{PLANES, SPREAD_VECTORS, WHOLE, FADE_SPAN}
+
 struct Tree {
     xz: u32,
     y: f32,
@@ -16,9 +20,11 @@ struct ForestView {
     // Anchor's height over the stand's datum in metres.
     anchor_y: f32,
     cell_size: f32,
-    // Distance in metres where the full model begins to give way, and where it is gone.
-    fade_start: f32,
-    fade_end: f32,
+    // Distances in metres over which the level comes in and goes out.
+    fade_in: vec2<f32>,
+    fade_out: vec2<f32>,
+    // The level's tint, and how much of it is mixed in.
+    tint: vec4<f32>,
 }
 
 struct Plane {
@@ -29,28 +35,37 @@ struct Plane {
 }
 
 struct Variant {
-    planes: array<Plane, 3>,
-    // x: height in metres, y: crown radius, z: first layer of its pictures, w: 1 where it has a full model.
-    size: vec4<f32>,
-    // Transmission of its leaves; w: 1 where k_a was traced and holds what leaves send each other.
-    transmission: vec4<f32>,
-    // How far the leaves of a texel face everywhere, 0..1, mip by mip.
-    spread: array<vec4<f32>, 2>,
-    // Gloss of its leaves: reflectance, roughness, 1 where normals point out of the crown; w: first layer of its lighting
-    // pictures.
-    gloss: vec4<f32>,
-    // Light of the key light that its leaves send each other, in the mean (scattered_sun in transfer.wgsl): colour; w: the
-    // first coefficient. Where it comes from: x: the second band's rise towards the zenith.
-    scattered: vec4<f32>,
-    scattered_rise: vec4<f32>,
+    planes: array<Plane, PLANES>,
+    // Metres.
+    height: f32,
+    crown_radius: f32,
+    // First layer of its textures, and of its lighting textures.
+    first_layer: u32,
+    first_light_layer: u32,
+    // Factor for light through its leaves, as in `Surface`.
+    transmission: vec3<f32>,
+    // 1 where it is lit by radiance transfer: its ambient visibility is traced, and holds what leaves scatter.
+    radiance_transfer: u32,
+    // Fraction of a texel's leaf area with isotropic normals, 0..1, mip by mip.
+    isotropic_fraction: array<vec4<f32>, SPREAD_VECTORS>,
+    // Gloss of its leaves.
+    specular_reflectance: f32,
+    roughness: f32,
+    // 1 where the foliage's normals point out of the crown, else 0.
+    realigned: f32,
+    // Indirect light of the key light (indirect_sun in transfer.wgsl) in the mean over its leaves: the component of the second
+    // band towards the zenith, the first coefficient, and its colour.
+    indirect_sun_zenith: f32,
+    indirect_sun_color: vec3<f32>,
+    indirect_sun_mean: f32,
 }
 
 struct Instance {
     // Foot relative to the anchor, metres.
     position: vec3<f32>,
-    // Cosine and sine of the yaw.
+    // Cosine and sine of the yaw, x and y.
     yaw: vec2<f32>,
-    // The yaw in 256ths of a turn.
+    // The yaw in steps of a full rotation over YAWS.
     yaw_code: u32,
     scale: f32,
     variant: u32,
@@ -65,34 +80,62 @@ struct Instance {
 
 fn unpack_tree(tree: Tree) -> Instance {
     let cell = vec2(extractBits(bitcast<i32>(tree.cell), 0u, 16u), extractBits(bitcast<i32>(tree.cell), 16u, 16u));
-    let offset = vec2(f32(tree.xz & 0xffffu), f32(tree.xz >> 16u)) * (view.cell_size / 65535.0);
+    let offset = vec2(f32(tree.xz & 0xffffu), f32(tree.xz >> 16u)) * (view.cell_size / PLACE_STEPS);
     let xz = vec2<f32>(cell - view.anchor_cell) * view.cell_size + (offset - view.anchor_offset);
-    let yaw_code = tree.look & 0xffu;
-    let yaw = f32(yaw_code) * (6.28318531 / 256.0);
+    let yaw_code = extractBits(tree.look, 0u, YAW_BITS);
+    let yaw = f32(yaw_code) * (6.28318531 / f32(YAWS));
+    let scale_code = extractBits(tree.look, SCALE_SHIFT, SCALE_BITS);
+    let tint_code = extractBits(bitcast<i32>(tree.look), TINT_SHIFT, TINT_BITS);
     var instance: Instance;
     instance.yaw_code = yaw_code;
     instance.position = vec3(xz.x, tree.y - view.anchor_y, xz.y);
     instance.yaw = vec2(cos(yaw), sin(yaw));
-    instance.scale = exp2(f32((tree.look >> 8u) & 0xfffu) * (8.0 / 4095.0) - 4.0);
-    instance.variant = (tree.look >> 20u) & 0x3fu;
-    instance.tint = max(f32(extractBits(bitcast<i32>(tree.look), 26u, 6u)) / 31.0, -1.0);
+    instance.scale = exp2(f32(scale_code) * (SCALE_OCTAVES / SCALE_STEPS) + LEAST_SCALE_LOG2);
+    instance.variant = extractBits(tree.look, VARIANT_SHIFT, VARIANT_BITS);
+    instance.tint = max(f32(tint_code) / TINT_STEPS, -1.0);
     return instance;
 }
 
-// Plant frame to world axes: a turn about Y.
-fn turn(v: vec3<f32>, yaw: vec2<f32>) -> vec3<f32> {
+// Plant frame to world axes: a rotation about Y.
+fn rotate(v: vec3<f32>, yaw: vec2<f32>) -> vec3<f32> {
     return vec3(yaw.x * v.x + yaw.y * v.z, v.y, -yaw.y * v.x + yaw.x * v.z);
 }
 
-// Thresholds of the alpha test over the distance: the CPU twin is src/lod/mod.rs.
-fn model_threshold(distance: f32) -> f32 {
-    let middle = 0.5 * (view.fade_start + view.fade_end);
-    return 0.5 + 0.51 * clamp((distance - middle) / max(view.fade_end - middle, 1e-3), 0.0, 1.0);
+// Where a vertex of a tree is, metres in world axes.
+struct VertexPosition {
+    // From the anchor.
+    relative: vec3<f32>,
+    // From the tree's foot.
+    from_foot: vec3<f32>,
 }
 
-fn cross_threshold(distance: f32) -> f32 {
-    let middle = 0.5 * (view.fade_start + view.fade_end);
-    return 0.5 + 0.51 * clamp((middle - distance) / max(middle - view.fade_start, 1e-3), 0.0, 1.0);
+// Where a tree has the vertex that its plant has at `local` (metres in the plant's frame). All vertex shaders of plants
+// take their positions from here, those of shadows too.
+fn plant_vertex_position(tree: Instance, local: vec3<f32>) -> VertexPosition {
+    return rotated_vertex_position(tree, rotate(local, tree.yaw));
+}
+
+// The same for a position in the plant that is rotated into world axes already.
+fn rotated_vertex_position(tree: Instance, rotated: vec3<f32>) -> VertexPosition {
+    var position: VertexPosition;
+    position.from_foot = rotated * tree.scale;
+    position.relative = tree.position + position.from_foot;
+    return position;
+}
+
+// Threshold of the alpha test of this level at a distance: the CPU twin is src/lod.
+fn level_threshold(distance: f32) -> f32 {
+    let coming = 0.5 * (view.fade_in.x + view.fade_in.y);
+    let going = 0.5 * (view.fade_out.x + view.fade_out.y);
+    return max(
+        WHOLE + FADE_SPAN * clamp((coming - distance) / max(coming - view.fade_in.x, 1e-3), 0.0, 1.0),
+        WHOLE + FADE_SPAN * clamp((distance - going) / max(view.fade_out.y - going, 1e-3), 0.0, 1.0),
+    );
+}
+
+// Mixes in the level's tint.
+fn tint_level(color: vec3<f32>) -> vec3<f32> {
+    return mix(color, view.tint.rgb * dot(color, vec3(0.5)), view.tint.w);
 }
 
 // Individual shift of the foliage's hue and brightness.
@@ -100,15 +143,14 @@ fn tint_foliage(albedo: vec3<f32>, tint: f32) -> vec3<f32> {
     return albedo * (1.0 + tint * vec3(0.18, 0.07, -0.05));
 }
 
-// Ambient light at a visibility k: what does not come from the sky comes from other leaves, by their albedo. The share is
-// fitted to the path tracer (benches/expressive.rs).
-fn scattered(k: f32) -> f32 {
+// Ambient light at an ambient visibility `k`: what does not come from the sky comes from other leaves, by their albedo. The
+// share is fitted to the path tracer (benches/expressive.rs).
+fn with_indirect_ambient(k: f32) -> f32 {
     return k + (1.0 - k) * 0.13;
 }
 
-// Share of the key light that reaches a leaf of ambient visibility k past the leaves around it, for which the shadow
-// maps are too coarse: what sees little of the sky mostly lies in shade. Where the map is fine, k says nothing that the
-// map does not know, and 0.8 + 0.75 k, at most 1.3, would be a little nearer (benches/expressive.rs).
+// Share of the key light that reaches a leaf of ambient visibility `k` past the leaves around it, for which the shadow
+// maps are too coarse: what sees little of the sky mostly lies in shade. Where the map is fine, `k` adds nothing to it, and 0.8 + 0.75 k, at most 1.3, would be a little nearer (benches/expressive.rs).
 fn leaf_visibility(k: f32) -> f32 {
     return min(0.35 + 2.0 * k, 1.1);
 }

@@ -1,25 +1,28 @@
 // The full model of a tree, near the camera.
+#import canopy::constants::{NORMAL_STEPS, NORMAL_LEAST_LENGTH, WHOLE}
 #import canopy::frame::{frame, light}
-#import canopy::instance::{view, trees, visible, variants, unpack_tree, turn, model_threshold, tint_foliage, scattered, leaf_visibility}
+#import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, leaf_visibility}
 #import canopy::lighting::{Surface, shade, exitant, even_sky, leaf_transmission}
-#import canopy::sky::{apply_fog, night_vision}
+#import canopy::output::finish
 #import canopy::stand::stand_light
-#import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
+#import canopy::sun_visibility::{sample_ground, terrain_visibility, cascaded_visibility}
 
 #ifdef TRANSFER
-#import canopy::transfer::{light_sides, light_in_stand, scattered_sun, SUN_ROWS}
+#import canopy::transfer::{light_sides, light_in_stand, indirect_sun}
+#endif
+#ifdef SUN_HARMONICS
+#import canopy::constants::YAWS
 #endif
 
 struct Part {
-    base_color: vec4<f32>,
-    // w: 1 where normals point out of the crown, whichever side of a leaf is seen.
-    transmission: vec4<f32>,
-    // Reflectance, roughness.
-    gloss: vec4<f32>,
+    base_color: vec3<f32>,
+    // 1 where normals point out of the crown, whichever side of a leaf is seen; else 0.
+    realigned: f32,
+    // As in `Surface`.
+    transmission: vec3<f32>,
+    specular_reflectance: f32,
+    roughness: f32,
 }
-
-// Length of a stored normal whose ambient visibility is zero.
-const LEAST_LENGTH: f32 = 0.25;
 
 @group(2) @binding(0) var color_texture: texture_2d<f32>;
 @group(2) @binding(1) var normal_texture: texture_2d<f32>;
@@ -28,7 +31,7 @@ const LEAST_LENGTH: f32 = 0.25;
 
 struct Vertex {
     @location(0) position: vec3<f32>,
-    // The normal, as long as the ambient visibility says: src/bake/implicit/packing.rs.
+    // The normal, as long as the ambient visibility says: src/bake/lighting/implicit/packing.rs.
     @location(1) normal: vec4<f32>,
     @location(2) uv: vec2<f32>,
 }
@@ -41,13 +44,31 @@ const SHADOW_BIAS: f32 = 3.0;
 const SHADOW_BIAS: f32 = 1.0;
 #endif
 
+struct Look {
+    ambient_visibility: f32,
+    // Above the foot, metres.
+    height: f32,
+    // In the crown: 0 at the foot, 1 at the top.
+    relative_height: f32,
+    tint: f32,
+}
+
+// Four numbers are interpolated at the price of one.
+fn pack_look(look: Look) -> vec4<f32> {
+    return vec4(look.ambient_visibility, look.height, look.relative_height, look.tint);
+}
+
+fn unpack_look(packed: vec4<f32>) -> Look {
+    return Look(packed.x, packed.y, packed.z, packed.w);
+}
+
 struct Varying {
     @builtin(position) clip: vec4<f32>,
     @location(0) relative: vec3<f32>,
     @location(1) @interpolate(perspective, centroid) normal: vec3<f32>,
     @location(2) uv: vec2<f32>,
-    // Ambient visibility, height above the foot in metres, relative height in the crown, tint. Light is taken inside the
-    // triangle: extrapolated to the middle of a pixel that a sliver of a leaf only touches, it would sparkle.
+    // A packed `Look`. Light is taken inside the triangle: extrapolated to the middle of a pixel that a sliver of a leaf only
+    // touches, it would sparkle.
     @location(3) @interpolate(perspective, centroid) look: vec4<f32>,
     @location(4) threshold: f32,
 #ifdef TRANSFER
@@ -65,34 +86,34 @@ struct Varying {
 @vertex
 fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index) vertex: u32) -> Varying {
     let tree = unpack_tree(trees[visible[index]]);
-    let local = turn(in.position, tree.yaw) * tree.scale;
-    let relative = tree.position + local;
+    let position = plant_vertex_position(tree, in.position);
     var out: Varying;
-    out.relative = relative;
-    out.clip = frame.clip_from_relative * vec4(relative, 1.0);
-    let stored = in.normal.xyz * (1023.0 / 511.0) - 1.0;
+    out.relative = position.relative;
+    out.clip = frame.clip_from_relative * vec4(position.relative, 1.0);
+    let stored = in.normal.xyz * ((2.0 * NORMAL_STEPS + 1.0) / NORMAL_STEPS) - 1.0;
     let size = max(length(stored), 1e-6);
-    out.normal = turn(stored / size, tree.yaw);
-    let ambient = saturate((size - LEAST_LENGTH) / (1.0 - LEAST_LENGTH));
+    out.normal = rotate(stored / size, tree.yaw);
+    let ambient = saturate((size - NORMAL_LEAST_LENGTH) / (1.0 - NORMAL_LEAST_LENGTH));
     out.uv = in.uv;
-    let height = max(variants[tree.variant].size.x * tree.scale, 0.01);
-    out.look = vec4(ambient, local.y, local.y / height, tree.tint);
-    out.threshold = model_threshold(length(tree.position.xz));
+    let height = max(variants[tree.variant].height * tree.scale, 0.01);
+    let look = Look(ambient, position.from_foot.y, position.from_foot.y / height, tree.tint);
+    out.look = pack_look(look);
+    out.threshold = level_threshold(length(tree.position.xz));
 #ifdef TRANSFER
-    let map = ground_map(relative);
-    let stand = stand_light(map.z, 1.0 - out.look.z);
+    let ground = sample_ground(position.relative);
+    let stand = stand_light(ground.surrounding_cover, 1.0 - look.relative_height);
     let sky = light_in_stand(vertex, tree.yaw_code, stand);
     out.front_sky = sky.front;
     out.back_sky = sky.back;
 #ifndef SUN_HARMONICS
-    let to_light = turn(light.key_direction.xyz, vec2(tree.yaw.x, -tree.yaw.y));
-    let scattered = scattered_sun(vertex, to_light) * (stand.beam * terrain_visibility(map, local.y));
-    out.front_sky += scattered;
-    out.back_sky += scattered;
+    let to_light = rotate(light.key_direction, vec2(tree.yaw.x, -tree.yaw.y));
+    let indirect = indirect_sun(vertex, to_light) * (stand.key_transmittance * terrain_visibility(ground, look.height));
+    out.front_sky += indirect;
+    out.back_sky += indirect;
 #endif
 #endif
 #ifdef SUN_HARMONICS
-    let sun = light_sides(vertex, SUN_ROWS + tree.yaw_code);
+    let sun = light_sides(vertex, YAWS + tree.yaw_code);
     out.front_sun = sun.front;
     out.back_sun = sun.back;
 #endif
@@ -126,6 +147,7 @@ fn detail_normal(normal: vec3<f32>, relative: vec3<f32>, uv: vec2<f32>) -> vec3<
 
 @fragment
 fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
+    let look = unpack_look(in.look);
     let texel = textureSample(color_texture, part_sampler, in.uv);
     var normal = normalize(in.normal);
     var coverage = 1.0;
@@ -145,27 +167,29 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
     }
 #endif
     // A leaf has two sides, and its own normal is that of the side that is seen.
-    let behind = (part.transmission.w < 0.5) & (dot(normal, in.relative) > 0.0);
+    let behind = (part.realigned < 0.5) & (dot(normal, in.relative) > 0.0);
     normal = select(normal, -normal, behind);
 #else
     normal = detail_normal(normal, in.relative, in.uv);
-    let keep = hash(vec3(in.uv * 97.0, in.look.y * 31.0));
-    if 0.5 + 0.5 * keep < in.threshold - 1e-4 {
+    let keep = hash(vec3(in.uv * 97.0, look.height * 31.0));
+    if WHOLE + (1.0 - WHOLE) * keep < in.threshold - 1e-4 {
         discard;
     }
 #endif
     var surface: Surface;
-    surface.albedo = texel.rgb * part.base_color.rgb;
+    surface.albedo = texel.rgb * part.base_color;
 #ifdef FOLIAGE
-    surface.transmission = leaf_transmission(surface.albedo, part.transmission.rgb, part.gloss.x);
-    surface.albedo = tint_foliage(surface.albedo, in.look.w);
+    surface.transmission = leaf_transmission(surface.albedo, part.transmission, part.specular_reflectance);
+    surface.albedo = tint_foliage(surface.albedo, look.tint);
     surface.viewer = -normalize(in.relative);
-    // A pixel that covers half a picture of leaves covers several such pictures, and each faces elsewhere: highlights of one
-    // would sparkle. Normals that point out of the crown are no leaf's at all.
-    surface.gloss = vec3(part.gloss.xy, max(saturate(2.0 * max(across.x, across.y)), part.transmission.w));
+    surface.specular_reflectance = part.specular_reflectance;
+    surface.roughness = part.roughness;
+    // A pixel that covers half a texture of leaves covers several of them, and each faces elsewhere: highlights of one would
+    // sparkle. Normals that point out of the crown are no leaf's at all.
+    surface.gloss_isotropy = max(saturate(2.0 * max(across.x, across.y)), part.realigned);
 #endif
     surface.normal = normal;
-    let map = ground_map(in.relative);
+    let ground = sample_ground(in.relative);
 #ifdef TRANSFER
 #ifdef FOLIAGE
     let near_sky = select(in.front_sky, in.back_sky, behind);
@@ -175,17 +199,17 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
     let sky = in.front_sky;
 #endif
 #else
-    surface.ambient = scattered(in.look.x);
-    let sky = even_sky(surface, stand_light(map.z, 1.0 - in.look.z));
+    surface.ambient_visibility = with_indirect_ambient(look.ambient_visibility);
+    let sky = even_sky(surface, stand_light(ground.surrounding_cover, 1.0 - look.relative_height));
 #endif
-    var visibility = terrain_visibility(map, in.look.y);
+    var visibility = terrain_visibility(ground, look.height);
     if visibility > 0.0 {
-        let near = cascaded_visibility(in.relative, normal, SHADOW_BIAS, in.clip.xy);
-        visibility *= mix(1.0, near.x, near.y);
+        let cascades = cascaded_visibility(in.relative, normal, SHADOW_BIAS, in.clip.xy);
+        visibility *= mix(1.0, cascades.visibility, cascades.weight);
     }
 #ifdef FOLIAGE
 #ifndef TRANSFER
-    visibility *= leaf_visibility(in.look.x);
+    visibility *= leaf_visibility(look.ambient_visibility);
 #endif
 #endif
 #ifdef SUN_HARMONICS
@@ -199,6 +223,6 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
 #else
     var color = shade(surface, visibility, sky);
 #endif
-    color = mix(color, vec3(0.15, 0.9, 0.2) * dot(color, vec3(0.5)), 0.6 * frame.flags.y);
-    return vec4(night_vision(apply_fog(color, in.relative)), coverage);
+    color = tint_level(color);
+    return finish(in.relative, color, coverage);
 }

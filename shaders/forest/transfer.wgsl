@@ -1,18 +1,26 @@
-// Radiance transfer [Franzke 2005, 4.2.3]: the twin of src/bake/transfer/evaluate.rs on coefficients that
-// src/bake/transfer/pack.rs packed.
+// Radiance transfer [Franzke 2005, 4.2.3]: the twin of src/bake/lighting/transfer/evaluate.rs on coefficients that
+// src/bake/lighting/transfer/pack.rs packed.
 #define_import_path canopy::transfer
 
+#import canopy::constants::{LIGHT_STRIDE, TRANSFER_WORDS}
 #import canopy::frame::light
-#import canopy::stand::{StandLight, in_stand_by_transfer, two_bands}
+#import canopy::stand::{StandLight, in_stand_by_transfer, evaluate_two_bands}
 
 struct Transfer {
     // What 127 stands for in each coefficient after the first, relative to it, four a word of codes.
-    scale: array<vec4<f32>, 9>,
-    // Words from one vertex to the next, of its means, and of the codes of one side and channel; where the codes of the key
-    // light that leaves send each other begin, a word a vertex.
-    form: vec4<u32>,
-    // Colour of the key light that leaves send each other; w: what 127 stands for in its codes.
-    scattered: vec4<f32>,
+    scale: array<vec4<f32>, TRANSFER_WORDS>,
+    // Words from one vertex to the next.
+    vertex_words: u32,
+    // Words of a vertex's means, which stand first.
+    mean_words: u32,
+    // Words of the codes of one side and channel.
+    side_words: u32,
+    // Where the codes of the indirect key light begin, a word a vertex.
+    indirect_sun_start: u32,
+    // Colour of the indirect key light, which leaves send each other.
+    indirect_sun_color: vec3<f32>,
+    // What 127 stands for in its codes.
+    indirect_sun_scale: f32,
 }
 
 // Irradiance over pi on the side of a vertex's normal and on the other.
@@ -21,13 +29,8 @@ struct Sides {
     back: vec3<f32>,
 }
 
-// Vectors from one yaw's light to the next: the first coefficient, then red, green and blue of each word of four.
-const STRIDE: u32 = 28u;
-// The first row of the sun's light.
-const SUN_ROWS: u32 = 256u;
-
 // The surroundings' light as a plant of each yaw sees it, then, where a plant wants it, the sun's.
-@group(3) @binding(0) var<storage, read> turned_light: array<vec4<f32>>;
+@group(3) @binding(0) var<storage, read> light_by_yaw: array<vec4<f32>>;
 @group(3) @binding(1) var<storage, read> coefficients: array<u32>;
 // No uniform: its values steer loops, and lavapipe compiles a shader again for every binding of such a buffer.
 @group(3) @binding(2) var<storage, read> transfer: Transfer;
@@ -38,9 +41,9 @@ fn mean_at(vertex: u32, index: u32) -> f32 {
     return bitcast<f32>(bits << 13u) * 5.192297e33;
 }
 
-// What light of four coefficients brings to a side whose codes for them are in `word`, and in words `stride` further on for
-// green and blue where light takes on colour.
-fn brought(word: u32, stride: u32, scale: vec4<f32>, light: u32) -> vec3<f32> {
+// Irradiance over pi by four coefficients of the light on a side whose codes for them are in `word`, and in words `stride`
+// further on for green and blue where light takes on colour.
+fn irradiance_by_word(word: u32, stride: u32, scale: vec4<f32>, light: u32) -> vec3<f32> {
     let red = unpack4x8snorm(coefficients[word]) * scale;
 #ifdef TRANSFER_COLOR
     let green = unpack4x8snorm(coefficients[word + stride]) * scale;
@@ -49,39 +52,39 @@ fn brought(word: u32, stride: u32, scale: vec4<f32>, light: u32) -> vec3<f32> {
     let green = red;
     let blue = red;
 #endif
-    return vec3(dot(red, turned_light[light]), dot(green, turned_light[light + 1u]), dot(blue, turned_light[light + 2u]));
+    return vec3(dot(red, light_by_yaw[light]), dot(green, light_by_yaw[light + 1u]), dot(blue, light_by_yaw[light + 2u]));
 }
 
-// Means of both sides, and how far their second band rises towards the zenith, relative to them.
+// Means of both sides, and the component of their second band towards the zenith, relative to them.
 struct Means {
     front: vec3<f32>,
-    front_rise: vec3<f32>,
+    front_zenith: vec3<f32>,
     back: vec3<f32>,
-    back_rise: vec3<f32>,
+    back_zenith: vec3<f32>,
 }
 
 fn means(vertex: u32) -> Means {
-    let first = vertex * transfer.form.x;
-    let codes = first + transfer.form.y;
-    let words = transfer.form.z;
+    let first = vertex * transfer.vertex_words;
+    let codes = first + transfer.mean_words;
+    let words = transfer.side_words;
     let scale = transfer.scale[0].y;
     var out: Means;
 #ifdef TRANSFER_COLOR
     out.front = vec3(mean_at(first, 0u), mean_at(first, 1u), mean_at(first, 2u));
-    out.front_rise = vec3(rise(codes), rise(codes + words), rise(codes + 2u * words)) * scale;
+    out.front_zenith = vec3(zenith(codes), zenith(codes + words), zenith(codes + 2u * words)) * scale;
     out.back = vec3(mean_at(first, 3u), mean_at(first, 4u), mean_at(first, 5u));
-    out.back_rise = vec3(rise(codes + 3u * words), rise(codes + 4u * words), rise(codes + 5u * words)) * scale;
+    out.back_zenith = vec3(zenith(codes + 3u * words), zenith(codes + 4u * words), zenith(codes + 5u * words)) * scale;
 #else
     out.front = vec3(mean_at(first, 0u));
-    out.front_rise = vec3(rise(codes) * scale);
+    out.front_zenith = vec3(zenith(codes) * scale);
     out.back = vec3(mean_at(first, 1u));
-    out.back_rise = vec3(rise(codes + words) * scale);
+    out.back_zenith = vec3(zenith(codes + words) * scale);
 #endif
     return out;
 }
 
 // The third coefficient of a side and channel, relative to what 127 stands for.
-fn rise(word: u32) -> f32 {
+fn zenith(word: u32) -> f32 {
     return unpack4x8snorm(coefficients[word]).y;
 }
 
@@ -90,30 +93,30 @@ fn light_in_stand(vertex: u32, yaw: u32, stand: StandLight) -> Sides {
     let open = light_sides(vertex, yaw);
     let own = means(vertex);
     var sides: Sides;
-    sides.front = in_stand_by_transfer(open.front, own.front, own.front_rise, stand);
+    sides.front = in_stand_by_transfer(open.front, own.front, own.front_zenith, stand);
 #ifdef FOLIAGE
-    sides.back = in_stand_by_transfer(open.back, own.back, own.back_rise, stand);
+    sides.back = in_stand_by_transfer(open.back, own.back, own.back_zenith, stand);
 #endif
     return sides;
 }
 
-// Irradiance over pi of the key light that the leaves around a vertex send it, the same on both of its sides, where nothing
-// else is in the way. `to_light`: in the plant's frame.
-fn scattered_sun(vertex: u32, to_light: vec3<f32>) -> vec3<f32> {
-    let codes = unpack4x8snorm(coefficients[transfer.form.w + vertex]) * transfer.scattered.w;
+// Irradiance over pi of the indirect key light at a vertex: what the leaves around it scatter, the same on both of its sides,
+// where nothing else is in the way. `to_light`: in the plant's frame.
+fn indirect_sun(vertex: u32, to_light: vec3<f32>) -> vec3<f32> {
+    let codes = unpack4x8snorm(coefficients[transfer.indirect_sun_start + vertex]) * transfer.indirect_sun_scale;
     let band = codes.z * to_light.y - codes.y * to_light.x - codes.w * to_light.z;
-    return light.key_illuminance.rgb * transfer.scattered.rgb * two_bands(codes.x, band);
+    return light.key_illuminance * transfer.indirect_sun_color * evaluate_two_bands(codes.x, band);
 }
 
 // Irradiance over pi that the light of a row brings to the sides of a vertex. The row is the tree's yaw for the
-// surroundings, SUN_ROWS more for the sun.
+// surroundings, YAWS more for the sun.
 fn light_sides(vertex: u32, row: u32) -> Sides {
-    let first = vertex * transfer.form.x;
-    let codes = first + transfer.form.y;
-    let words = transfer.form.z;
-    let light = row * STRIDE;
+    let first = vertex * transfer.vertex_words;
+    let codes = first + transfer.mean_words;
+    let words = transfer.side_words;
+    let light = row * LIGHT_STRIDE;
     var sides: Sides;
-    sides.front = turned_light[light].rgb;
+    sides.front = light_by_yaw[light].rgb;
 #ifdef TRANSFER_COLOR
     let other = 3u * words;
 #else
@@ -124,9 +127,9 @@ fn light_sides(vertex: u32, row: u32) -> Sides {
 #endif
     for (var k = 0u; k < words; k += 1u) {
         let at = light + 1u + 3u * k;
-        sides.front += brought(codes + k, words, transfer.scale[k], at);
+        sides.front += irradiance_by_word(codes + k, words, transfer.scale[k], at);
 #ifdef FOLIAGE
-        sides.back += brought(codes + other + k, words, transfer.scale[k], at);
+        sides.back += irradiance_by_word(codes + other + k, words, transfer.scale[k], at);
 #endif
     }
     // A few bands can fall below zero where next to nothing arrives.

@@ -1,6 +1,8 @@
 // The sky behind everything: the radiance table, the sun's and the moon's disc, stars.
+#import canopy::constants::LUX_OF_MAGNITUDE_0
 #import canopy::frame::{frame, light}
-#import canopy::sky::{sky_radiance, night_vision}
+#import canopy::output::finish_sky
+#import canopy::sky::sky_radiance
 
 struct Varying {
     @builtin(position) clip: vec4<f32>,
@@ -17,12 +19,13 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     return out;
 }
 
-fn disc(direction: vec3<f32>, center: vec4<f32>) -> f32 {
-    let cosine = dot(direction, center.xyz);
+// Coverage of a disc around `center`, of which `disc_cosine` is the cosine of the angular radius.
+fn disc(direction: vec3<f32>, center: vec3<f32>, disc_cosine: f32) -> f32 {
+    let cosine = dot(direction, center);
     // Soft over a pixel, in angle.
     let angle = sqrt(max(2.0 - 2.0 * cosine, 0.0));
-    let radius = sqrt(max(2.0 - 2.0 * center.w, 0.0));
-    let pixel = 1.0 / frame.camera.w;
+    let radius = sqrt(max(2.0 - 2.0 * disc_cosine, 0.0));
+    let pixel = 1.0 / frame.focal_length_pixels;
     return 1.0 - smoothstep(radius - pixel, radius + pixel, angle);
 }
 
@@ -37,13 +40,9 @@ fn unit(h: u32) -> f32 {
     return f32(h >> 8u) / 16777216.0;
 }
 
-// Illuminance of a star of magnitude 0 in lux [Allen 1976].
-const LUX_OF_MAGNITUDE_0: f32 = 2.54e-6;
-
 // Radiance of the procedural star field, exposed: one star at most in each cell of a cube grid.
 fn stars(direction: vec3<f32>) -> vec3<f32> {
-    let d = light.star_frame[0].xyz * direction.x + light.star_frame[1].xyz * direction.y
-        + light.star_frame[2].xyz * direction.z;
+    let d = light.star_frame[0] * direction.x + light.star_frame[1] * direction.y + light.star_frame[2] * direction.z;
     let a = abs(d);
     var face = 0u;
     var st = vec2(0.0);
@@ -57,12 +56,12 @@ fn stars(direction: vec3<f32>) -> vec3<f32> {
         face = select(5u, 4u, d.z > 0.0);
         st = d.xy / a.z;
     }
-    let n = light.stars.x;
-    let place = clamp((st * 0.5 + 0.5) * n, vec2(0.0), vec2(n - 0.001));
-    let cell = vec2<u32>(place);
+    let n = light.star_cells;
+    let position = clamp((st * 0.5 + 0.5) * n, vec2(0.0), vec2(n - 0.001));
+    let cell = vec2<u32>(position);
     let edge = u32(n);
-    var h = pcg(((face * edge + cell.y) * edge + cell.x) ^ u32(light.stars.y));
-    if unit(h) >= light.stars.z {
+    var h = pcg(((face * edge + cell.y) * edge + cell.x) ^ light.star_seed);
+    if unit(h) >= light.star_density {
         return vec3(0.0);
     }
     h = pcg(h);
@@ -74,10 +73,10 @@ fn stars(direction: vec3<f32>) -> vec3<f32> {
     h = pcg(h);
     let warm = mix(vec3(1.15, 0.98, 0.80), vec3(0.85, 0.97, 1.25), unit(h));
     // Angle per cell at the face's middle; a star is as large as a pixel.
-    let offset = (place - floor(place) - vec2(x, y)) * (2.0 / n);
-    let blur = max(0.8 / frame.camera.w, 0.0006);
+    let offset = (position - floor(position) - vec2(x, y)) * (2.0 / n);
+    let blur = max(0.8 / frame.focal_length_pixels, 0.0006);
     let radiance = LUX_OF_MAGNITUDE_0 * exp2(-1.3287712 * magnitude) / (3.14159 * blur * blur);
-    return warm * radiance * exp(-dot(offset, offset) / (blur * blur)) * light.sky_frame.z;
+    return warm * radiance * exp(-dot(offset, offset) / (blur * blur)) * light.exposure;
 }
 
 @fragment
@@ -86,9 +85,9 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let direction = normalize(far.xyz / far.w);
     var color = sky_radiance(direction);
     let above = smoothstep(-0.004, 0.004, direction.y);
-    color += disc(direction, light.sun_direction) * light.sun_radiance.rgb * above;
-    let moon = disc(direction, light.moon_direction);
-    color += moon * light.moon_radiance.rgb * above;
+    color += disc(direction, light.sun_direction, light.sun_disc_cosine) * light.sun_radiance * above;
+    let moon = disc(direction, light.moon_direction, light.moon_disc_cosine);
+    color += moon * light.moon_radiance * above;
     color += stars(direction) * above * (1.0 - moon) * smoothstep(0.0, 0.25, direction.y);
-    return vec4(night_vision(min(color, vec3(6.0e4))), 1.0);
+    return finish_sky(min(color, vec3(6.0e4)));
 }

@@ -4,8 +4,8 @@
 struct CascadeView {
     // Metres relative to the box's centre to the map's clip space, reversed depth.
     clip_from_anchor: mat4x4<f32>,
-    // To the light.
-    direction: vec4<f32>,
+    // Unit vector to the light.
+    direction: vec3<f32>,
 }
 
 @group(0) @binding(0) var<uniform> cascade: CascadeView;

@@ -1,9 +1,10 @@
-// Depth from the key light: far trees as one upright picture that turns its face to the light's azimuth, so that the
-// shadow's area does not depend on it, and the level picture for a high light.
-#import canopy::instance::{trees, visible, variants, unpack_tree, turn}
+// Depth from the key light: far trees as one upright texture that faces the light's azimuth, so that the
+// shadow's area does not depend on it, and the level one for a high light.
+#import canopy::constants::CASTER_VERTICES
+#import canopy::instance::{trees, visible, variants, unpack_tree, rotate, rotated_vertex_position}
 #import canopy::caster::{cascade, clamp_caster}
 
-@group(2) @binding(0) var color_pictures: texture_2d_array<f32>;
+@group(2) @binding(0) var color_textures: texture_2d_array<f32>;
 
 struct Varying {
     @builtin(position) clip: vec4<f32>,
@@ -11,41 +12,39 @@ struct Varying {
     @location(1) @interpolate(flat) layer: u32,
 }
 
-const VERTICES_A_TREE: u32 = 12u;
-
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     var corners = array<vec2<f32>, 6>(
         vec2(-1.0, -1.0), vec2(1.0, -1.0), vec2(1.0, 1.0), vec2(-1.0, -1.0), vec2(1.0, 1.0), vec2(-1.0, 1.0),
     );
-    let tree = unpack_tree(trees[visible[index / VERTICES_A_TREE]]);
-    let upright = (index % VERTICES_A_TREE) < 6u;
+    let tree = unpack_tree(trees[visible[index / CASTER_VERTICES]]);
+    let upright = (index % CASTER_VERTICES) < 6u;
     let corner = corners[index % 6u];
     let plane_index = select(2u, 0u, upright);
     let plane = variants[tree.variant].planes[plane_index];
-    var u = turn(plane.u.xyz, tree.yaw);
-    let v = turn(plane.v.xyz, tree.yaw);
-    let center = turn(plane.center.xyz, tree.yaw);
+    var u = rotate(plane.u.xyz, tree.yaw);
+    let v = rotate(plane.v.xyz, tree.yaw);
+    let center = rotate(plane.center.xyz, tree.yaw);
     if upright {
-        // Face the light's azimuth about the crown's axis, so that both pictures shade the same place.
+        // Face the light's azimuth about the crown's axis, so that both textures shade the same spot.
         let across = cascade.direction.zx * vec2(1.0, -1.0);
         let axis = across / max(length(across), 1e-6);
         u = vec3(axis.x, 0.0, axis.y) * length(plane.u.xyz);
     }
     var out: Varying;
-    out.clip = clamp_caster(tree.position + (center + corner.x * u + corner.y * v) * tree.scale);
+    out.clip = clamp_caster(rotated_vertex_position(tree, center + corner.x * u + corner.y * v).relative);
     out.uv = vec2(0.5 + 0.5 * corner.x, 0.5 - 0.5 * corner.y);
-    out.layer = u32(variants[tree.variant].size.z) + plane_index;
+    out.layer = variants[tree.variant].first_layer + plane_index;
     return out;
 }
 
 // One texel, as in model.wgsl, but of a level that is twice as fine: a cross has few texels, and their sum must hold.
 fn alpha(uv: vec2<f32>, layer: u32) -> f32 {
-    let size = vec2<f32>(textureDimensions(color_pictures));
+    let size = vec2<f32>(textureDimensions(color_textures));
     let texels = max(fwidth(uv.x) * size.x, fwidth(uv.y) * size.y);
-    let level = clamp(i32(log2(max(0.5 * texels, 1.0))), 0, i32(textureNumLevels(color_pictures)) - 1);
-    let place = clamp(uv, vec2(0.0), vec2(0.9999)) * vec2<f32>(textureDimensions(color_pictures, level));
-    return textureLoad(color_pictures, vec2<i32>(place), i32(layer), level).a;
+    let level = clamp(i32(log2(max(0.5 * texels, 1.0))), 0, i32(textureNumLevels(color_textures)) - 1);
+    let position = clamp(uv, vec2(0.0), vec2(0.9999)) * vec2<f32>(textureDimensions(color_textures, level));
+    return textureLoad(color_textures, vec2<i32>(position), i32(layer), level).a;
 }
 
 @fragment

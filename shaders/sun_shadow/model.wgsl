@@ -1,5 +1,5 @@
-// Depth from the key light: the shadow proxies of near trees (src/bake/shadow_proxy.rs).
-#import canopy::instance::{trees, visible, unpack_tree, turn}
+// Depth from the key light: the shadow proxies of near trees (src/bake/levels/shadow_proxy.rs).
+#import canopy::instance::{trees, visible, unpack_tree, plant_vertex_position}
 #import canopy::caster::{cascade, clamp_caster}
 
 @group(2) @binding(0) var color_texture: texture_2d<f32>;
@@ -17,7 +17,7 @@ fn vertex(
 ) -> Varying {
     let tree = unpack_tree(trees[visible[index]]);
     var out: Varying;
-    out.clip = clamp_caster(tree.position + turn(position, tree.yaw) * tree.scale);
+    out.clip = clamp_caster(plant_vertex_position(tree, position).relative);
     out.uv = uv;
     return out;
 }
@@ -28,8 +28,8 @@ fn alpha(uv: vec2<f32>) -> f32 {
     let size = vec2<f32>(textureDimensions(color_texture));
     let texels = max(fwidth(uv.x) * size.x, fwidth(uv.y) * size.y);
     let level = clamp(i32(log2(max(texels, 1.0))), 0, i32(textureNumLevels(color_texture)) - 1);
-    let place = fract(uv) * vec2<f32>(textureDimensions(color_texture, level));
-    return textureLoad(color_texture, vec2<i32>(place), level).a;
+    let position = fract(uv) * vec2<f32>(textureDimensions(color_texture, level));
+    return textureLoad(color_texture, vec2<i32>(position), level).a;
 }
 
 @fragment

@@ -1,9 +1,10 @@
 // The ground: tiles that morph into each other (src/terrain/tiles), coloured by slope, height, canopy cover and noise.
+#import canopy::constants::TILE_SIDE
 #import canopy::frame::{frame, light, shadow}
 #import canopy::lighting::{Surface, shade, even_sky}
-#import canopy::sky::{apply_fog, night_vision}
+#import canopy::output::finish
 #import canopy::stand::ground_light
-#import canopy::sun_visibility::{ground_map, terrain_visibility, cascaded_visibility}
+#import canopy::sun_visibility::{sample_ground, terrain_visibility, cascaded_visibility}
 
 struct TileVertex {
     // Metres above the datum: own, and in the next coarser mesh.
@@ -32,8 +33,6 @@ struct Tile {
 @group(1) @binding(2) var noise_texture: texture_2d<f32>;
 @group(1) @binding(3) var noise_sampler: sampler;
 
-const SIDE: u32 = 33u;
-
 struct Varying {
     @builtin(position) clip: vec4<f32>,
     @location(0) relative: vec3<f32>,
@@ -53,7 +52,7 @@ fn decode_octahedral(packed: u32) -> vec3<f32> {
 fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: u32) -> Varying {
     let tile = tiles[instance];
     let v = vertices[tile.first + index];
-    let grid = vec2(f32(index % SIDE), f32(index / SIDE));
+    let grid = vec2(f32(index % TILE_SIDE), f32(index / TILE_SIDE));
     let xz = tile.origin + grid * tile.spacing;
     let distance = max(length(xz), tile.clearance);
     let k = clamp((distance - tile.morph_start) / (tile.morph_end - tile.morph_start), 0.0, 1.0);
@@ -65,14 +64,14 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     return out;
 }
 
-// Noise of a period that divides NOISE_PERIOD: r smooth, g fine, b patchy, a ridged; each 0..1 around 0.5.
+// Noise of a period that divides the 1024 metres of `frame.camera`: r smooth, g fine, b patchy, a ridged; each 0..1 around 0.5.
 fn noise(xz: vec2<f32>, period: f32) -> vec4<f32> {
     return textureSample(noise_texture, noise_sampler, xz / period);
 }
 
-// The same, turned by the angle of a 3-4-5 triangle: periods of 1024 * 3 / (5 k) and 1024 * 4 / (5 k) metres keep it
+// The same, rotated by the angle of a 3-4-5 triangle: periods of 1024 * 3 / (5 k) and 1024 * 4 / (5 k) metres keep it
 // seamless. Mixed with the other it hides the repetition of both.
-fn noise_turned(xz: vec2<f32>, period: f32) -> vec4<f32> {
+fn rotated_noise(xz: vec2<f32>, period: f32) -> vec4<f32> {
     return noise(vec2(0.6 * xz.x - 0.8 * xz.y, 0.8 * xz.x + 0.6 * xz.y), period);
 }
 
@@ -82,16 +81,16 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let xz = frame.camera.xz + in.relative.xz;
     let distance = length(in.relative);
     let wide = noise(xz, 512.0);
-    let middle = 0.5 + 0.72 * (noise(xz, 64.0) + noise_turned(xz, 51.2) - 1.0);
-    let fine = 0.5 + 0.72 * (noise(xz, 8.0) + noise_turned(xz, 12.8) - 1.0);
-    let grain = 0.5 + 0.72 * (noise(xz, 2.0) + noise_turned(xz, 3.2) - 1.0);
+    let middle = 0.5 + 0.72 * (noise(xz, 64.0) + rotated_noise(xz, 51.2) - 1.0);
+    let fine = 0.5 + 0.72 * (noise(xz, 8.0) + rotated_noise(xz, 12.8) - 1.0);
+    let grain = 0.5 + 0.72 * (noise(xz, 2.0) + rotated_noise(xz, 3.2) - 1.0);
 
-    let map = ground_map(in.relative);
+    let ground = sample_ground(in.relative);
     let uv = (in.relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;
     let outside = max(max(-uv.x, uv.x - 1.0), max(-uv.y, uv.y - 1.0)) > 0.0;
-    var cover = map.y;
+    var cover = ground.cover;
     if outside {
-        cover = frame.flags.z;
+        cover = frame.mean_cover;
     }
 
     // Detail in the normal, as far as it can be seen.
@@ -124,20 +123,20 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.albedo = albedo;
     surface.normal = normal;
     surface.transmission = vec3(0.0);
-    surface.ambient = 0.8 + 0.2 * grain.r;
-    var shade_cover = map.z;
+    surface.ambient_visibility = 0.8 + 0.2 * grain.r;
+    var shade_cover = ground.surrounding_cover;
     if outside {
-        surface.ambient = 0.85;
+        surface.ambient_visibility = 0.85;
         shade_cover = 0.0;
     }
 
     let stand = ground_light(shade_cover);
-    var visibility = select(terrain_visibility(map, 0.0), 1.0, outside);
+    var visibility = select(terrain_visibility(ground, 0.0), 1.0, outside);
     if visibility > 0.0 {
-        let near = cascaded_visibility(in.relative, smooth_normal, 1.0, in.clip.xy);
+        let cascades = cascaded_visibility(in.relative, smooth_normal, 1.0, in.clip.xy);
         // Beyond the maps: the share of light that finds its way between the crowns.
-        visibility *= mix(stand.beam, near.x, near.y);
+        visibility *= mix(stand.key_transmittance, cascades.visibility, cascades.weight);
     }
     let color = shade(surface, visibility, even_sky(surface, stand));
-    return vec4(night_vision(apply_fog(color, in.relative)), 1.0);
+    return finish(in.relative, color, 1.0);
 }

@@ -4,7 +4,7 @@ use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
     sync::{Arc, Mutex},
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 use bevy::{
@@ -19,12 +19,15 @@ use bevy::{
         RenderApp, RenderPlugin,
         pipelined_rendering::PipelinedRenderingPlugin,
         render_asset::RenderAssets,
-        render_resource::{Extent3d, PollType, TextureDimension, TextureFormat, TextureUsages},
+        render_resource::{
+            CachedPipelineState, Extent3d, PipelineCache, PollType, TextureDimension, TextureFormat, TextureUsages,
+        },
         renderer::{RenderDevice, RenderQueue},
         settings::{RenderCreation, WgpuSettings},
         texture::GpuImage,
         view::Msaa,
     },
+    shader::ShaderCacheError,
     window::{ExitCondition, WindowPlugin},
     winit::WinitPlugin,
 };
@@ -34,13 +37,14 @@ use super::{
     RenderOptions, RenderPlan, RenderReport, adapter, camera, error::AppError, notes::notes, picture::Picture,
 };
 use crate::{
-    CanopyPlugins,
     assets::Stage,
+    plugin::CanopyPlugins,
     progress::Progress,
     render::{
         components::CanopyCamera,
         readback::read_rgb,
         report::{FrameReport, PassOutcome},
+        shaders::CanopyShaders,
     },
     scene::Viewpoint,
 };
@@ -102,6 +106,9 @@ fn check_writable(plan: &RenderPlan) -> Result<(), AppError> {
     }
     Ok(())
 }
+
+/// How long shaders and pipelines may take; far more than they need on the slowest machine.
+const LONGEST_WAIT: Duration = Duration::from_secs(120);
 
 /// A renderer without a window, driven frame by frame.
 pub struct Renderer {
@@ -211,14 +218,16 @@ impl Renderer {
     /// [`AppError::Render`] with what the device says of this very frame.
     pub fn update(&mut self) -> Result<(), AppError> {
         if !self.warm {
-            // The first update brings meshes, textures and shaders to the device, and draws nothing yet.
-            self.app.update();
+            self.warm_up()?;
             self.warm = true;
-            if let Some(mut camera) = self.app.world_mut().get_mut::<Camera>(self.camera) {
-                camera.is_active = true;
-            }
         }
         self.app.update();
+        // A frame in which a pass waited for its pipeline is drawn again.
+        let started = Instant::now();
+        while !self.pipelines_are_ready()? {
+            patience(started, "the pipelines")?;
+            self.app.update();
+        }
         let device = self.app.world().resource::<RenderDevice>();
         let waited = device.wgpu_device().poll(PollType::Wait { submission_index: None, timeout: None });
         // What the device reported says more than that it could not be waited for.
@@ -230,6 +239,46 @@ impl Renderer {
             }
             _ => Ok(()),
         }
+    }
+
+    /// The first updates bring meshes, textures and shaders to the device, and draw nothing yet.
+    fn warm_up(&mut self) -> Result<(), AppError> {
+        let started = Instant::now();
+        loop {
+            self.app.update();
+            let world = self.app.world();
+            let (Some(shaders), Some(server)) = (world.get_resource::<CanopyShaders>(), world.get_resource()) else {
+                return Err(AppError::Render("there is no renderer (see above)".to_owned()));
+            };
+            if shaders.loaded(server).map_err(AppError::Render)? {
+                break;
+            }
+            patience(started, "the shaders")?;
+            std::thread::yield_now();
+        }
+        if let Some(mut camera) = self.app.world_mut().get_mut::<Camera>(self.camera) {
+            camera.is_active = true;
+        }
+        Ok(())
+    }
+
+    /// Whether the last frame had every pipeline that it asked for.
+    fn pipelines_are_ready(&self) -> Result<bool, AppError> {
+        let cache = self.app.sub_app(RenderApp).world().resource::<PipelineCache>();
+        let mut ready = true;
+        for pipeline in cache.pipelines() {
+            match &pipeline.state {
+                CachedPipelineState::Ok(_) => {}
+                CachedPipelineState::Queued | CachedPipelineState::Creating(_) => ready = false,
+                CachedPipelineState::Err(
+                    ShaderCacheError::ShaderNotLoaded(_) | ShaderCacheError::ShaderImportNotYetAvailable,
+                ) => ready = false,
+                CachedPipelineState::Err(error) => {
+                    return Err(AppError::Render(format!("a shader is broken: {error}")));
+                }
+            }
+        }
+        Ok(ready)
     }
 
     /// Draws `stage` from `view` at `instant`.
@@ -272,6 +321,14 @@ impl Renderer {
         let (width, height) = self.size;
         Ok(Picture { width, height, pixels })
     }
+}
+
+/// Fails where what began at `started` has taken too long.
+fn patience(started: Instant, what: &str) -> Result<(), AppError> {
+    if started.elapsed() < LONGEST_WAIT {
+        return Ok(());
+    }
+    Err(AppError::Render(format!("{what} were not ready within {} s", LONGEST_WAIT.as_secs())))
 }
 
 /// Where the device's errors go from now on, the first of them.

@@ -1,7 +1,7 @@
 //! Texts of the command line to values.
 
 use crate::{
-    bake::{implicit::ImplicitSettings, lighting::SunLight},
+    bake::lighting::{SunLight, implicit::ImplicitSettings},
     scene::{Lighting, Pose, Transfer},
 };
 

@@ -4,7 +4,7 @@ use std::{ops::Range, path::PathBuf};
 
 use super::StageError;
 use crate::{
-    bake::{BakeSettings, billboard::CrossSettings, lighting::LightingSettings},
+    bake::{BakeSettings, levels::cross::CrossSettings, lighting::LightingSettings},
     plant::{
         Gloss, Plant,
         gltf::{GltfOptions, load_plant},

@@ -13,13 +13,13 @@ use super::{StageError, ground, plants, together, trees};
 use crate::{
     bake::{BakeSource, BakedPlant, bake_plant, cache::Cache, lighting::SunLight},
     light::sun::Observer,
-    lod::FadeBand,
+    lod::{FadeBand, Levels},
     progress::Progress,
     render::{
         components::{Forest, Ground, SunShadowSettings},
         daylight::SkySettings,
     },
-    scatter::{CoverMap, PackedStand, PackedTree, VariantBounds, cover_map, packed::DEFAULT_CELL_SIZE},
+    scatter::{CoverMap, PackedStand, PackedTree, PlantSize, cover_map, packed::DEFAULT_CELL_SIZE},
     scene::{self, Lighting, Quality, Scene},
     terrain::Terrain,
 };
@@ -29,7 +29,7 @@ const COVER_TEXEL: f64 = 8.0;
 /// Share of a plant's half width, the greater of its two, that counts as its crown's radius.
 const CROWN_SHARE: f32 = 0.8;
 /// Extent of a plant without any surface, metres.
-const NO_PLANT: VariantBounds = VariantBounds { radius: 0.1, height: 0.1 };
+const NO_PLANT: PlantSize = PlantSize { radius: 0.1, height: 0.1 };
 
 /// A scene, built.
 pub struct Stage {
@@ -91,16 +91,17 @@ impl Stage {
 
         let started = Instant::now();
         progress.begin("Trees", 0);
-        let mut stand = trees::build_stand(scene, &species, &plants, &terrain, progress)?;
+        let sizes: Vec<PlantSize> = plants.iter().map(BakedPlant::size).collect();
+        let mut stand = trees::build_stand(scene, &species, &sizes, &terrain, progress)?;
         progress.end();
         check_wanted(progress)?;
         let plants = together::light_together(scene, &mut species, plants, &mut stand, progress)?;
-        let bounds: Vec<VariantBounds> = plants.iter().map(variant_bounds).collect();
-        let packed = PackedStand::new(&stand, DEFAULT_CELL_SIZE, &bounds)?;
+        let sizes: Vec<PlantSize> = plants.iter().map(BakedPlant::size).collect();
+        let packed = PackedStand::new(&stand, DEFAULT_CELL_SIZE, &sizes)?;
         let cover = if stand.trees.is_empty() {
             None
         } else {
-            let crowns: Vec<VariantBounds> = plants.iter().map(crown).collect();
+            let crowns: Vec<PlantSize> = plants.iter().map(crown).collect();
             Some(Arc::new(cover_map(&packed, &crowns, COVER_TEXEL, None)?.smoothed()))
         };
         progress.note(&format!("{} trees: {:.2} s", stand.trees.len(), started.elapsed().as_secs_f64()));
@@ -144,7 +145,7 @@ impl Stage {
             plants: self.plants.clone(),
             suns: self.suns.clone(),
             origin: DVec3::ZERO,
-            fade: FadeBand::new(quality.near_distance as f32, quality.fade_band as f32),
+            levels: Levels::model_and_cross(FadeBand::new(quality.near_distance as f32, quality.fade_band as f32)),
             view_distance: quality.view_distance as f32,
         })
     }
@@ -161,7 +162,7 @@ impl Stage {
 
     /// Shadows as the scene's quality asks for them.
     pub fn shadow(&self) -> SunShadowSettings {
-        SunShadowSettings::from(&self.scene.quality)
+        shadow(&self.scene.quality)
     }
 
     /// Sun, moon and air at an instant.
@@ -173,6 +174,18 @@ impl Stage {
             visibility_km: self.scene.place.visibility * 1e-3,
             ..SkySettings::default()
         }
+    }
+}
+
+/// Shadows as `quality` asks for them.
+fn shadow(quality: &Quality) -> SunShadowSettings {
+    SunShadowSettings {
+        map_size: quality.shadow_map_size,
+        cascades: quality.cascades as usize,
+        distance: quality.shadow_distance,
+        // A billboard's level plane would draw a line across the crowns of full models.
+        proxy_distance: quality.near_distance + quality.fade_band,
+        ..SunShadowSettings::default()
     }
 }
 
@@ -196,21 +209,13 @@ pub(crate) fn observer(scene: &Scene, terrain: &Terrain) -> Result<Observer, Sta
     Ok(Observer::new(latitude, longitude, height)?)
 }
 
-/// What holds the plant whatever its yaw.
-fn variant_bounds(plant: &BakedPlant) -> VariantBounds {
-    let plant = &plant.plant;
-    plant
-        .bounds()
-        .map_or(NO_PLANT, |_| VariantBounds { radius: plant.reach().max(0.01), height: plant.height().max(0.01) })
-}
-
 /// The disc of ground that the plant's crown covers, which is smaller than what holds every twig of it.
-fn crown(plant: &BakedPlant) -> VariantBounds {
+fn crown(plant: &BakedPlant) -> PlantSize {
     let (half_width, height) = plant.plant.bounds().map_or((NO_PLANT.radius, NO_PLANT.height), |bounds| {
         let size = bounds.size();
         ((0.5 * size.x.max(size.z)).max(0.01), bounds.max.y.max(0.01))
     });
-    VariantBounds { radius: half_width * CROWN_SHARE, height }
+    PlantSize { radius: half_width * CROWN_SHARE, height }
 }
 
 fn bake(
@@ -254,4 +259,14 @@ fn bake(
     let seconds = started.elapsed().as_secs_f64();
     progress.note(&format!("{} plants, {fresh} baked anew: {seconds:.2} s", baked.len()));
     Ok(baked)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shadows_and_the_quality_of_a_scene_have_the_same_defaults() {
+        assert_eq!(shadow(&Quality::default()), SunShadowSettings::default());
+    }
 }

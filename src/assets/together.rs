@@ -13,9 +13,11 @@ use super::{StageError, plants::PlantPlan, plants::bake_settings};
 use crate::{
     bake::{
         BakedPlant,
-        billboard::bake_cross,
-        implicit::{StandPlant, bake_implicit_stand},
-        lighting::{BakedLighting, ExpressiveLighting, LightingSettings},
+        levels::cross::bake_cross,
+        lighting::{
+            BakedLighting, ExpressiveLighting, LightingSettings,
+            implicit::{StandPlant, bake_implicit_stand},
+        },
     },
     progress::Progress,
     scatter::{Stand, packed::MAX_VARIANTS},

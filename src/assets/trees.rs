@@ -4,11 +4,10 @@ use glam::{DVec2, DVec3};
 
 use super::{StageError, plants::PlantPlan};
 use crate::{
-    bake::BakedPlant,
     progress::Progress,
     scatter::{
-        Allometry, Area, Coordinates, Ground, Inventory, InventoryOptions, InventorySpecies, PlacementRules, SizeRule,
-        SpeciesRule, Stand, place, read_inventory, stand_from_inventory,
+        Allometry, Area, Coordinates, Ground, Inventory, InventoryOptions, InventorySpecies, PlacementRules, PlantSize,
+        SizeRule, SpeciesRule, Stand, place, read_inventory, stand_from_inventory,
     },
     scene::{Anchor, InventoryTrees, ScatteredTrees, Scene, Species, Trees},
     terrain::{CoordinateSystem, GeoReference, Terrain},
@@ -29,29 +28,26 @@ impl Ground for Terrain {
     }
 }
 
-/// Builds the stand of `scene` on `terrain`.
+/// Builds the stand of `scene` on `terrain`, from plants of these sizes, by variant.
 ///
 /// # Errors
 /// [`StageError`] for rules that cannot be met and inventories that cannot be read.
 pub fn build_stand(
     scene: &Scene,
     plan: &PlantPlan,
-    plants: &[BakedPlant],
+    sizes: &[PlantSize],
     terrain: &Terrain,
     progress: &mut dyn Progress,
 ) -> Result<Stand, StageError> {
     match &scene.trees {
         Trees::None => Ok(Stand::default()),
-        Trees::Scattered(rules) => scatter(scene, rules, plan, plants, terrain, progress),
-        Trees::Inventory(inventory) => from_inventory(scene, inventory, plan, plants, terrain, progress),
+        Trees::Scattered(rules) => scatter(scene, rules, plan, sizes, terrain, progress),
+        Trees::Inventory(inventory) => from_inventory(scene, inventory, plan, sizes, terrain, progress),
     }
 }
 
-fn plant_heights(variants: &std::ops::Range<u16>, plants: &[BakedPlant]) -> Vec<f32> {
-    variants
-        .clone()
-        .map(|variant| plants.get(usize::from(variant)).map_or(1.0, |plant| plant.plant.height()).max(0.01))
-        .collect()
+fn plant_heights(variants: &std::ops::Range<u16>, sizes: &[PlantSize]) -> Vec<f32> {
+    variants.clone().map(|variant| sizes.get(usize::from(variant)).map_or(1.0, |size| size.height)).collect()
 }
 
 /// Trunk radius at scale 1, where a species states it for a tree of mean height.
@@ -64,7 +60,7 @@ fn scatter(
     scene: &Scene,
     trees: &ScatteredTrees,
     plan: &PlantPlan,
-    plants: &[BakedPlant],
+    sizes: &[PlantSize],
     terrain: &Terrain,
     progress: &mut dyn Progress,
 ) -> Result<Stand, StageError> {
@@ -75,7 +71,7 @@ fn scatter(
         .iter()
         .zip(&plan.variants)
         .map(|(species, variants)| {
-            let heights = plant_heights(variants, plants);
+            let heights = plant_heights(variants, sizes);
             let (low, high) = (species.height.0 as f32, species.height.1 as f32);
             SpeciesRule {
                 weight: species.weight,
@@ -124,13 +120,13 @@ fn from_inventory(
     scene: &Scene,
     trees: &InventoryTrees,
     plan: &PlantPlan,
-    plants: &[BakedPlant],
+    sizes: &[PlantSize],
     terrain: &Terrain,
     progress: &mut dyn Progress,
 ) -> Result<Stand, StageError> {
     let options = InventoryOptions { dbh_unit: trees.dbh_unit, height_unit: trees.height_unit };
     let inventory = read_inventory(&trees.path, options)?;
-    let table = species_table(scene, trees, plan, plants);
+    let table = species_table(scene, trees, plan, sizes);
     let to_local = placement(trees, &inventory, terrain)?;
     let result = stand_from_inventory(&inventory.rows, to_local, terrain, &table, scene.seed)?;
     for line in result.warnings.to_string().lines() {
@@ -174,10 +170,10 @@ fn species_table(
     scene: &Scene,
     trees: &InventoryTrees,
     plan: &PlantPlan,
-    plants: &[BakedPlant],
+    sizes: &[PlantSize],
 ) -> Vec<InventorySpecies> {
     let entry = |name: &str, species: &Species, variants: &std::ops::Range<u16>| {
-        let heights = plant_heights(variants, plants);
+        let heights = plant_heights(variants, sizes);
         InventorySpecies {
             name: name.to_owned(),
             variants: variants.clone(),

@@ -2,73 +2,32 @@
 //!
 //! | module | makes | after |
 //! |---|---|---|
-//! | [`lighting`] | which light a plant gets, and what is baked for it | |
-//! | [`billboard`] | crossed billboards with colour, normal, k_a | [Franzke 2005, 4.3] |
-//! | [`implicit`] | normals and k_a from the crown's implicit surface, and that surface | [Luft 2007] |
-//! | [`shadow_proxy`] | a lighter model with the same projected area | [Cook et al. 2007] |
-//! | [`transfer`] | radiance transfer of the sky a vertex and side | [Franzke 2005, 4.2.3] |
-//! | [`rasterize`] | which triangle each sample of a picture sees | |
+//! | [`lighting`] | which light a plant gets, and what is baked for it: | |
+//! | [`lighting::implicit`] | normals and k_a from the crown's implicit surface, and that surface | [Luft 2007] |
+//! | [`lighting::transfer`] | radiance transfer of the sky a vertex and side | [Franzke 2005, 4.2.3] |
+//! | [`levels`] | what a plant is drawn as: | |
+//! | [`levels::cross`] | crossed billboards with colour, normal, k_a | [Franzke 2005, 4.3] |
+//! | [`levels::shadow_proxy`] | a lighter model with the same projected area | [Cook et al. 2007] |
 //! | [`cache`] | files on disk, found by the content they were made from | |
 //!
 //! [`bake_plant`] does all of it. Its result depends on the plant and the settings alone, bit for bit, not on the
 //! number of threads.
 
-pub mod billboard;
+mod baked;
 pub mod cache;
-pub(crate) mod geometry;
-pub mod implicit;
+mod error;
+pub mod levels;
 pub mod lighting;
-pub mod rasterize;
-pub mod shadow_proxy;
-pub(crate) mod surface;
-pub mod transfer;
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::plant::{Plant, PlantMesh};
-use billboard::{Cross, CrossSettings, bake_cross};
+use crate::plant::Plant;
 use cache::{Cache, CacheKey};
-use lighting::{BakedLighting, LightingSettings};
+use levels::{cross::bake_cross, shadow_proxy::shadow_proxy};
+use lighting::BakedLighting;
 
-/// A plant with everything that is derived from it once and kept in the cache. What is made apart is shared apart: a copy
-/// is cheap, and who draws plants sees by the pointers what of one has changed.
-#[derive(Clone, Debug)]
-pub struct BakedPlant {
-    /// The full model.
-    pub plant: Arc<Plant>,
-    /// What lights the foliage.
-    pub lighting: Arc<BakedLighting>,
-    /// A lighter model (parts in the plant's order) with the same projected area, which casts the near shadow.
-    pub shadow_proxy: Arc<Vec<PlantMesh>>,
-    /// Crossed billboards.
-    pub cross: Arc<Cross>,
-}
-
-/// How a plant is baked. Values out of range are moved into it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BakeSettings {
-    /// Which light the foliage gets.
-    pub lighting: LightingSettings,
-    /// Crossed billboards.
-    pub cross: CrossSettings,
-    /// Triangles of the shadow proxy as a share of the plant's, 0..=1. Smaller: faster and coarser shadows.
-    pub shadow_share: f32,
-}
-
-impl Default for BakeSettings {
-    fn default() -> Self {
-        Self { lighting: LightingSettings::default(), cross: CrossSettings::default(), shadow_share: 0.2 }
-    }
-}
-
-impl BakeSettings {
-    /// The settings with every value moved into its range; what is not finite becomes the default.
-    pub fn in_range(self) -> Self {
-        let share = if self.shadow_share.is_finite() { self.shadow_share } else { Self::default().shadow_share };
-        Self { lighting: self.lighting.in_range(), cross: self.cross.in_range(), shadow_share: share.clamp(0.0, 1.0) }
-    }
-}
+pub use baked::{BakeSettings, BakedPlant, plant_size};
+pub use error::BakeError;
 
 /// Where a baked plant came from.
 #[derive(Debug)]
@@ -79,35 +38,6 @@ pub enum BakeSource {
     Fresh {
         /// Why it could not be kept in the cache, if one was given. Worth a message, no reason to stop.
         warning: Option<BakeError>,
-    },
-}
-
-/// What can go wrong around a bake. The bakes themselves cannot fail.
-#[derive(Debug, thiserror::Error)]
-pub enum BakeError {
-    /// The cache folder is not there and cannot be made.
-    #[error(
-        "cannot create the cache folder {}: {source}; set CANOPY_CACHE to a folder that can be written, or bake \
-         without a cache",
-        path.display()
-    )]
-    CacheFolder {
-        /// The folder.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// A baked plant could not be written into the cache.
-    #[error(
-        "cannot write {} into the cache: {source}; the result is good but will be computed again next time: free \
-         space there or set CANOPY_CACHE to another folder",
-        path.display()
-    )]
-    CacheWrite {
-        /// The file.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
     },
 }
 
@@ -129,6 +59,6 @@ fn bake_fresh(plant: Arc<Plant>, settings: &BakeSettings) -> BakedPlant {
     let target = (triangles as f64 * f64::from(settings.shadow_share)).round() as usize;
     let lighting = Arc::new(BakedLighting::bake(&plant, &settings.lighting));
     let cross = Arc::new(bake_cross(&plant, &lighting, &settings.cross));
-    let shadow_proxy = Arc::new(shadow_proxy::shadow_proxy(&plant, target));
+    let shadow_proxy = Arc::new(shadow_proxy(&plant, target));
     BakedPlant { plant, lighting, shadow_proxy, cross }
 }

@@ -15,7 +15,6 @@ mod error;
 pub mod exposure;
 pub mod moon;
 pub mod night;
-pub mod quadrature;
 pub mod sh;
 pub mod stand;
 mod state;

@@ -189,7 +189,7 @@ pub fn celestial_rotation(instant: DateTime<Utc>, observer: &Observer) -> Mat3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::light::atmosphere::LUMINANCE_WEIGHTS;
+    use crate::math::LUMINANCE_WEIGHTS;
 
     /// Meeus 1998, example 47.a: 1992 April 12, 0h TD.
     #[test]

@@ -38,9 +38,6 @@ impl Default for NightSky {
 }
 
 impl NightSky {
-    /// No light at all.
-    pub const DARK: Self = Self { airglow: Vec3::ZERO, starlight: Vec3::ZERO, zodiacal: Vec3::ZERO };
-
     /// Radiance in nits from the unit direction `view` at an observer at a height above the sea; below the
     /// horizon the ground, dimly lit by it, behind the horizon's haze. What the air scatters into the view is not
     /// integrated; to make up for it (Leinert et al. 1998, 2.2), extinction and slant are those of a zenith cosine
@@ -111,7 +108,7 @@ pub struct Star {
 /// Stars in the whole sky brighter than magnitude 6.5.
 const STARS: f32 = 9_000.0;
 /// Lux of a star of magnitude 0 (Allen 1976, section 10).
-const LUX_OF_MAGNITUDE_0: f32 = 2.54e-6;
+pub const LUX_OF_MAGNITUDE_0: f32 = 2.54e-6;
 
 impl StarField {
     /// The share of cells that hold a star, 0 to 1.

@@ -32,7 +32,7 @@ use std::sync::LazyLock;
 
 use glam::{DMat3, DVec3, Vec3};
 
-use super::quadrature::SphereQuadrature;
+use crate::math::SphereQuadrature;
 
 /// The largest number of bands the basis is defined for here: 36 coefficients, Franzke's largest set (2005, 4.2).
 pub const MAX_BANDS: usize = 6;

@@ -2,7 +2,7 @@
 
 use glam::{Mat3, Vec3};
 
-use super::atmosphere::{Atmosphere, SkyView, luminance};
+use super::atmosphere::{Atmosphere, SkyView};
 use super::error::{LightError, check_range};
 use super::exposure::{ExposureSettings, ScotopicTint, exposure_from_ev100};
 use super::moon::{MOON_ANGULAR_RADIUS, Moon};
@@ -10,6 +10,7 @@ use super::night::{NightSky, StarField};
 use super::sh::{self, Sh9Rgb};
 use super::sun::{SUN_ANGULAR_RADIUS, SunPosition, direction_from};
 use super::surroundings::{Surroundings, ground_radiance, sky_illuminance};
+use crate::math::{luminance, smoothstep};
 
 /// With the sun higher than this (sine of 5 degrees) moonlight is below 2e-4 of the daylight, and left out; it fades
 /// in below.
@@ -271,9 +272,4 @@ fn fog(atmosphere: &Atmosphere) -> FogParams {
         }
     }
     FogParams { extinction: atmosphere.extinction(0.0), scale_height_m: 0.5 * (low + high) }
-}
-
-fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
-    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
 }

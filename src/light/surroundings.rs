@@ -5,8 +5,8 @@ use std::f32::consts::PI;
 use glam::Vec3;
 
 use super::atmosphere::SkyView;
-use super::quadrature::SphereQuadrature;
 use super::sh;
+use crate::math::SphereQuadrature;
 
 /// Rings a hemisphere and azimuths with which the surroundings are projected onto spherical harmonics.
 const SH_RINGS: usize = 24;
@@ -30,7 +30,7 @@ impl Surroundings<'_> {
 
     /// Coefficients of [`Surroundings::radiance`] in the basis of [`sh`], `bands` bands (1 to [`sh::MAX_BANDS`],
     /// others are moved into that range), nits. Not windowed: what is read from them by a dot product with a transfer
-    /// ([`crate::bake::transfer`]) is clamped there.
+    /// ([`crate::bake::lighting::transfer`]) is clamped there.
     ///
     /// Whatever the yaw of a plant, these are computed once and turned by [`sh::rotate_y`], exactly, at any band.
     pub fn project(&self, bands: usize) -> Vec<Vec3> {

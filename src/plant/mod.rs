@@ -3,16 +3,20 @@
 //! A [`Plant`] comes from a glTF file ([`gltf`]) or is grown by rule ([`grow`]). It stands with its trunk's
 //! foot at the origin, Y up, in metres. Everything downstream (bakes, levels of detail, passes) reads this type.
 
+mod content;
+pub(crate) mod geometry;
 mod gloss;
 pub mod gltf;
 pub mod grow;
 mod optics;
+pub(crate) mod surface;
 pub mod texture;
 
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 use image::RgbaImage;
+use serde::{Deserialize, Serialize};
 
 pub use gloss::Gloss;
 pub use optics::LeafColors;
@@ -48,7 +52,7 @@ pub enum PartKind {
 
 /// An indexed triangle mesh. `positions`, `normals` and `uvs` have the same length;
 /// every index in `triangles` is below it; all values are finite and normals have unit length.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PlantMesh {
     /// Vertex positions in metres.
     pub positions: Vec<Vec3>,
@@ -61,6 +65,17 @@ pub struct PlantMesh {
 }
 
 impl PlantMesh {
+    /// Whether the mesh is what it promises, but for the length of its normals: lists of one length, indices below it, finite
+    /// values.
+    pub fn is_whole(&self) -> bool {
+        let vertices = self.positions.len();
+        self.normals.len() == vertices
+            && self.uvs.len() == vertices
+            && self.triangles.iter().flatten().all(|&corner| (corner as usize) < vertices)
+            && self.positions.iter().chain(&self.normals).all(|vector| vector.is_finite())
+            && self.uvs.iter().all(|uv| uv.is_finite())
+    }
+
     /// Area of one side of a triangle, square metres; 0 where it overflows or a corner is missing.
     pub fn area(&self, triangle: [u32; 3]) -> f32 {
         let [a, b, c] = triangle.map(|corner| self.positions.get(corner as usize).copied().unwrap_or(Vec3::NAN));

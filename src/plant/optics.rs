@@ -2,7 +2,8 @@
 
 use glam::{Vec2, Vec3};
 
-use super::{PartKind, Plant, PlantMaterial, texture::srgb_to_linear};
+use super::{PartKind, Plant, PlantMaterial};
+use crate::math::srgb_to_linear;
 
 /// Share of a crown's extents that counts as its width: single twigs reach farther.
 const CROWN_SHARE: f32 = 0.8;

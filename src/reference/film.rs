@@ -10,7 +10,7 @@ use super::error::ReferenceError;
 use super::fog::Fog;
 use super::path::PathTracer;
 use super::sampler::PathSampler;
-use crate::light::atmosphere::luminance;
+use crate::math::luminance;
 
 /// Pixels along a tile's side: what one task renders.
 const TILE: u32 = 16;

@@ -14,7 +14,7 @@ use super::checkpoint::write_whole;
 use super::error::ReferenceError;
 use super::film::Film;
 use crate::light::{LightState, ScotopicTint};
-use crate::plant::texture::linear_to_srgb;
+use crate::math::color::srgb8;
 
 /// A tone curve as a cube of colours over the logarithm of exposed radiance, as Bevy's `BlenderFilmic` is: the twin of
 /// `sample_blender_filmic_lut` in Bevy 0.19's `tonemapping_shared.wgsl`.
@@ -95,7 +95,7 @@ impl<'a> Development<'a> {
             let encoded = shown.max(Vec3::ZERO).map(|c| c.powf(1.0 / 2.2)) + (noise - 0.5) / 255.0;
             shown = encoded.max(Vec3::ZERO).map(|c| c.powf(2.2));
         }
-        shown.to_array().map(|c| (linear_to_srgb(c.clamp(0.0, 1.0)) * 255.0 + 0.5) as u8)
+        shown.to_array().map(srgb8)
     }
 }
 

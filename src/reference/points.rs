@@ -11,8 +11,7 @@ use super::error::ReferenceError;
 use super::path::PathTracer;
 use super::sampler::PathSampler;
 use super::scene::Normals;
-use crate::bake::geometry;
-use crate::plant::PartKind;
+use crate::plant::{PartKind, geometry};
 use crate::trace::Hit;
 
 /// A point of an instance's surface, in its plant's frame.

@@ -10,10 +10,7 @@
 
 use glam::Vec2;
 
-use crate::scatter::hash::mix64;
-
-/// 2⁶⁴ over the golden ratio, the increment of Weyl sequences.
-const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
+use crate::math::hash::{GOLDEN, mix64};
 
 /// The numbers of one sample of one pixel, drawn in order.
 #[derive(Clone, Debug)]

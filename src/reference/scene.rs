@@ -368,8 +368,7 @@ impl ReferenceScene {
     /// Everything that rays depend on, as bytes for a fingerprint.
     pub(crate) fn feed(&self, hasher: &mut blake3::Hasher) {
         for tracer in &self.tracers {
-            let key = crate::bake::cache::CacheKey::new(tracer.plant(), &crate::bake::BakeSettings::default());
-            hasher.update(key.to_hex().as_bytes());
+            tracer.plant().feed_baked_content(hasher);
             // What no bake reads.
             for part in &tracer.plant().parts {
                 hasher.update(&part.material.gloss.roughness.to_le_bytes());

@@ -11,7 +11,7 @@ use glam::{Vec2, Vec3};
 
 use super::error::ReferenceError;
 use crate::light::SkyView;
-use crate::light::atmosphere::luminance;
+use crate::math::luminance;
 
 /// Least share of the mean brightness that a cell is drawn with: what is dark between bright texels is still found.
 const LEAST: f64 = 0.05;

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3, Vec2, Vec3, Vec4};
 use image::RgbaImage;
 
+use crate::math::smoothstep;
 use crate::scatter::CoverMap;
 use crate::terrain::Terrain;
 use crate::terrain::ground_noise::{NOISE_SIDE, noise_image};
@@ -116,11 +117,6 @@ impl Soil {
 /// The place by which the second noise of a pair is read: turned by the angle of a 3-4-5 triangle.
 fn turn(xz: DVec2) -> DVec2 {
     DVec2::new(0.6 * xz.x - 0.8 * xz.y, 0.8 * xz.x + 0.6 * xz.y)
-}
-
-fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
-    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
 }
 
 #[cfg(test)]

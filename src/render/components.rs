@@ -13,16 +13,12 @@ use glam::DVec3;
 use crate::{
     bake::BakedPlant,
     light::LightState,
-    lod::FadeBand,
+    lod::Levels,
     scatter::{CoverMap, PackedStand},
-    scene::Quality,
     terrain::Terrain,
 };
 
 pub use crate::bake::lighting::SunLight;
-
-/// Metres around the camera that the finest shadow cascade serves unless stated.
-const FINEST_RADIUS: f64 = 30.0;
 
 /// A camera that sees Canopy's sky, ground and forests. One camera at a time; a second one is refused with a message.
 #[derive(Component, Clone, Copy, Debug, Default, ExtractComponent)]
@@ -47,8 +43,8 @@ pub struct Forest {
     pub suns: Arc<[SunLight]>,
     /// Scene position in metres of the stand's own origin.
     pub origin: DVec3,
-    /// Where full models give way to billboards.
-    pub fade: FadeBand,
+    /// The representations of the trees, from near to far.
+    pub levels: Levels,
     /// Metres beyond which trees are not drawn.
     pub view_distance: f32,
 }
@@ -86,23 +82,9 @@ pub struct SunShadowSettings {
 }
 
 impl Default for SunShadowSettings {
-    /// As a scene with the default [`Quality`] has them.
+    /// As a scene with the default quality has them.
     fn default() -> Self {
-        Self::from(&Quality::default())
-    }
-}
-
-impl From<&Quality> for SunShadowSettings {
-    /// Shadows as the quality of a scene asks for them.
-    fn from(quality: &Quality) -> Self {
-        Self {
-            map_size: quality.shadow_map_size,
-            cascades: quality.cascades as usize,
-            finest_radius: FINEST_RADIUS,
-            distance: quality.shadow_distance,
-            // A billboard's level plane would draw a line across the crowns of full models.
-            proxy_distance: quality.near_distance + quality.fade_band,
-        }
+        Self { map_size: 2048, cascades: 4, finest_radius: 30.0, distance: 800.0, proxy_distance: 80.0 }
     }
 }
 

@@ -24,10 +24,11 @@ use glam::Vec3;
 use super::components::{CanopyCamera, Daylight};
 use crate::light::{
     ExposureSettings, LightError, LightSettings, LightState,
-    atmosphere::{Atmosphere, AtmosphereParams, luminance},
+    atmosphere::{Atmosphere, AtmosphereParams},
     moon::{MoonSetting, celestial_rotation},
     sun::{Observer, SunPosition},
 };
+use crate::math::luminance;
 
 /// Place, instant and air. Change it whenever the clock moves; the light is computed anew only then.
 #[derive(Resource, Clone, Debug, PartialEq)]

@@ -1,16 +1,39 @@
 //! Small helpers over wgpu: buffers that grow, textures with ready-made mip chains.
 
-use bevy::render::{
-    render_resource::{
-        Buffer, BufferDescriptor, BufferInitDescriptor, BufferUsages, Extent3d, Origin3d, TexelCopyBufferLayout,
-        TexelCopyTextureInfo, Texture, TextureAspect, TextureDescriptor, TextureDimension, TextureFormat,
-        TextureUsages, TextureView, TextureViewDescriptor, TextureViewDimension,
+use bevy::{
+    core_pipeline::core_3d::CORE_3D_DEPTH_FORMAT,
+    ecs::system::{Res, SystemParam},
+    render::{
+        render_resource::{
+            BindGroup, BindGroupEntry, BindGroupLayoutDescriptor, Buffer, BufferDescriptor, BufferInitDescriptor,
+            BufferUsages, CompareFunction, DepthBiasState, DepthStencilState, Extent3d, Origin3d, PipelineCache,
+            StencilState, TexelCopyBufferLayout, TexelCopyTextureInfo, Texture, TextureAspect, TextureDescriptor,
+            TextureDimension, TextureFormat, TextureUsages, TextureView, TextureViewDescriptor, TextureViewDimension,
+        },
+        renderer::{RenderDevice, RenderQueue},
     },
-    renderer::{RenderDevice, RenderQueue},
 };
 use bytemuck::Pod;
 
-use crate::plant::texture::MipChain;
+use crate::math::MipChain;
+
+/// The device, and what makes bind groups on it.
+#[derive(SystemParam)]
+pub struct Gpu<'w> {
+    /// The device.
+    pub device: Res<'w, RenderDevice>,
+    /// Its queue.
+    pub queue: Res<'w, RenderQueue>,
+    /// Where layouts and pipelines come from.
+    pub pipelines: Res<'w, PipelineCache>,
+}
+
+impl Gpu<'_> {
+    /// A bind group of `layout`.
+    pub fn bind_group(&self, label: &str, layout: &BindGroupLayoutDescriptor, entries: &[BindGroupEntry]) -> BindGroup {
+        self.device.create_bind_group(label, &self.pipelines.get_bind_group_layout(layout), entries)
+    }
+}
 
 /// Bytes between dynamic offsets of uniform buffers that every device allows.
 pub const UNIFORM_STRIDE: u64 = 256;
@@ -182,4 +205,20 @@ pub fn write_level(
         TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(width * texel_bytes), rows_per_image: Some(height) },
         Extent3d { width, height, depth_or_array_layers: 1 },
     );
+}
+
+/// Depth test and write of opaque passes on the camera's reversed depth.
+pub fn opaque_depth() -> DepthStencilState {
+    reversed_depth(CORE_3D_DEPTH_FORMAT)
+}
+
+/// Test and write of a reversed depth in `format`: nearer is greater.
+pub fn reversed_depth(format: TextureFormat) -> DepthStencilState {
+    DepthStencilState {
+        format,
+        depth_write_enabled: Some(true),
+        depth_compare: Some(CompareFunction::GreaterEqual),
+        stencil: StencilState::default(),
+        bias: DepthBiasState::default(),
+    }
 }

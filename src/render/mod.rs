@@ -3,7 +3,7 @@
 //! The way of a frame:
 //!
 //! ```text
-//! extract ── frame (camera in f64, group 0) ── cull (lists of trees)
+//! extract ── view (camera in f64) ── cull (lists of trees) ── bindings (group 0)
 //!              │
 //!              ├─ sun_shadow   only the cascades that changed        before Core3dSystems::MainPass
 //!              ├─ (Bevy's own opaque meshes)
@@ -11,45 +11,69 @@
 //!              ├─ terrain      tiles                                 after forest
 //!              └─ sky          what is left                          before main_transparent_pass_3d
 //! ```
+//!
+//! The order is that of the public system [`sets`]. What one pass has for the others it writes into
+//! [`bindings::SharedTextures`]; no pass names another one's systems.
 
+pub mod bindings;
 pub mod components;
-pub mod cull;
 pub mod daylight;
-mod extract;
+pub mod extract;
 pub mod forest;
-pub mod frame;
-mod gpu;
+pub mod gpu;
 pub mod readback;
 pub mod report;
+pub mod sets;
+pub mod shader_constants;
 pub mod shaders;
 pub mod sky;
+pub mod stand_light;
 pub mod sun_shadow;
 pub mod terrain;
+pub mod view;
 
 use bevy::{
     app::{App, Plugin},
+    asset::{AssetServer, io::embedded::EmbeddedAssetRegistry},
+    core_pipeline::CorePipelinePlugin,
     ecs::schedule::IntoScheduleConfigs,
+    log::error,
     render::{ExtractSchedule, Render, RenderApp, RenderSystems},
 };
 
-/// All passes.
+/// All passes. May stand before or after Bevy's own plugins; where one of them is missing, it says so and draws nothing.
 pub struct CanopyRenderPlugin;
 
 impl Plugin for CanopyRenderPlugin {
     fn build(&self, app: &mut App) {
-        let shaders = shaders::CanopyShaders::load(app);
-        shaders.share(app, |app| app.get_sub_app_mut(RenderApp));
-        let report = report::FrameReport::default();
-        app.insert_resource(report.clone()).add_plugins(components::ComponentsPlugin);
-        if let Some(render_app) = app.get_sub_app_mut(RenderApp) {
-            render_app
-                .insert_resource(report)
-                .init_resource::<extract::ExtractedScene>()
-                .add_systems(ExtractSchedule, extract::extract_scene)
-                .add_systems(Render, report::finish_report.in_set(RenderSystems::Cleanup));
-        }
-        app.add_plugins((
-            frame::FramePlugin,
+        app.init_resource::<report::FrameReport>();
+    }
+
+    // Here all other plugins are built, in whatever order they were added.
+    fn finish(&self, app: &mut App) {
+        app.add_plugins(components::ComponentsPlugin);
+        let has_pipeline = app.is_plugin_added::<CorePipelinePlugin>();
+        let report = app.world().resource::<report::FrameReport>().clone();
+        let assets = app.world().get_resource::<EmbeddedAssetRegistry>().zip(app.world().get_resource::<AssetServer>());
+        let shaders = assets.map(|(registry, server)| shaders::CanopyShaders::load(registry, server));
+        let (Some(shaders), Some(render_app), true) = (shaders, app.get_sub_app_mut(RenderApp), has_pipeline) else {
+            error!(
+                "Canopy draws nothing: the app needs AssetPlugin, RenderPlugin (with a graphics device) and \
+                 CorePipelinePlugin; Bevy's DefaultPlugins have them."
+            );
+            return;
+        };
+        sets::configure(render_app);
+        render_app
+            .insert_resource(report)
+            .insert_resource(shaders.clone())
+            .init_resource::<extract::ExtractedScene>()
+            .add_systems(ExtractSchedule, extract::extract_scene)
+            .add_systems(Render, report::finish_report.in_set(RenderSystems::Cleanup));
+        app.insert_resource(shaders).add_plugins((
+            view::ViewPlugin,
+            bindings::BindingsPlugin,
+            stand_light::StandLightPlugin,
             sky::SkyPassPlugin,
             sun_shadow::SunShadowPassPlugin,
             terrain::TerrainPassPlugin,

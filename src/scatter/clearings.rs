@@ -6,10 +6,10 @@
 
 use glam::{DVec2, I64Vec2};
 
-use super::hash::{Stream, hash64};
 use super::rules::ClearingNoise;
-use super::sequence::HaltonSequence;
 use super::stand::Area;
+use super::stream::Stream;
+use crate::math::{HaltonSequence, hash::hash64};
 
 /// Samples that the cut is found from: their mean density is within about 0.003 of the area's.
 const SAMPLES: usize = 8192;

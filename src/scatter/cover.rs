@@ -6,7 +6,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::ScatterError;
-use super::packed::{PackedStand, VariantBounds, check_bounds};
+use super::packed::{PackedStand, PlantSize, check_bounds};
 use super::stand::{Area, MAX_SCALE, MIN_SCALE, Stand, XzPlane};
 
 /// The most texels of a map: 64 MiB.
@@ -174,12 +174,12 @@ struct Crown {
 /// on texels of 8 m (two cores).
 ///
 /// # Errors
-/// [`ScatterError::VariantBounds`], [`ScatterError::TooManyVariants`], [`ScatterError::UnknownVariant`] for the bounds,
+/// [`ScatterError::PlantSize`], [`ScatterError::TooManyVariants`], [`ScatterError::UnknownVariant`] for the bounds,
 /// [`ScatterError::Unpackable`] for a scale outside of its range, [`ScatterError::Size`] for a texel below 1 cm or so small
 /// that the map has more than 2²⁶.
 pub fn cover_map<S: Crowns>(
     stand: &S,
-    bounds: &[VariantBounds],
+    bounds: &[PlantSize],
     texel: f64,
     extent: Option<Area>,
 ) -> Result<CoverMap, ScatterError> {

@@ -45,22 +45,6 @@ pub enum ScatterError {
         /// The most a stand holds.
         limit: u32,
     },
-    /// A radical inverse needs a base of at least 2.
-    #[error("radical inverse in base {base}: a base is at least 2")]
-    Base {
-        /// The base given.
-        base: u32,
-    },
-    /// A point of a set whose discrepancy is asked for is outside the unit square.
-    #[error("point {index} ({x}, {y}) is outside the unit square: scale the set to 0..1 first")]
-    OutsideUnitSquare {
-        /// Index of the point.
-        index: usize,
-        /// First coordinate.
-        x: f64,
-        /// Second coordinate.
-        y: f64,
-    },
     /// A file cannot be read.
     #[error("cannot read the inventory {}: {source}", path.display())]
     Io {
@@ -132,7 +116,7 @@ pub enum ScatterError {
         limit: usize,
     },
     /// A tree names a variant that does not exist.
-    #[error("tree {tree} is of variant {variant}, but only {count} variants are known: give bounds for each variant")]
+    #[error("tree {tree} is of variant {variant}, but only {count} variants are known: give the size of each variant")]
     UnknownVariant {
         /// Place of the tree in its stand.
         tree: usize,
@@ -141,9 +125,9 @@ pub enum ScatterError {
         /// Number of variants known.
         count: usize,
     },
-    /// The bounds of a variant are not usable.
+    /// The size of a variant is not usable.
     #[error("variant {variant} has {what} {value} m: give 0 to 1000 m")]
-    VariantBounds {
+    PlantSize {
         /// The variant.
         variant: usize,
         /// `radius` or `height`.

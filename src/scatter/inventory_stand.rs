@@ -6,10 +6,10 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::hash::{self, Stream};
 use super::inventory::InventoryTree;
 use super::stand::{Ground, MAX_SCALE, MIN_SCALE, Stand, Tree, sink};
-use super::{Allometry, ScatterError};
+use super::{Allometry, ScatterError, Stream};
+use crate::math::hash;
 
 /// Two trees nearer than this are one tree that is listed twice, metres.
 const SAME_PLACE_M: f64 = 0.01;

@@ -10,7 +10,7 @@
 //! Franzke 2005 (section 4.4, figure 4.17) scatters its plants by the Halton and Hammersley points of
 //! [Halton 1964] and [Hammersley & Handscomb 1964], because they fill the ground evenly without the rows of a grid.
 //! Here the points carry density, slope, height and clearing rules, a least distance, and several species.
-//! A point's *index* decides nothing but its place: species, size, yaw and tint come from a hash of it ([`hash`]),
+//! A point's *index* decides nothing but its place: species, size, yaw and tint come from a hash of it ([`crate::math::hash`]),
 //! as index bits are the very digits of the coordinates.
 //!
 //! Positions are scene-local: metres, f64, X east, Z south, Y up from the datum of the heights.
@@ -19,30 +19,25 @@
 pub mod allometry;
 mod clearings;
 pub mod cover;
-pub mod discrepancy;
 mod error;
-pub mod hash;
 pub mod inventory;
 pub mod inventory_stand;
 pub mod packed;
 pub mod placement;
-pub mod radical_inverse;
 pub mod rules;
-pub mod sequence;
 mod spacing;
 mod stand;
+pub mod stream;
 
 pub use allometry::Allometry;
 pub use cover::{CoverMap, cover_map};
-pub use discrepancy::star_discrepancy;
 pub use error::{BadValue, ScatterError};
 pub use inventory::{
     Coordinates, Inventory, InventoryOptions, InventoryTree, LengthUnit, parse_inventory, read_inventory,
 };
 pub use inventory_stand::{InventorySpecies, InventoryStand, InventoryWarnings, stand_from_inventory};
-pub use packed::{Cell, PackedStand, PackedTree, VariantBounds};
+pub use packed::{Cell, PackedStand, PackedTree, PlantSize};
 pub use placement::{Placement, PlacementReport, place};
-pub use radical_inverse::{RadicalInverse, radical_inverse};
 pub use rules::{ClearingNoise, PlacementRules, Sequence, SizeRule, SpeciesRule};
-pub use sequence::{HaltonSequence, halton, hammersley, random};
 pub use stand::{Area, Ground, MAX_COORDINATE_M, MAX_SCALE, MIN_SCALE, Stand, Tree};
+pub use stream::{Stream, random};

@@ -40,8 +40,35 @@ pub const MAX_HEIGHT_M: f64 = 100_000.0;
 /// Largest radius and height of a plant at scale 1, metres.
 pub const MAX_PLANT_M: f32 = 1000.0;
 
-const SCALE_STEPS: f32 = 4095.0;
-const TINT_STEPS: f32 = 31.0;
+/// Steps of a position along a cell's side.
+pub const PLACE_STEPS: f32 = 65535.0;
+/// Bits of the yaw, the lowest of [`PackedTree::look`].
+pub const YAW_BITS: u32 = 8;
+/// First bit of the scale.
+pub const SCALE_SHIFT: u32 = YAW_BITS;
+/// Bits of the scale.
+pub const SCALE_BITS: u32 = 12;
+/// First bit of the variant.
+pub const VARIANT_SHIFT: u32 = SCALE_SHIFT + SCALE_BITS;
+/// Bits of the variant.
+pub const VARIANT_BITS: u32 = 6;
+/// First bit of the tint.
+pub const TINT_SHIFT: u32 = VARIANT_SHIFT + VARIANT_BITS;
+/// Bits of the tint, two's complement: the uppermost.
+pub const TINT_BITS: u32 = 32 - TINT_SHIFT;
+/// Steps of the scale, even in the logarithm.
+pub const SCALE_STEPS: f32 = ((1 << SCALE_BITS) - 1) as f32;
+/// Binary logarithm of the smallest scale.
+pub const LEAST_SCALE_LOG2: f32 = -4.0;
+/// Binary logarithm of the largest scale over the smallest.
+pub const SCALE_OCTAVES: f32 = 8.0;
+/// Steps of the tint on either side of 0.
+pub const TINT_STEPS: f32 = ((1 << (TINT_BITS - 1)) - 1) as f32;
+
+/// The lowest `bits` bits.
+const fn mask(bits: u32) -> u32 {
+    (1 << bits) - 1
+}
 
 /// One tree; see the module for its bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -68,8 +95,10 @@ impl PackedTree {
         let DVec3 { x, y, z } = tree.position;
         let axis = |value: f64| {
             let cell = (value / cell_size).floor();
-            let inside = ((value / cell_size - cell) * 65535.0).round() as u32;
-            (f64::from(i16::MIN)..=f64::from(i16::MAX)).contains(&cell).then_some((cell as i16, inside.min(65535)))
+            let inside = ((value / cell_size - cell) * f64::from(PLACE_STEPS)).round() as u32;
+            (f64::from(i16::MIN)..=f64::from(i16::MAX))
+                .contains(&cell)
+                .then_some((cell as i16, inside.min(PLACE_STEPS as u32)))
         };
         let reach = || format!("stay within ±{} m or take larger cells", cell_size * f64::from(i16::MAX));
         let Some((ix, place_x)) = axis(x) else { return fail("x", x, reach()) };
@@ -89,14 +118,17 @@ impl PackedTree {
         if usize::from(tree.variant) >= MAX_VARIANTS {
             return fail("variant", tree.variant.into(), format!("variants are 0 to {}", MAX_VARIANTS - 1));
         }
-        let yaw = ((tree.yaw / TAU).rem_euclid(1.0) * 256.0).round() as u32 & 0xFF;
-        let scale = ((tree.scale.log2() + 4.0) / 8.0 * SCALE_STEPS).round() as u32 & 0xFFF;
-        let tint = (tree.tint * TINT_STEPS).round() as i32 as u32 & 0x3F;
+        let yaw = ((tree.yaw / TAU).rem_euclid(1.0) * (1 << YAW_BITS) as f32).round() as u32;
+        let scale = ((tree.scale.log2() - LEAST_SCALE_LOG2) / SCALE_OCTAVES * SCALE_STEPS).round() as u32;
+        let tint = (tree.tint * TINT_STEPS).round() as i32 as u32;
         Ok(Self {
             xz: place_x | place_z << 16,
             y: y as f32,
             cell: u32::from(ix as u16) | u32::from(iz as u16) << 16,
-            look: yaw | scale << 8 | u32::from(tree.variant) << 20 | tint << 26,
+            look: yaw & mask(YAW_BITS)
+                | (scale & mask(SCALE_BITS)) << SCALE_SHIFT
+                | u32::from(tree.variant) << VARIANT_SHIFT
+                | tint << TINT_SHIFT,
         })
     }
 
@@ -108,39 +140,49 @@ impl PackedTree {
     /// Scene-local position of the foot, metres.
     pub fn position(&self, cell_size: f64) -> DVec3 {
         let (ix, iz) = self.cell_index();
-        let axis = |cell: i16, place: u32| (f64::from(cell) + f64::from(place) / 65535.0) * cell_size;
+        let axis = |cell: i16, place: u32| (f64::from(cell) + f64::from(place) / f64::from(PLACE_STEPS)) * cell_size;
         DVec3::new(axis(ix, self.xz & 0xFFFF), self.y.into(), axis(iz, self.xz >> 16))
     }
 
     /// Turn about the trunk, radians, 0 to 2π.
     pub fn yaw(&self) -> f32 {
-        (self.look & 0xFF) as f32 * (TAU / 256.0)
+        (self.look & mask(YAW_BITS)) as f32 * (TAU / (1 << YAW_BITS) as f32)
     }
 
     /// Factor on the plant's size.
     pub fn scale(&self) -> f32 {
-        ((self.look >> 8 & 0xFFF) as f32 * (8.0 / SCALE_STEPS) - 4.0).exp2()
+        ((self.look >> SCALE_SHIFT & mask(SCALE_BITS)) as f32 * (SCALE_OCTAVES / SCALE_STEPS) + LEAST_SCALE_LOG2).exp2()
     }
 
     /// Which plant stands here.
     pub fn variant(&self) -> u16 {
-        (self.look >> 20 & 0x3F) as u16
+        (self.look >> VARIANT_SHIFT & mask(VARIANT_BITS)) as u16
     }
 
     /// Deviation in colour, -1 to 1.
     pub fn tint(&self) -> f32 {
         // The tint is in the uppermost bits, so the arithmetic shift extends its sign.
-        (self.look as i32 >> 26) as f32 / TINT_STEPS
+        (self.look as i32 >> TINT_SHIFT) as f32 / TINT_STEPS
     }
 }
 
-/// Extent of a plant at scale 1.
+/// Size of a plant at scale 1: an upright cylinder around its trunk's axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct VariantBounds {
-    /// Largest horizontal distance from the trunk's axis, metres.
-    pub radius: f32,
+pub struct PlantSize {
     /// Height above the foot, metres.
     pub height: f32,
+    /// Largest horizontal distance from the trunk's axis, metres.
+    pub radius: f32,
+}
+
+impl PlantSize {
+    /// Sizes below this, metres, count as this: a plant of nothing has a size too.
+    pub const LEAST: f32 = 0.01;
+
+    /// The size of a plant of this height and radius, metres; at least [`Self::LEAST`] each.
+    pub fn new(height: f32, radius: f32) -> Self {
+        Self { height: height.max(Self::LEAST), radius: radius.max(Self::LEAST) }
+    }
 }
 
 /// A square of ground with the trees that stand on it.
@@ -179,10 +221,10 @@ impl PackedStand {
     /// Packs `stand` into cells of `cell_size` metres (1 to 4096). `bounds` are those of the plants, by variant.
     ///
     /// # Errors
-    /// [`ScatterError::Size`] for the cell size, [`ScatterError::TooManyVariants`] and [`ScatterError::VariantBounds`] for
+    /// [`ScatterError::Size`] for the cell size, [`ScatterError::TooManyVariants`] and [`ScatterError::PlantSize`] for
     /// the bounds, [`ScatterError::UnknownVariant`] and [`ScatterError::Unpackable`] for the first tree that cannot be
     /// packed, [`ScatterError::TooManyTrees`] beyond 2³² - 1 trees.
-    pub fn new(stand: &Stand, cell_size: f64, bounds: &[VariantBounds]) -> Result<Self, ScatterError> {
+    pub fn new(stand: &Stand, cell_size: f64, bounds: &[PlantSize]) -> Result<Self, ScatterError> {
         if !(1.0..=4096.0).contains(&cell_size) {
             let remedy = format!("give 1 to 4096 m, such as {DEFAULT_CELL_SIZE}");
             return Err(ScatterError::Size { what: "the cell size", value: cell_size, remedy });
@@ -223,14 +265,14 @@ impl PackedStand {
 }
 
 /// Refuses bounds of too many variants, or that are not usable as lengths.
-pub(super) fn check_bounds(bounds: &[VariantBounds]) -> Result<(), ScatterError> {
+pub(super) fn check_bounds(bounds: &[PlantSize]) -> Result<(), ScatterError> {
     if bounds.len() > MAX_VARIANTS {
         return Err(ScatterError::TooManyVariants { count: bounds.len(), limit: MAX_VARIANTS });
     }
     for (variant, bound) in bounds.iter().enumerate() {
         for (what, value) in [("radius", bound.radius), ("height", bound.height)] {
             if !(0.0..=MAX_PLANT_M).contains(&value) {
-                return Err(ScatterError::VariantBounds { variant, what, value });
+                return Err(ScatterError::PlantSize { variant, what, value });
             }
         }
     }
@@ -238,7 +280,7 @@ pub(super) fn check_bounds(bounds: &[VariantBounds]) -> Result<(), ScatterError>
 }
 
 /// The cell of `group`, which is not empty. Boxes hold the trees as they are drawn, after rounding.
-fn cell(first: u32, group: &[PackedTree], cell_size: f64, bounds: &[VariantBounds]) -> Cell {
+fn cell(first: u32, group: &[PackedTree], cell_size: f64, bounds: &[PlantSize]) -> Cell {
     let (mut min, mut max, mut max_scale) = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0f32);
     for tree in group {
         let foot = tree.position(cell_size);

@@ -18,11 +18,14 @@ use rayon::prelude::*;
 
 use super::ScatterError;
 use super::clearings::ClearingMask;
-use super::hash::{self, Stream, hash64, unit_f32, unit_f64};
 use super::rules::{PlacementRules, Sequence, SpeciesRule};
-use super::sequence::{HaltonSequence, hammersley, random};
 use super::spacing::SpacingGrid;
 use super::stand::{Ground, Stand, Tree, XzPlane, sink};
+use super::stream::{Stream, random};
+use crate::math::{
+    HaltonSequence, hammersley,
+    hash::{self, hash64, unit_f32, unit_f64},
+};
 
 /// Points that one task evaluates: two rounds of the ternary table.
 const CHUNK: u64 = 4374;

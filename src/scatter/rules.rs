@@ -5,7 +5,8 @@ use std::ops::Range;
 use serde::Deserialize;
 
 use super::stand::{Area, MAX_COORDINATE_M, MAX_SCALE, MIN_SCALE};
-use super::{ScatterError, hash};
+use super::{ScatterError, Stream};
+use crate::math::hash;
 
 /// The most trees that rules may ask for: 32 million, some 1.5 GiB while they are placed and 512 MB on the device.
 ///
@@ -290,9 +291,9 @@ impl SizeRule {
     /// The scale of the tree `index`, whose plant is the `place`-th of its species' variants.
     pub(super) fn scale(&self, seed: u64, index: u64, place: usize) -> f32 {
         let scale = match self {
-            Self::Scale { min, max } => min + (max - min) * hash::unit_f32(seed, index, hash::Stream::Scale),
+            Self::Scale { min, max } => min + (max - min) * hash::unit_f32(seed, index, Stream::Scale),
             Self::Height { mean_m, deviation_m, plant_heights_m } => {
-                let height = mean_m + deviation_m * hash::bell_f32(seed, index, hash::Stream::Scale);
+                let height = mean_m + deviation_m * hash::bell_f32(seed, index, Stream::Scale);
                 height / plant_heights_m.get(place).copied().unwrap_or(*mean_m)
             }
         };

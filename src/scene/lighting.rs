@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::check::Check;
-use crate::bake::{
+use crate::bake::lighting::{
+    LightingSettings, SunLight,
     implicit::ImplicitSettings,
-    lighting::{LightingSettings, SunLight},
     transfer::{Channels, Interior, TransferSettings},
 };
 

@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 use super::check::Check;
 
-/// Drawing quality. The renderer's own settings take their defaults from here.
+/// Drawing quality.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Quality {

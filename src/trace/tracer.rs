@@ -13,9 +13,7 @@ use obvhs::{Boundable, BvhBuildParams};
 
 use super::intersect::Shear;
 use super::{Hit, Ray, SurfacePoint};
-use crate::bake::geometry;
-use crate::bake::surface::Surface;
-use crate::plant::{Bounds, PartKind, Plant};
+use crate::plant::{Bounds, PartKind, Plant, geometry, surface::Surface};
 
 /// Size (longest extent) to which the plant is scaled for the tree, which takes everything nearer than 1e-4 as touched.
 const TREE_SIZE: f64 = 1024.0;

@@ -1,9 +1,7 @@
 //! Plant textures: coverage, fading, halos.
 
-use canopy::plant::texture::{
-    MipChain, alpha_tested_mips, color_mips, dilate_colors, fade_alpha, leaf_mips, linear_to_srgb, normal_mips,
-    resize_to, srgb_to_linear,
-};
+use canopy::math::{MipChain, linear_to_srgb, resample::resize_to, srgb_to_linear};
+use canopy::plant::texture::{alpha_tested_mips, color_mips, dilate_colors, fade_alpha, leaf_mips, normal_mips};
 use glam::{Vec2, Vec3};
 use image::{Rgba, RgbaImage};
 use proptest::prelude::*;

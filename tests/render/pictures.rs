@@ -3,7 +3,7 @@
 use canopy::{
     app::Picture,
     assets::Stage,
-    lod::FadeBand,
+    lod::{FadeBand, Levels},
     render::components::{CanopyOrigin, Forest, SunShadowSettings},
     scene::Viewpoint,
 };
@@ -141,7 +141,10 @@ fn changing_at(stage: &Stage, distance: f32, at: &str) -> Picture {
     renderer.set_view(&view(stage, (0.0, 12.0, 170.0), 0.0, -3.0));
     let world = renderer.app().world_mut();
     world.spawn(stage.ground());
-    world.spawn(Forest { fade: FadeBand::new(distance, 0.1), ..stage.forest().expect("a forest") });
+    world.spawn(Forest {
+        levels: Levels::model_and_cross(FadeBand::new(distance, 0.1)),
+        ..stage.forest().expect("a forest")
+    });
     world.insert_resource(stage.shadow());
     super::again(&mut renderer)
 }

@@ -13,8 +13,9 @@ use canopy::{
     app::{Picture, Renderer},
     assets::Stage,
     bake::{
-        BakeSettings, BakedPlant, bake_plant, billboard::CrossSettings, implicit::ImplicitSettings,
-        lighting::LightingSettings,
+        BakeSettings, BakedPlant, bake_plant,
+        levels::cross::CrossSettings,
+        lighting::{LightingSettings, implicit::ImplicitSettings},
     },
     render::{
         components::{CanopyCamera, CastsCanopyShadow, Forest, SunShadowSettings},

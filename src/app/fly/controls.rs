@@ -88,7 +88,7 @@ pub const HELP: [(&str, &str); 20] = [
     ("+  -", "clock: stands, 1x, 60x, 600x, 3600x"),
     ("Home", "back to the start, place and time"),
     ("U", "under the ground or not"),
-    ("T", "tint: full models green, crosses blue"),
+    ("T", "tint trees by level of detail"),
     ("L", "panel: turn the light of the leaves; it takes the arrows"),
     ("P", "save a picture into the working directory"),
     ("O", "overlay"),

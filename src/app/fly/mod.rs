@@ -32,7 +32,7 @@ use bevy::{
 use bevy_egui::{EguiPlugin, EguiPostUpdateSet, EguiPrimaryContextPass};
 
 use super::{FlyOptions, adapter, error::AppError};
-use crate::{CanopyPlugins, assets::Stage, progress::Progress};
+use crate::{assets::Stage, plugin::CanopyPlugins, progress::Progress};
 use session::Session;
 
 /// Opens a window and flies until the user has enough. Blocks; must be called on the program's main thread.

@@ -12,9 +12,12 @@ use super::{
     session::Session,
     timing::FrameTimes,
 };
-use crate::render::{
-    components::Daylight,
-    report::{FrameReport, PassOutcome},
+use crate::{
+    math::digits::grouped,
+    render::{
+        components::Daylight,
+        report::{FrameReport, PassOutcome},
+    },
 };
 
 /// Points between an overlay and the window's edge.
@@ -95,7 +98,9 @@ pub(super) fn small(text: impl Into<String>) -> RichText {
 
 fn numbers(ui: &mut Ui, session: &Session, frames: &FrameTimes, sun: Option<f32>) {
     let milliseconds = |share| frames.percentile(share).map_or("-".to_owned(), |s| format!("{:.1}", s * 1e3));
-    let (forest, terrain) = (frames.forest, frames.terrain);
+    let (forest, terrain) = (&frames.forest, frames.terrain);
+    let levels: Vec<String> =
+        forest.levels.iter().map(|level| format!("{} {}", grouped(level.trees), level.label)).collect();
     let clock = match session.clock.rate() {
         _ if session.paused => "paused".to_owned(),
         0.0 => "stands".to_owned(),
@@ -112,8 +117,8 @@ fn numbers(ui: &mut Ui, session: &Session, frames: &FrameTimes, sun: Option<f32>
             format!("p50 {} ms, p95 {} ms of {} frames", milliseconds(0.5), milliseconds(0.95), frames.frames()),
             FRAME_TIME,
         ),
-        ("trees", format!("{} models, {} crosses", grouped(forest.models), grouped(forest.crosses)), TREES),
-        ("triangles", grouped(forest.triangles + terrain.triangles), TRIANGLES),
+        ("trees", levels.join(", "), TREES),
+        ("triangles", grouped(forest.triangles() + terrain.triangles), TRIANGLES),
         ("ground", format!("{} tiles", grouped(terrain.tiles)), "Terrain tiles that the view draws."),
         (
             "time",
@@ -175,31 +180,4 @@ fn help(ui: &mut Ui) {
             ui.end_row();
         }
     });
-}
-
-/// A number with its digits in groups of three.
-fn grouped(number: usize) -> String {
-    let digits = number.to_string();
-    let first = digits.len() % 3;
-    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
-    for (place, digit) in digits.chars().enumerate() {
-        if place > 0 && place % 3 == first {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn digits_come_in_threes() {
-        for (number, text) in [(0, "0"), (12, "12"), (123, "123"), (1234, "1,234"), (300_000, "300,000")] {
-            assert_eq!(grouped(number), text);
-        }
-        assert_eq!(grouped(12_345_678), "12,345,678");
-    }
 }

@@ -99,7 +99,7 @@ fn receive(mailbox: Res<Mailbox>, mut frames: ResMut<FrameTimes>) {
     for seconds in news.times.drain(..) {
         frames.push(seconds);
     }
-    (frames.forest, frames.terrain) = (news.forest, news.terrain);
+    (frames.forest, frames.terrain) = (news.forest.clone(), news.terrain);
 }
 
 fn await_device(
@@ -121,7 +121,7 @@ fn await_device(
     let now = Instant::now();
     let mut news = mailbox.0.lock().unwrap_or_else(PoisonError::into_inner);
     news.times.extend(before.replace(now).map(|before| (now - before).as_secs_f64()));
-    (news.forest, news.terrain) = (*forest, *terrain);
+    (news.forest, news.terrain) = (forest.clone(), *terrain);
 }
 
 #[cfg(test)]

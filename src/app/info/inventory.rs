@@ -4,10 +4,11 @@ use std::{collections::BTreeMap, path::Path};
 
 use glam::DVec2;
 
-use super::page::{Page, grouped, length};
+use super::page::{Page, length};
 use crate::{
     app::AppError,
     assets::StageError,
+    math::digits::grouped,
     scatter::{Coordinates, Inventory, InventoryOptions, inventory::columns_of, parse_inventory},
 };
 

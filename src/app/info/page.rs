@@ -52,19 +52,6 @@ impl Page {
     }
 }
 
-/// A number with its thousands apart: `1,017,344`.
-pub(super) fn grouped(number: usize) -> String {
-    let digits = number.to_string();
-    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
-    for (place, digit) in digits.chars().enumerate() {
-        if place > 0 && (digits.len() - place).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
-
 /// A length in the unit in which people would say it.
 pub(super) fn length(metres: f64) -> String {
     match metres.abs() {
@@ -90,7 +77,6 @@ mod tests {
 
     #[test]
     fn numbers_and_places_read_well() {
-        assert_eq!(["0", "999", "1,000", "1,017,344"].map(String::from), [0, 999, 1000, 1_017_344].map(grouped));
         assert_eq!(length(6123.4), "6.12 km");
         assert_eq!(length(0.126), "0.13 m");
         assert_eq!(place((36.5, -84.25)), "36.5000° N, 84.2500° W");

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use super::page::{Page, grouped, length};
+use super::page::{Page, length};
 use crate::{
     app::AppError,
+    math::digits::grouped,
     plant::{
         PartKind, Plant,
         gltf::{GltfOptions, PlantReport, Warning, load_plant},

@@ -1,26 +1,21 @@
 //! Scenes: all that they refer to, read and built as for drawing, short of the bakes and the graphics device.
 
-use std::{ops::Range, path::Path, sync::Arc};
-
-use glam::Vec3;
+use std::{ops::Range, path::Path};
 
 use super::{
     inventory,
-    page::{Page, grouped, length, place},
+    page::{Page, length, place},
     plant, terrain,
 };
 use crate::{
     app::AppError,
     assets::{ground::build_terrain, plants, stage::observer, trees},
-    bake::{
-        BakedPlant,
-        billboard::{Cross, CrossTextures, SPREAD_LEVELS},
-        lighting::BakedLighting,
-    },
+    bake::plant_size,
     light::sun::{Observer, SunPosition},
+    math::digits::grouped,
     plant::{PartKind, Plant, grow::GrowParameters},
     progress::Progress,
-    scatter::{InventoryOptions, Stand, read_inventory},
+    scatter::{InventoryOptions, PlantSize, Stand, read_inventory},
     scene::{self, PlantSource, Scene, Species, Trees},
     terrain::Terrain,
 };
@@ -64,9 +59,10 @@ fn describe(page: &mut Page, scene: &Scene, path: &Path) -> Result<(), AppError>
     for individual in &plan.individuals {
         let (plant, warnings) = individual.build()?;
         heard.warnings.extend(warnings);
-        individuals.push(unbaked(plant));
+        individuals.push(plant);
     }
-    let stand = trees::build_stand(scene, &plan, &individuals, &ground, &mut heard)?;
+    let sizes: Vec<PlantSize> = individuals.iter().map(plant_size).collect();
+    let stand = trees::build_stand(scene, &plan, &sizes, &ground, &mut heard)?;
 
     page.title(format!("{}: a scene", path.display()));
     page.inset(|page| {
@@ -110,17 +106,6 @@ impl Progress for Heard {
     }
 }
 
-/// A plant as a stand needs it: of a baked plant it reads the height alone.
-fn unbaked(plant: Plant) -> BakedPlant {
-    let textures = CrossTextures { color: Vec::new(), properties: Vec::new(), light: Vec::new() };
-    BakedPlant {
-        plant: Arc::new(plant),
-        lighting: Arc::new(BakedLighting::Local),
-        shadow_proxy: Arc::default(),
-        cross: Arc::new(Cross { planes: Vec::new(), textures, transmission: Vec3::ZERO, spread: [0.0; SPREAD_LEVELS] }),
-    }
-}
-
 fn describe_ground(page: &mut Page, scene: &Scene, ground: &Terrain) {
     let source = match &scene.terrain {
         scene::Ground::File(file) => format!("the file {}", file.path.display()),
@@ -132,18 +117,15 @@ fn describe_ground(page: &mut Page, scene: &Scene, ground: &Terrain) {
     page.inset(|page| terrain::describe(page, ground));
 }
 
-fn describe_species(page: &mut Page, species: &Species, variants: &Range<u16>, individuals: &[BakedPlant]) {
+fn describe_species(page: &mut Page, species: &Species, variants: &Range<u16>, individuals: &[Plant]) {
     let (low, high) = species.height;
     page.row(
         "species",
         format!("{}: weight {}, {} to {} high", species.name, species.weight, length(low), length(high)),
     );
     page.inset(|page| {
-        let plants: Vec<&Plant> = variants
-            .clone()
-            .filter_map(|variant| individuals.get(usize::from(variant)))
-            .map(|baked| baked.plant.as_ref())
-            .collect();
+        let plants: Vec<&Plant> =
+            variants.clone().filter_map(|variant| individuals.get(usize::from(variant))).collect();
         match &species.plant {
             PlantSource::Grown(grown) => {
                 let triangles = |kind: PartKind| {

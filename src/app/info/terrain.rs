@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use super::page::{Page, grouped, length, place};
+use super::page::{Page, length, place};
 use crate::{
     app::AppError,
+    math::digits::grouped,
     terrain::{CoordinateSystem, GeoReference, ImageScale, ReadOptions, Terrain, Warning, read_terrain},
 };
 

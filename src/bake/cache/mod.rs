@@ -11,12 +11,14 @@
 mod codec;
 
 use std::ffi::OsString;
-use std::io::Write;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::{BakeError, BakeSettings, BakedPlant};
-use crate::plant::{PartKind, Plant};
+use super::baked::{BakeSettings, BakedPlant};
+use super::error::BakeError;
+use crate::files;
+use crate::plant::Plant;
 
 /// What identifies a baked plant: a hash of all inputs of the bake.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -27,42 +29,13 @@ impl CacheKey {
     /// textures are among it.
     pub fn new(plant: &Plant, settings: &BakeSettings) -> Self {
         let mut hasher = blake3::Hasher::new();
-        let mut number = |value: u64| {
-            hasher.update(&value.to_le_bytes());
-        };
-        number(u64::from(codec::VERSION));
-        number(plant.parts.len() as u64);
-        // Every field by name, every number to its last bit: no setting can be forgotten here.
-        hasher.update(format!("{settings:?}").as_bytes());
-        for part in &plant.parts {
-            // Every list goes with its length, so that no two plants give the same stream of bytes.
-            let mut list = |bytes: &[u8]| {
-                hasher.update(&(bytes.len() as u64).to_le_bytes());
-                hasher.update(bytes);
-            };
-            let (mesh, material) = (&part.mesh, &part.material);
-            list(&[match part.kind {
-                PartKind::Wood => 0,
-                PartKind::Foliage => 1,
-            }]);
-            list(bytemuck::cast_slice(&mesh.positions));
-            list(bytemuck::cast_slice(&mesh.normals));
-            list(bytemuck::cast_slice(&mesh.uvs));
-            list(bytemuck::cast_slice(&mesh.triangles));
-            list(bytemuck::bytes_of(&material.base_color));
-            list(bytemuck::bytes_of(&material.alpha_cutoff));
-            list(bytemuck::bytes_of(&material.transmission));
-            // Its roughness is read by no bake.
-            list(bytemuck::bytes_of(&material.gloss.reflectance));
-            match &material.base_color_texture {
-                Some(image) => {
-                    list(&image.width().to_le_bytes());
-                    list(&image.height().to_le_bytes());
-                    list(image.as_raw());
-                }
-                None => list(&[]),
-            }
-        }
+        hasher.update(&codec::VERSION.to_le_bytes());
+        // Every field, every number to its last bit: no setting can be forgotten here. Numbers and enums can always be
+        // written; if that ever changes, the key still tells settings apart.
+        let settings = postcard::to_stdvec(settings).unwrap_or_else(|_| format!("{settings:?}").into_bytes());
+        hasher.update(&(settings.len() as u64).to_le_bytes());
+        hasher.update(&settings);
+        plant.feed_baked_content(&mut hasher);
         Self(*hasher.finalize().as_bytes())
     }
 
@@ -84,11 +57,11 @@ impl Cache {
         Self { folder: folder.into() }
     }
 
-    /// The user's cache: the folder `$CANOPY_CACHE`, else `$XDG_CACHE_HOME/canopy`, else `$HOME/.cache/canopy`.
-    /// Empty variables count as not set, a relative `XDG_CACHE_HOME` too (XDG Base Directory Specification 0.8).
-    /// `None` where none of the three is set.
+    /// The user's cache: the folder `$CANOPY_CACHE` where that is set and not empty, else the folder `canopy` where the system
+    /// keeps caches: `$XDG_CACHE_HOME` or `~/.cache` on Linux, `~/Library/Caches` on macOS, `%LOCALAPPDATA%` on Windows.
+    /// `None` where there is neither.
     pub fn of_user() -> Option<Self> {
-        default_folder(|name| std::env::var_os(name)).map(Self::new)
+        user_folder(std::env::var_os("CANOPY_CACHE"), dirs::cache_dir()).map(Self::new)
     }
 
     /// The folder.
@@ -116,42 +89,39 @@ impl Cache {
         let path = self.file(key);
         std::fs::create_dir_all(&self.folder)
             .map_err(|source| BakeError::CacheFolder { path: self.folder.clone(), source })?;
-        let write = || -> std::io::Result<()> {
-            let mut file = tempfile::NamedTempFile::new_in(&self.folder)?;
-            file.write_all(&codec::encode(baked, &key.0))?;
-            file.persist(&path).map_err(|error| error.error)?;
-            Ok(())
+        let write = || {
+            let bytes =
+                codec::encode(baked, &key.0).ok_or_else(|| io::Error::other("it cannot be written as bytes"))?;
+            files::write_whole(&path, |writer| writer.write_all(&bytes))
         };
         write().map_err(|source| BakeError::CacheWrite { path: path.clone(), source })
     }
 }
 
-fn default_folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
-    let set = |name: &str| variable(name).filter(|value| !value.is_empty()).map(PathBuf::from);
-    set("CANOPY_CACHE")
-        .or_else(|| set("XDG_CACHE_HOME").filter(|path| path.is_absolute()).map(|path| path.join("canopy")))
-        .or_else(|| set("HOME").map(|home| home.join(".cache").join("canopy")))
+/// The folder that the environment asks for, else one in the system's own.
+fn user_folder(asked: Option<OsString>, system: Option<PathBuf>) -> Option<PathBuf> {
+    asked.filter(|folder| !folder.is_empty()).map(PathBuf::from).or_else(|| system.map(|caches| caches.join("canopy")))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bake::{
+    use crate::bake::lighting::{
+        LightingSettings,
         implicit::{ImplicitSettings, NormalSource},
-        lighting::LightingSettings,
     };
 
     #[test]
     fn the_folder_follows_the_environment() {
-        let folder = |set: &[(&str, &str)]| {
-            default_folder(|name| set.iter().find(|(key, _)| *key == name).map(|(_, value)| OsString::from(value)))
+        let folder = |asked: Option<&str>, system: Option<&str>| {
+            user_folder(asked.map(OsString::from), system.map(PathBuf::from))
         };
-        assert_eq!(folder(&[]), None);
-        assert_eq!(folder(&[("HOME", "/h")]), Some("/h/.cache/canopy".into()));
-        assert_eq!(folder(&[("HOME", "/h"), ("XDG_CACHE_HOME", "relative")]), Some("/h/.cache/canopy".into()));
-        assert_eq!(folder(&[("HOME", "/h"), ("XDG_CACHE_HOME", "/x")]), Some("/x/canopy".into()));
-        assert_eq!(folder(&[("XDG_CACHE_HOME", "/x"), ("CANOPY_CACHE", "here")]), Some("here".into()));
-        assert_eq!(folder(&[("XDG_CACHE_HOME", "/x"), ("CANOPY_CACHE", "")]), Some("/x/canopy".into()));
+        assert_eq!(folder(None, None), None);
+        assert_eq!(folder(Some(""), None), None);
+        assert_eq!(folder(None, Some("/h/.cache")), Some("/h/.cache/canopy".into()));
+        assert_eq!(folder(Some(""), Some("/x")), Some("/x/canopy".into()));
+        assert_eq!(folder(Some("here"), Some("/x")), Some("here".into()));
+        assert_eq!(folder(Some("here"), None), Some("here".into()));
     }
 
     #[test]

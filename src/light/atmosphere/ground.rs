@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::multiple::ln;
 use super::transmittance::{SunAxis, bilinear};
 use super::{Atmosphere, LOWEST_OBSERVER_M, VIEW_STEPS};
-use crate::light::quadrature::SphereQuadrature;
+use crate::math::SphereQuadrature;
 
 const RINGS: usize = 12;
 const AZIMUTHS: usize = 24;

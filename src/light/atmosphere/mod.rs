@@ -30,7 +30,7 @@ use glam::Vec3;
 
 use self::ground::GroundTable;
 use self::multiple::MultipleScatteringLut;
-pub use self::params::{AtmosphereParams, LUMINANCE_WEIGHTS, luminance};
+pub use self::params::AtmosphereParams;
 pub use self::sky_view::SkyView;
 use self::transmittance::{Level, TransmittanceLut};
 use super::error::LightError;
@@ -271,7 +271,7 @@ fn cornette_shanks_phase(cosine: f32, g: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::light::quadrature::gauss_legendre;
+    use crate::math::quadrature::gauss_legendre;
 
     #[test]
     fn phase_functions_are_normalised() {

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::Atmosphere;
 use super::transmittance::{Level, SunAxis, bilinear};
-use crate::light::quadrature::SphereQuadrature;
+use crate::math::SphereQuadrature;
 
 const HEIGHTS: usize = 32;
 /// 8 rings in each hemisphere, 16 azimuths: the directions are many because the light of dusk comes from few of them.

@@ -43,14 +43,6 @@ pub struct AtmosphereParams {
     pub solar_illuminance: Vec3,
 }
 
-/// Weights of linear Rec. 709 red, green and blue in luminance (ITU-R BT.709-6).
-pub const LUMINANCE_WEIGHTS: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
-
-/// Luminance of a linear Rec. 709 colour, in the colour's own unit.
-pub fn luminance(color: Vec3) -> f32 {
-    color.dot(LUMINANCE_WEIGHTS)
-}
-
 impl Default for AtmosphereParams {
     /// The Earth on a clear day with 50 km of visibility.
     fn default() -> Self {

@@ -1,10 +1,17 @@
 //! The two species that come with the crate, and the defaults of a species' parts.
-//! `assets/species/*.ron` hold the same numbers as files (a test compares them).
+//!
+//! The conifer is read from its file. The broadleaf is the default of every field that a species' file leaves out, so it
+//! cannot be read from one: its numbers are here, and a test compares them with `assets/species/broadleaf.ron`.
+
+use std::sync::LazyLock;
 
 use super::parameters::{
     BarkKind, BarkParameters, BranchParameters, CrownShape, GrowParameters, LeafParameters, LeafShape, Pruning,
     StemParameters,
 };
+
+/// The species file of the conifer.
+const CONIFER: &str = include_str!("../../../assets/species/conifer.ron");
 
 impl GrowParameters {
     /// A broadleaf of the closed forest, between oak and beech: about 22 m high, a crown of 7 to 9 m across from a
@@ -99,89 +106,13 @@ impl GrowParameters {
     }
 
     /// A spruce of the closed forest: about 28 m high, a crown of 4.5 to 6 m across, whorls of boughs that hang in
-    /// the middle and turn up at their ends, with needle sprays that droop from them.
+    /// the middle and turn up at their ends, with needle sprays that droop from them. Read once from
+    /// `assets/species/conifer.ron`, which is compiled in.
     pub fn conifer() -> Self {
-        Self {
-            name: "conifer".into(),
-            shape: CrownShape::Spire,
-            height: 27.2,
-            height_variation: 2.4,
-            ratio: 0.0086,
-            ratio_power: 0.92,
-            flare: 0.45,
-            lobes: 5,
-            lobe_depth: 0.1,
-            lean_deg: 1.0,
-            irregularity: 0.2,
-            pruning: None,
-            trunk: StemParameters {
-                length: 1.0,
-                length_variation: 0.0,
-                segments: 16,
-                taper: 1.0,
-                curve_variation_deg: 8.0,
-                attraction_up: 0.5,
-                bare: 0.2,
-                ..StemParameters::default()
-            },
-            branches: vec![
-                BranchParameters {
-                    stem: StemParameters {
-                        length: 0.092,
-                        length_variation: 0.018,
-                        segments: 8,
-                        curve_deg: 24.0,
-                        curve_back_deg: -46.0,
-                        curve_variation_deg: 30.0,
-                        bare: 0.08,
-                        ..StemParameters::default()
-                    },
-                    count: 230,
-                    whorl: 5,
-                    down_angle_deg: 80.0,
-                    down_angle_variation_deg: -26.0,
-                    rotate_variation_deg: 14.0,
-                    ..BranchParameters::default()
-                },
-                BranchParameters {
-                    stem: StemParameters {
-                        length: 0.36,
-                        length_variation: 0.08,
-                        segments: 4,
-                        curve_variation_deg: 30.0,
-                        attraction_up: -1.0,
-                        bare: 0.1,
-                        ..StemParameters::default()
-                    },
-                    count: 16,
-                    down_angle_deg: 56.0,
-                    down_angle_variation_deg: 10.0,
-                    rotate_deg: -78.0,
-                    rotate_variation_deg: 16.0,
-                    ..BranchParameters::default()
-                },
-            ],
-            leaves: LeafParameters {
-                shape: LeafShape::Needles,
-                count: 10000,
-                scale: 0.4,
-                aspect: 0.6,
-                scale_variation: 0.25,
-                down_angle_deg: 26.0,
-                down_angle_variation_deg: 16.0,
-                rotate_deg: -75.0,
-                droop: 0.42,
-                bend: 0.55,
-                fold_deg: 28.0,
-                normal_bend: 0.0,
-                shell: 0.25,
-                tint: [0.82, 0.84, 0.9],
-                tint_variation: 0.1,
-                transmission: [0.8, 0.8, 0.8],
-            },
-            bark: BarkParameters { kind: BarkKind::Scaly, tile: 0.6, tint: [1.0, 1.0, 1.0] },
-            wood_share: 0.28,
-        }
+        // That the text is a species is certain: a test reads it.
+        static SHIPPED: LazyLock<GrowParameters> =
+            LazyLock::new(|| GrowParameters::from_ron(CONIFER).unwrap_or_default());
+        SHIPPED.clone()
     }
 }
 
@@ -251,5 +182,17 @@ impl Default for LeafParameters {
 impl Default for BarkParameters {
     fn default() -> Self {
         Self { kind: BarkKind::Fissured, tile: 0.7, tint: [1.0, 1.0, 1.0] }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_conifer_is_what_its_file_says() {
+        let file = GrowParameters::from_ron(CONIFER).unwrap();
+        assert_eq!(file, GrowParameters::conifer());
+        assert_eq!((file.name.as_str(), file.shape, file.branches.len()), ("conifer", CrownShape::Spire, 2));
     }
 }

@@ -4,6 +4,8 @@
 //! state, splittable by a key. The generators of the `rand` crate may change their streams from one version to the
 //! next; a tree that is named by its seed in a scene file must not.
 
+use crate::math::hash::{GOLDEN, mix64};
+
 /// A stream of random numbers.
 #[derive(Clone, Debug)]
 pub(super) struct Random {
@@ -13,18 +15,18 @@ pub(super) struct Random {
 impl Random {
     /// A stream for `seed`. Neighbouring seeds give unrelated streams.
     pub fn new(seed: u64) -> Self {
-        Self { state: mix(seed ^ 0x5851_f42d_4c95_7f2d) }
+        Self { state: mix64(seed ^ 0x5851_f42d_4c95_7f2d) }
     }
 
     /// An independent stream for the part `key` of what this stream describes; this stream does not advance.
     pub fn split(&self, key: u64) -> Self {
-        Self { state: mix(self.state ^ mix(key.wrapping_add(0x9e37_79b9_7f4a_7c15))) }
+        Self { state: mix64(self.state ^ mix64(key.wrapping_add(GOLDEN))) }
     }
 
     /// The next number, evenly in `0.0..1.0`.
     pub fn unit(&mut self) -> f32 {
-        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        (mix(self.state) >> 40) as f32 / (1u64 << 24) as f32
+        self.state = self.state.wrapping_add(GOLDEN);
+        (mix64(self.state) >> 40) as f32 / (1u64 << 24) as f32
     }
 
     /// The next number, evenly in `-1.0..1.0`.
@@ -36,13 +38,6 @@ impl Random {
     pub fn range(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * self.unit()
     }
-}
-
-/// The finaliser of `SplitMix64`.
-pub(super) fn mix(mut z: u64) -> u64 {
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }
 
 #[cfg(test)]

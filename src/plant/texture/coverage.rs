@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use super::resample::Layer;
+use crate::math::{MipChain, resample::Layer};
 
 /// Iterations at most; each one needs one pass over the interpolated mip.
 const ITERATIONS: usize = 12;
@@ -78,6 +78,19 @@ impl Distribution {
     /// Mean difference over the same thresholds.
     fn mean_error(&self, other: &Self) -> f64 {
         (128..256).map(|value| (self.0[value] - other.0[value]).abs()).sum::<f64>() / 128.0
+    }
+}
+
+impl MipChain {
+    /// The fraction, 0..1, of the area of `level` whose alpha, interpolated bilinearly between texels, reaches
+    /// `threshold` (0..1): what an alpha test draws when the level is sampled. Sampled on a fixed grid.
+    ///
+    /// 0 for a level that does not exist or has no texels.
+    pub fn drawn_coverage(&self, level: usize, threshold: f32) -> f32 {
+        let (width, height) = self.level_size(level);
+        let alphas: Vec<u8> =
+            self.levels.get(level).map_or_else(Vec::new, |bytes| bytes.chunks_exact(4).map(|texel| texel[3]).collect());
+        Distribution::of_drawn(&alphas, width as usize, height as usize).at(threshold)
     }
 }
 

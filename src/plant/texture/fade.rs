@@ -4,7 +4,7 @@ use image::RgbaImage;
 use rayon::prelude::*;
 
 use super::distance::{NearestSites, nearest_sites};
-use super::resample::to_byte;
+use crate::math::color::unorm8;
 
 /// Distance outside the outline, in texels, at which alpha has fallen to 0.
 const FALLOFF: f32 = 2.0;
@@ -64,7 +64,7 @@ pub fn fade_alpha(image: &RgbaImage, cutoff: f32) -> RgbaImage {
         .into_par_iter()
         .map(|at| {
             let alpha = if inside[at] { 0.5 + (0.5 * area[at]).max(STEP) } else { outline.outside_alpha(at, &area) };
-            to_byte(alpha)
+            unorm8(alpha)
         })
         .collect();
     for (texel, alpha) in out.chunks_exact_mut(4).zip(faded) {

@@ -3,11 +3,10 @@
 use image::RgbaImage;
 use rayon::prelude::*;
 
-use super::MipChain;
 use super::coverage::{Distribution, match_coverage};
 use super::dilate::dilate_colors;
 use super::fade::fade_alpha;
-use super::resample::{Layer, to_byte};
+use crate::math::{MipChain, color::unorm8, resample::Layer};
 
 /// A mean normal this short is the rounding of 8 bits.
 const NO_LENGTH: f32 = 0.01;
@@ -71,7 +70,7 @@ pub fn normal_mips(image: &RgbaImage) -> MipChain {
             .map(|&[x, y, z, _]| {
                 let length = (x * x + y * y + z * z).sqrt();
                 let unit = if length > NO_LENGTH { [x / length, y / length, z / length] } else { [0.0, 0.0, 1.0] };
-                let byte = |value: f32| to_byte(0.5 * value + 0.5);
+                let byte = |value: f32| unorm8(0.5 * value + 0.5);
                 [byte(unit[0]), byte(unit[1]), byte(unit[2]), 255]
             })
             .collect();

@@ -23,57 +23,8 @@ mod dilate;
 mod distance;
 mod fade;
 mod mips;
-mod resample;
 
 pub use dilate::dilate_colors;
 pub use distance::{NearestSites, nearest_sites};
 pub use fade::fade_alpha;
 pub use mips::{alpha_tested_mips, color_mips, leaf_mips, normal_mips};
-pub use resample::{linear_to_srgb, resize_to, srgb_to_linear};
-
-/// A texture with its mip levels, RGBA8, ready to be uploaded.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct MipChain {
-    /// Width of level 0 in texels.
-    pub width: u32,
-    /// Height of level 0 in texels.
-    pub height: u32,
-    /// The levels, full size first, down to 1x1. Level `n` holds [`MipChain::level_size`]`(n)` texels of 4 bytes,
-    /// row by row from the top.
-    pub levels: Vec<Vec<u8>>,
-}
-
-impl MipChain {
-    /// Width and height of `level` in texels: `size >> level`, at least 1 (0 only where level 0 is 0).
-    pub fn level_size(&self, level: usize) -> (u32, u32) {
-        let shrink = |size: u32| if size == 0 { 0 } else { size.checked_shr(level as u32).unwrap_or(0).max(1) };
-        (shrink(self.width), shrink(self.height))
-    }
-
-    /// The levels one after the other in one allocation, full size first: what a GPU upload expects.
-    pub fn concat(&self) -> Vec<u8> {
-        self.levels.concat()
-    }
-
-    /// The fraction, 0..1, of the area of `level` whose alpha, interpolated bilinearly between texels, reaches
-    /// `threshold` (0..1): what an alpha test draws when the level is sampled. Sampled on a fixed grid.
-    ///
-    /// 0 for a level that does not exist or has no texels.
-    pub fn drawn_coverage(&self, level: usize, threshold: f32) -> f32 {
-        let (width, height) = self.level_size(level);
-        let alphas: Vec<u8> =
-            self.levels.get(level).map_or_else(Vec::new, |bytes| bytes.chunks_exact(4).map(|texel| texel[3]).collect());
-        coverage::Distribution::of_drawn(&alphas, width as usize, height as usize).at(threshold)
-    }
-
-    /// The fraction, 0..1, of the texels of `level` whose alpha is at least `threshold` (0..1).
-    ///
-    /// 0 for a level that does not exist or has no texels.
-    pub fn coverage(&self, level: usize, threshold: f32) -> f32 {
-        let Some(texels) = self.levels.get(level).filter(|texels| !texels.is_empty()) else {
-            return 0.0;
-        };
-        let passing = texels.chunks_exact(4).filter(|texel| f32::from(texel[3]) / 255.0 >= threshold).count();
-        passing as f32 / (texels.len() / 4) as f32
-    }
-}

@@ -1,42 +1,42 @@
-//! The forest pass: full models near the camera, crossed billboards far away, one lighting for both.
+//! The forest pass: trees in the levels of detail that [`Forest::levels`](super::components::Forest::levels) lists, one
+//! lighting for all of them.
 //!
-//! From [Franzke 2005] 4.3 (billboards, blending by alpha test). A tree costs 16 bytes of instance data; the full
-//! models are drawn instanced, one call a variant and part, the crosses of all variants in one call of eighteen
-//! pulled vertices a tree. What is drawn is decided by [`cull`](super::cull) before the frame.
+//! From [Franzke 2005] 4.3 (billboards, blending by alpha test). A tree costs 16 bytes of instance data. What is drawn is
+//! decided by [`cull`](crate::cull) before the frame; how it is drawn, by the [`representation`] of each level.
 //!
 //! Limits: at most 64 variants a forest; no motion vectors; one camera.
 
-mod crosses;
-mod layouts;
-mod parts;
+mod gpu_forest;
+mod instances;
+mod leaves;
+mod levels;
+mod lists;
 mod pass;
-mod prepare;
-mod relight;
-mod resources;
+mod pipelines;
+pub mod representation;
+mod rotated_light;
 mod textures;
-mod transfer;
-mod uniforms;
+pub(super) mod transfer;
+pub(super) mod uniforms;
 mod vertex;
 
 use bevy::{
     app::{App, Plugin},
-    core_pipeline::{
-        Core3d, Core3dSystems,
-        core_3d::{main_opaque_pass_3d, main_transparent_pass_3d},
-    },
+    core_pipeline::Core3d,
     ecs::schedule::IntoScheduleConfigs,
-    render::{GpuResourceAppExt, Render, RenderApp, RenderSystems},
+    render::{GpuResourceAppExt, Render, RenderApp},
 };
 
-pub(crate) use layouts::ForestLayouts;
-pub use prepare::ForestStatistics;
-pub(crate) use prepare::{
-    ForestPipelines, PreparedForests, forest_view, instance_bind_group, opaque_depth, prepare_view_lists,
+use super::{
+    sets::{CanopyPasses, CanopyRenderSystems},
+    shaders::CanopyShaders,
 };
-pub use resources::GpuForests;
-pub(crate) use resources::prepare_forests;
-pub use transfer::TransferUniform;
-pub use uniforms::{ForestViewUniform, PartUniform, PlaneUniform, VariantUniform};
+pub use gpu_forest::{ForestLevel, GpuForest, GpuForests};
+pub use instances::{forest_view, instance_bind_group, instance_layout};
+pub use lists::{ForestStatistics, LevelStatistics};
+pub use pipelines::LevelPipelines;
+pub use representation::Representations;
+pub use uniforms::{ForestViewUniform, PartUniform, PlaneUniform, TransferUniform, VariantUniform};
 pub use vertex::PlantVertex;
 
 /// Draws [`Forest`](super::components::Forest)s.
@@ -44,28 +44,29 @@ pub struct ForestPassPlugin;
 
 impl Plugin for ForestPassPlugin {
     fn build(&self, app: &mut App) {
+        let mut known = app.world_mut().remove_resource::<Representations>().unwrap_or_default();
         let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
+        if let Some(shaders) = render_app.world().get_resource::<CanopyShaders>() {
+            for renderer in levels::built_in(shaders) {
+                known.add(renderer);
+            }
+        }
         render_app
-            .init_gpu_resource::<ForestLayouts>()
+            .insert_resource(known)
             .init_gpu_resource::<GpuForests>()
-            .init_gpu_resource::<PreparedForests>()
-            .init_gpu_resource::<ForestPipelines>()
+            .init_gpu_resource::<lists::PreparedForests>()
+            .init_gpu_resource::<LevelPipelines>()
             .init_gpu_resource::<transfer::TransferLight>()
             .init_resource::<ForestStatistics>()
             .add_systems(
                 Render,
-                (prepare_forests, prepare_view_lists, transfer::prepare_transfer_light, prepare::prepare_pipelines)
-                    .chain()
-                    .in_set(RenderSystems::PrepareResources)
-                    .after(super::frame::prepare_frame),
+                (
+                    gpu_forest::prepare_forests.in_set(CanopyRenderSystems::Upload),
+                    lists::prepare_view_lists.in_set(CanopyRenderSystems::Cull),
+                    rotated_light::prepare_transfer_light.in_set(CanopyRenderSystems::Light),
+                    pipelines::prepare_pipelines.in_set(CanopyRenderSystems::Pipelines),
+                ),
             )
-            .add_systems(
-                Core3d,
-                pass::forest_pass
-                    .after(main_opaque_pass_3d)
-                    .before(super::terrain::terrain_pass)
-                    .before(main_transparent_pass_3d)
-                    .in_set(Core3dSystems::MainPass),
-            );
+            .add_systems(Core3d, pass::forest_pass.in_set(CanopyPasses::Forest));
     }
 }

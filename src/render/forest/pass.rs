@@ -5,54 +5,35 @@ use bevy::{
     render::{
         camera::ExtractedCamera,
         diagnostic::RecordDiagnostics,
-        render_resource::{IndexFormat, PipelineCache, RenderPassDescriptor, StoreOp},
+        render_resource::{PipelineCache, RenderPassDescriptor, StoreOp},
         renderer::{RenderContext, ViewQuery},
         view::{ViewDepthTexture, ViewTarget},
     },
 };
 
-use super::{ForestPipelines, GpuForests, PreparedForests, crosses::CrossLight, parts::PartLight};
-use crate::{
-    plant::PartKind,
-    render::{components::CanopyCamera, frame::FrameBindGroup},
+use super::{
+    GpuForests, LevelPipelines,
+    lists::{PreparedForest, PreparedForests},
+    representation::LevelTarget,
 };
+use crate::render::{bindings::FrameBindGroup, components::CanopyCamera, view::PreparedFrame};
 
-/// Vertices that the cross shader pulls for one tree.
-const VERTICES_A_CROSS: u32 = 18;
-
-/// Draws every forest into the camera's colour and depth.
+/// Draws every forest into the camera's colour and depth, level by level.
 pub fn forest_pass(
     view: ViewQuery<(&ViewTarget, &ViewDepthTexture, &ExtractedCamera), With<CanopyCamera>>,
-    frame: Res<FrameBindGroup>,
+    frame: Res<PreparedFrame>,
+    group: Res<FrameBindGroup>,
     forests: Res<GpuForests>,
     prepared: Res<PreparedForests>,
-    pipelines: Res<ForestPipelines>,
+    pipelines: Res<LevelPipelines>,
     cache: Res<PipelineCache>,
     mut ctx: RenderContext,
 ) {
-    let frame = frame.of(view.entity());
+    let group = group.of(view.entity());
     let (target, depth, camera) = view.into_inner();
-    let (Some(frame), Some(current)) = (frame, pipelines.current) else { return };
-    let something = forests.iter().any(|(entity, _)| {
-        prepared.get(entity).is_some_and(|forest| forest.lists.model_count() + forest.lists.cross_count() > 0)
-    });
-    let ready = |id| cache.get_render_pipeline(id);
-    let mut crosses = Vec::with_capacity(CrossLight::ALL.len());
-    for (light, id) in CrossLight::ALL.into_iter().zip(current.crosses) {
-        let Some(id) = id else { continue };
-        let Some(pipeline) = ready(id) else { return };
-        crosses.push((light, pipeline));
-    }
-    let mut models = Vec::with_capacity(2 * PartLight::ALL.len());
-    for (light, ids) in PartLight::ALL.into_iter().zip(current.models) {
-        for (kind, id) in [PartKind::Wood, PartKind::Foliage].into_iter().zip(ids.into_iter().flatten()) {
-            let Some(pipeline) = ready(id) else { return };
-            models.push((kind, light, pipeline));
-        }
-    }
-    // All wood first: what it hides of the leaves is not shaded.
-    models.sort_by_key(|(kind, ..)| *kind == PartKind::Foliage);
-    if !something {
+    let (Some(group), Some(prepared_view)) = (group, &frame.view) else { return };
+    let level_target = LevelTarget::View(prepared_view.attachment);
+    if !prepared.draw_something() || !pipelines.ready(&forests, level_target, &cache) {
         return;
     }
     let diagnostics = ctx.diagnostic_recorder();
@@ -69,39 +50,16 @@ pub fn forest_pass(
     if let Some(viewport) = &camera.viewport {
         pass.set_camera_viewport(viewport);
     }
+    pass.set_bind_group(0, group, &[]);
     for (entity, forest) in forests.iter() {
         let Some(lists) = prepared.get(entity) else { continue };
-        pass.set_bind_group(0, frame, &[]);
-        pass.set_bind_group(1, &lists.bind_group, &[0]);
-        for &(kind, light, pipeline) in &models {
-            pass.set_render_pipeline(pipeline);
-            for (range, parts) in lists.lists.models.iter().zip(&forest.parts) {
-                if range.is_empty() {
-                    continue;
-                }
-                for part in parts.iter().filter(|part| part.kind == kind && part.light == light) {
-                    if part.model.index_count == 0 {
-                        continue;
-                    }
-                    if let Some(group) = &part.transfer {
-                        pass.set_bind_group(3, group, &[]);
-                    }
-                    pass.set_bind_group(2, &part.bind_group, &[]);
-                    pass.set_vertex_buffer(0, part.model.vertices.slice(..));
-                    pass.set_index_buffer(part.model.indices.slice(..), IndexFormat::Uint32);
-                    pass.draw_indexed(0..part.model.index_count, 0, range.clone());
-                }
+        for (index, level) in forest.levels().filter(|(index, _)| lists.lists.count(*index) > 0) {
+            pass.set_bind_group(1, &lists.bind_group, &[PreparedForest::offset(index)]);
+            for features in level.gpu.features(level_target) {
+                let Some(pipeline) = pipelines.get(&*level.renderer, features, level_target, &cache) else { continue };
+                pass.set_render_pipeline(pipeline);
+                level.gpu.draw(&mut pass, features, level_target, lists.lists.ranges(index));
             }
-        }
-        let range = &lists.lists.crosses;
-        let pipeline = crosses.iter().find(|(light, _)| *light == forest.cross_light);
-        if let Some((_, pipeline)) = pipeline.filter(|_| !range.is_empty()) {
-            pass.set_render_pipeline(pipeline);
-            pass.set_bind_group(2, &forest.cross_bind_group, &[]);
-            if let Some(pictures) = &forest.cross_pictures {
-                pass.set_bind_group(3, pictures, &[]);
-            }
-            pass.draw(range.start * VERTICES_A_CROSS..range.end * VERTICES_A_CROSS, 0..1);
         }
     }
     span.end(&mut pass);

@@ -1,4 +1,4 @@
-//! The pictures of full models, each filtered for its use and uploaded once.
+//! The textures of full models, each filtered for its use and uploaded once.
 
 use std::sync::Arc;
 
@@ -11,9 +11,10 @@ use bevy::{
 };
 
 use crate::{
+    math::MipChain,
     plant::{
         PartKind, PlantMaterial,
-        texture::{MipChain, color_mips, leaf_mips, normal_mips},
+        texture::{color_mips, leaf_mips, normal_mips},
     },
     render::gpu,
 };
@@ -29,12 +30,12 @@ enum TextureUse {
 
 /// Textures that several parts share are uploaded once.
 #[derive(Default)]
-pub struct TextureShelf {
+pub struct TextureCache {
     views: HashMap<(usize, TextureUse), TextureView>,
 }
 
-impl TextureShelf {
-    /// The base colour of a part of `kind`; white without a picture.
+impl TextureCache {
+    /// The base colour of a part of `kind`; white without a texture.
     pub fn color(
         &mut self,
         material: &PlantMaterial,
@@ -58,7 +59,7 @@ impl TextureShelf {
             .clone()
     }
 
-    /// The normal map; flat without a picture.
+    /// The normal map; flat without a texture.
     pub fn normal(&mut self, material: &PlantMaterial, device: &RenderDevice, queue: &RenderQueue) -> TextureView {
         let format = TextureFormat::Rgba8Unorm;
         let Some(image) = &material.normal_texture else {

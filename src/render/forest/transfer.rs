@@ -10,84 +10,68 @@
 use std::{f32::consts::TAU, sync::Arc};
 
 use bevy::{
-    ecs::{
-        resource::Resource,
-        system::{Res, ResMut},
-    },
-    render::{
-        render_resource::{BindGroup, BindGroupEntries, Buffer, BufferDescriptor, BufferUsages, PipelineCache},
-        renderer::{RenderDevice, RenderQueue},
+    ecs::resource::Resource,
+    render::render_resource::{
+        BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer, BufferDescriptor,
+        BufferUsages, ShaderStages, binding_types::storage_buffer_read_only_sized,
     },
 };
-use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use super::{layouts::ForestLayouts, resources::GpuForests};
+use super::uniforms::{TransferUniform, WORDS};
 use crate::{
-    bake::transfer::{PackedPart, TransferSettings, code_words, mean_words},
+    bake::lighting::transfer::{PackedPart, TransferSettings},
     light::{
         LightState,
-        atmosphere::luminance,
-        sh::{MAX_BANDS, basis_into, rotate_y},
+        sh::{basis_into, rotate_y},
     },
-    plant::LeafColors,
-    render::{components::SunLight, extract::ExtractedScene, frame::PreparedFrame, gpu, report::FrameReport},
+    render::{
+        components::SunLight,
+        gpu::{Gpu, buffer_with},
+    },
+    scatter::packed::YAW_BITS,
 };
 
 /// Yaws of a packed tree.
-const YAWS: usize = 256;
-/// Words of four coefficients after the first, of all bands.
-const WORDS: usize = (MAX_BANDS * MAX_BANDS - 1).div_ceil(4);
+pub const YAWS: usize = 1 << YAW_BITS;
 /// Vectors from one yaw's light to the next: the first coefficient, then red, green and blue of each word.
-const STRIDE: usize = 1 + 3 * WORDS;
+pub const STRIDE: usize = 1 + 3 * WORDS;
 /// Bytes of one light in all yaws.
-const SET_BYTES: u64 = (YAWS * STRIDE * size_of::<[f32; 4]>()) as u64;
+pub const SET_BYTES: u64 = (YAWS * STRIDE * size_of::<[f32; 4]>()) as u64;
 
-/// `Transfer` of `shaders/forest/transfer.wgsl`.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct TransferUniform {
-    /// What 127 stands for in each coefficient after the first, relative to it, four a word of codes.
-    pub scale: [[f32; 4]; WORDS],
-    /// Words from one vertex to the next, of its means, and of the codes of one side and channel; where the codes of the key
-    /// light that leaves send each other begin.
-    pub form: [u32; 4],
-    /// Colour of the key light that leaves send each other; w: what 127 stands for in its codes.
-    pub scattered: [f32; 4],
-}
-
-impl TransferUniform {
-    fn new(settings: &TransferSettings, part: &PackedPart, tint: Vec3) -> Self {
-        let mut scale = [0.0; 4 * WORDS];
-        for (i, scale) in scale.iter_mut().enumerate() {
-            *scale = part.scale.get((i + 1).isqrt()).copied().unwrap_or(0.0);
-        }
-        let form =
-            [part.vertex_bytes / 4, mean_words(settings, part.sides), code_words(settings), part.bytes.len() / 4];
-        Self {
-            scale: bytemuck::cast(scale),
-            form: form.map(|words| words as u32),
-            scattered: tint.extend(part.scattered_scale).to_array(),
-        }
-    }
+/// Layout of group 3: the rotated light, the part's coefficients, their layout.
+pub fn transfer_layout() -> BindGroupLayoutDescriptor {
+    BindGroupLayoutDescriptor::new(
+        "canopy_transfer",
+        &BindGroupLayoutEntries::sequential(
+            ShaderStages::VERTEX,
+            (
+                storage_buffer_read_only_sized(false, None),
+                storage_buffer_read_only_sized(false, None),
+                storage_buffer_read_only_sized(false, std::num::NonZeroU64::new(size_of::<TransferUniform>() as u64)),
+            ),
+        ),
+    )
 }
 
 /// The light of the moment, turned.
 #[derive(Resource, Default)]
 pub struct TransferLight {
-    buffer: Option<Buffer>,
-    wanted: Wanted,
+    /// The rotated light; `None` until a plant asks for it.
+    pub buffer: Option<Buffer>,
+    /// What plants ask of it.
+    pub wanted: Wanted,
     /// What the buffer holds.
-    known: Option<(Arc<LightState>, f32, Wanted)>,
+    pub known: Option<(Arc<LightState>, f32, Wanted)>,
 }
 
 /// What plants ask of the turned light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Wanted {
+pub struct Wanted {
     /// The most bands.
-    bands: usize,
+    pub bands: usize,
     /// The sun's light too.
-    sun: bool,
+    pub sun: bool,
 }
 
 impl TransferLight {
@@ -97,14 +81,12 @@ impl TransferLight {
         (settings, part): (&TransferSettings, &PackedPart),
         tint: Vec3,
         sun: SunLight,
-        layouts: &ForestLayouts,
-        device: &RenderDevice,
-        pipelines: &PipelineCache,
+        gpu: &Gpu,
     ) -> BindGroup {
         self.wanted.bands = self.wanted.bands.max(settings.bands.into());
         self.wanted.sun |= sun == SunLight::Harmonics;
         let light = self.buffer.get_or_insert_with(|| {
-            device.create_buffer(&BufferDescriptor {
+            gpu.device.create_buffer(&BufferDescriptor {
                 label: Some("canopy_turned_light"),
                 // Sky and sun.
                 size: 2 * SET_BYTES,
@@ -113,12 +95,12 @@ impl TransferLight {
             })
         });
         let words = [part.bytes.as_slice(), part.scattered.as_slice()].concat();
-        let coefficients = gpu::buffer_with(device, "canopy_transfer", BufferUsages::STORAGE, &words);
+        let coefficients = buffer_with(&gpu.device, "canopy_transfer", BufferUsages::STORAGE, &words);
         let uniform = [TransferUniform::new(settings, part, tint)];
-        let uniform = gpu::buffer_with(device, "canopy_transfer_layout", BufferUsages::STORAGE, &uniform);
-        device.create_bind_group(
+        let uniform = buffer_with(&gpu.device, "canopy_transfer_layout", BufferUsages::STORAGE, &uniform);
+        gpu.bind_group(
             "canopy_transfer",
-            &pipelines.get_bind_group_layout(&layouts.transfer),
+            &transfer_layout(),
             &BindGroupEntries::sequential((
                 light.as_entire_binding(),
                 coefficients.as_entire_binding(),
@@ -128,62 +110,15 @@ impl TransferLight {
     }
 }
 
-/// Turns the light where it, the exposure or what is asked of it has changed.
-pub fn prepare_transfer_light(
-    scene: Res<ExtractedScene>,
-    frame: Res<PreparedFrame>,
-    forests: Res<GpuForests>,
-    queue: Res<RenderQueue>,
-    report: Res<FrameReport>,
-    mut transfer: ResMut<TransferLight>,
-) {
-    let transfer = &mut *transfer;
-    // Plants may have come into another light since.
-    let lit =
-        || forests.iter().flat_map(|(_, forest)| forest.parts.iter().flatten()).any(|part| part.transfer.is_some());
-    let Some(buffer) = transfer.buffer.as_ref().filter(|_| lit()) else {
-        report.skipped("transfer light", "no plant is lit by radiance transfer");
-        return;
-    };
-    let (Some(view), Some(daylight)) = (&frame.view, &scene.daylight) else { return };
-    let same = |(light, exposure, wanted): &(Arc<LightState>, f32, Wanted)| {
-        Arc::ptr_eq(light, &daylight.0) && *exposure == view.exposure && *wanted == transfer.wanted
-    };
-    if transfer.known.as_ref().is_some_and(same) {
-        report.skipped("transfer light", "the light rests");
-        return;
-    }
-    let Wanted { bands, sun } = transfer.wanted;
-    let sky = daylight.0.surroundings().project(bands);
-    queue.write_buffer(buffer, 0, bytemuck::cast_slice(&turned(&sky, view.exposure)));
-    if sun {
-        let light = beam(daylight.0.key_direction, daylight.0.key_illuminance, bands);
-        queue.write_buffer(buffer, SET_BYTES, bytemuck::cast_slice(&turned(&light, view.exposure)));
-    }
-    transfer.known = Some((daylight.0.clone(), view.exposure, transfer.wanted));
-    let of = if sun { "sky and sun, " } else { "" };
-    report.ran("transfer light", format!("{of}{bands} bands turned into {YAWS} yaws"));
-}
-
-/// The colour that light takes on from a leaf, by its luminance; white where leaves are black.
-///
-/// With one channel a transfer holds what comes over other leaves by the luminance of their colours. That of the sky is a
-/// few percent of its light and stays without colour; that of the sun is most of what lights the shade inside a crown.
-pub fn scattered_tint(leaves: &LeafColors) -> Vec3 {
-    let color = leaves.reflected + leaves.transmitted;
-    let light = luminance(color);
-    if light > 1e-4 { color / light } else { Vec3::ONE }
-}
-
 /// Coefficients of light that comes from one direction (unit), `illuminance` lux on what faces it.
-fn beam(direction: Vec3, illuminance: Vec3, bands: usize) -> Vec<Vec3> {
+pub fn beam(direction: Vec3, illuminance: Vec3, bands: usize) -> Vec<Vec3> {
     let mut basis = vec![0.0; bands * bands];
     basis_into(direction, &mut basis);
     basis.into_iter().map(|value| illuminance * value).collect()
 }
 
 /// `light` as each yaw's plant sees it, times `exposure`; zeros beyond its bands.
-fn turned(light: &[Vec3], exposure: f32) -> Vec<[f32; 4]> {
+pub fn turned(light: &[Vec3], exposure: f32) -> Vec<[f32; 4]> {
     let mut rows = Vec::with_capacity(YAWS * STRIDE);
     for yaw in 0..YAWS {
         let mut seen = light.to_vec();

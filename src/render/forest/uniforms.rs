@@ -2,11 +2,21 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::transfer::scattered_tint;
+use glam::Vec3;
+
 use crate::{
-    bake::{BakedPlant, billboard::SPREAD_LEVELS, lighting::BakedLighting},
-    plant::PlantMaterial,
-    render::cull::VariantSize,
+    bake::{
+        BakedPlant,
+        levels::cross::SPREAD_LEVELS,
+        lighting::{
+            BakedLighting,
+            transfer::{PackedPart, TransferSettings, code_words, mean_words},
+        },
+    },
+    light::sh::MAX_BANDS,
+    math::luminance,
+    plant::{LeafColors, PlantMaterial},
+    scatter::PlantSize,
 };
 
 /// `ForestView` of `shaders/forest/instance.wgsl`.
@@ -21,10 +31,14 @@ pub struct ForestViewUniform {
     pub anchor_y: f32,
     /// Metres along a cell's side.
     pub cell_size: f32,
-    /// Where the full model begins to give way, metres.
-    pub fade_start: f32,
-    /// Where it is gone, metres.
-    pub fade_end: f32,
+    /// Distances in metres over which the level comes in.
+    pub fade_in: [f32; 2],
+    /// Distances in metres over which it goes out.
+    pub fade_out: [f32; 2],
+    /// WGSL aligns the next member to 16 bytes.
+    pub padding: [f32; 2],
+    /// Linear colour of the level's tint and how much of it is mixed in.
+    pub tint: [f32; 4],
 }
 
 /// `Plane` of `shaders/forest/instance.wgsl`.
@@ -43,6 +57,10 @@ pub struct PlaneUniform {
 
 /// Planes of a cross.
 pub const PLANES: usize = 3;
+/// Vertices that the shader pulls for a tree's cross.
+pub const CROSS_VERTICES: u32 = 6 * PLANES as u32;
+/// Vertices that the caster's shader pulls for a tree's cross: an upright plane and the level one.
+pub const CROSS_CASTER_VERTICES: u32 = 12;
 
 /// `Variant` of `shaders/forest/instance.wgsl`.
 #[repr(C)]
@@ -50,19 +68,32 @@ pub const PLANES: usize = 3;
 pub struct VariantUniform {
     /// Two upright planes and a level one.
     pub planes: [PlaneUniform; PLANES],
-    /// Height, crown radius, first layer of its pictures, 1 where it has a full model.
-    pub size: [f32; 4],
-    /// Transmission of its leaves; w: 1 where k_a was traced and holds what leaves send each other.
-    pub transmission: [f32; 4],
-    /// How far the leaves of a texel face everywhere, mip by mip.
-    pub spread: [[f32; 4]; SPREAD_LEVELS / 4],
-    /// Gloss of its leaves: reflectance, roughness, 1 where normals point out of the crown; w: first layer of its lighting
-    /// pictures.
-    pub gloss: [f32; 4],
-    /// Light of the key light that its leaves send each other, in the mean: colour, first coefficient.
-    pub scattered: [f32; 4],
-    /// Its second band's rise towards the zenith; unused, unused, unused.
-    pub scattered_rise: [f32; 4],
+    /// Metres.
+    pub height: f32,
+    /// Metres.
+    pub crown_radius: f32,
+    /// First layer of its textures.
+    pub first_layer: u32,
+    /// First layer of its lighting textures, where it has some.
+    pub first_light_layer: u32,
+    /// Factor for light through its leaves ([`PlantMaterial::transmission`]), in the mean.
+    pub transmission: [f32; 3],
+    /// 1 where it is lit by radiance transfer: its ambient visibility is traced, and holds what leaves scatter.
+    pub radiance_transfer: u32,
+    /// Fraction of a texel's leaf area with isotropic normals, mip by mip.
+    pub isotropic_fraction: [[f32; 4]; SPREAD_LEVELS / 4],
+    /// Specular reflectance of its leaves.
+    pub specular_reflectance: f32,
+    /// Root mean square slope of their facets.
+    pub roughness: f32,
+    /// 1 where the foliage's normals point out of the crown, else 0.
+    pub realigned: f32,
+    /// Indirect light of the key light in the mean over its leaves: the second band's component towards the zenith.
+    pub indirect_sun_zenith: f32,
+    /// Its colour.
+    pub indirect_sun_color: [f32; 3],
+    /// Its first coefficient.
+    pub indirect_sun_mean: f32,
 }
 
 /// `Part` of `shaders/forest/model.wgsl`.
@@ -70,30 +101,88 @@ pub struct VariantUniform {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct PartUniform {
     /// Linear factor on the texture.
-    pub base_color: [f32; 4],
-    /// Transmission factor; w: 1 where the normals point out of the crown, whichever side of a leaf is seen.
-    pub transmission: [f32; 4],
-    /// Gloss: reflectance, roughness; unused, unused.
-    pub gloss: [f32; 4],
+    pub base_color: [f32; 3],
+    /// 1 where the normals point out of the crown, whichever side of a leaf is seen; else 0.
+    pub realigned: f32,
+    /// Factor for light from behind ([`PlantMaterial::transmission`]).
+    pub transmission: [f32; 3],
+    /// Share of the light that the surface of a leaf reflects without letting it in; 0: matt.
+    pub specular_reflectance: f32,
+    /// Root mean square slope of its facets.
+    pub roughness: f32,
+    /// WGSL rounds the size up to 16 bytes.
+    pub padding: [f32; 3],
+}
+
+/// Words of four coefficients after the first, of all bands.
+pub const WORDS: usize = (MAX_BANDS * MAX_BANDS - 1).div_ceil(4);
+
+/// `Transfer` of `shaders/forest/transfer.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct TransferUniform {
+    /// What 127 stands for in each coefficient after the first, relative to it, four a word of codes.
+    pub scale: [[f32; 4]; WORDS],
+    /// Words from one vertex to the next.
+    pub vertex_words: u32,
+    /// Words of a vertex's means, which stand first.
+    pub mean_words: u32,
+    /// Words of the codes of one side and channel.
+    pub side_words: u32,
+    /// Where the codes of the indirect key light begin, a word a vertex.
+    pub indirect_sun_start: u32,
+    /// Colour of the indirect key light, which leaves send each other.
+    pub indirect_sun_color: [f32; 3],
+    /// What 127 stands for in its codes.
+    pub indirect_sun_scale: f32,
+}
+
+impl TransferUniform {
+    /// That of one part of a plant.
+    pub fn new(settings: &TransferSettings, part: &PackedPart, tint: Vec3) -> Self {
+        let mut scale = [0.0; 4 * WORDS];
+        for (i, scale) in scale.iter_mut().enumerate() {
+            *scale = part.scale.get((i + 1).isqrt()).copied().unwrap_or(0.0);
+        }
+        Self {
+            scale: bytemuck::cast(scale),
+            vertex_words: (part.vertex_bytes / 4) as u32,
+            mean_words: mean_words(settings, part.sides) as u32,
+            side_words: code_words(settings) as u32,
+            indirect_sun_start: (part.bytes.len() / 4) as u32,
+            indirect_sun_color: tint.to_array(),
+            indirect_sun_scale: part.scattered_scale,
+        }
+    }
+}
+
+/// The colour that light takes on from a leaf, by its luminance; white where leaves are black.
+///
+/// With one channel a transfer holds what comes over other leaves by the luminance of their colours. That of the sky is a
+/// few percent of its light and stays without colour; that of the sun is most of what lights the shade inside a crown.
+pub fn scattered_tint(leaves: &LeafColors) -> Vec3 {
+    let color = leaves.reflected + leaves.transmitted;
+    let light = luminance(color);
+    if light > 1e-4 { color / light } else { Vec3::ONE }
 }
 
 /// What the shaders know of each plant.
-pub fn variants(plants: &[BakedPlant], sizes: &[VariantSize]) -> Vec<VariantUniform> {
-    let mut lit_layer = 0;
+pub fn variants(plants: &[BakedPlant], sizes: &[PlantSize]) -> Vec<VariantUniform> {
+    let mut light_layer = 0;
     plants
         .iter()
         .zip(sizes)
         .enumerate()
         .map(|(index, (plant, size))| {
-            let variant = variant(index, plant, size, lit_layer);
-            lit_layer += plant.cross.textures.light.len();
+            let variant = variant(index, plant, size, light_layer);
+            light_layer += plant.cross.textures.light.len();
             variant
         })
         .collect()
 }
 
-/// `lit_layer`: the first of its lighting pictures, if it has any.
-fn variant(index: usize, plant: &BakedPlant, size: &VariantSize, lit_layer: usize) -> VariantUniform {
+/// `light_layer`: the first of its lighting textures, if it has any.
+fn variant(index: usize, plant: &BakedPlant, size: &PlantSize, light_layer: usize) -> VariantUniform {
     let mut planes = [PlaneUniform::default(); PLANES];
     for (slot, plane) in planes.iter_mut().zip(&plant.cross.planes) {
         *slot = PlaneUniform {
@@ -103,17 +192,23 @@ fn variant(index: usize, plant: &BakedPlant, size: &VariantSize, lit_layer: usiz
             normal: plane.normal.extend(0.0).to_array(),
         };
     }
-    let traced = f32::from(u8::from(matches!(*plant.lighting, BakedLighting::Transfer(_))));
     let gloss = plant.plant.leaf_gloss();
-    let (mean, rise) = plant.lighting.scattered();
+    let (mean, zenith) = plant.lighting.scattered();
     VariantUniform {
         planes,
-        size: [size.height, size.radius, (index * PLANES) as f32, 1.0],
-        transmission: plant.cross.transmission.extend(traced).to_array(),
-        spread: bytemuck::cast(plant.cross.spread),
-        gloss: [gloss.reflectance, gloss.roughness, realigned(&plant.lighting), lit_layer as f32],
-        scattered: scattered_tint(&plant.plant.leaf_colors()).extend(mean).to_array(),
-        scattered_rise: [rise, 0.0, 0.0, 0.0],
+        height: size.height,
+        crown_radius: size.radius,
+        first_layer: (index * PLANES) as u32,
+        first_light_layer: light_layer as u32,
+        transmission: plant.cross.transmission.to_array(),
+        radiance_transfer: u32::from(matches!(*plant.lighting, BakedLighting::Transfer(_))),
+        isotropic_fraction: bytemuck::cast(plant.cross.spread),
+        specular_reflectance: gloss.reflectance,
+        roughness: gloss.roughness,
+        realigned: realigned(&plant.lighting),
+        indirect_sun_zenith: zenith,
+        indirect_sun_color: scattered_tint(&plant.plant.leaf_colors()).to_array(),
+        indirect_sun_mean: mean,
     }
 }
 
@@ -126,8 +221,11 @@ fn realigned(lighting: &BakedLighting) -> f32 {
 pub fn part_uniform(material: &PlantMaterial, lighting: &BakedLighting) -> PartUniform {
     let gloss = material.gloss.in_range();
     PartUniform {
-        base_color: material.base_color.extend(1.0).to_array(),
-        transmission: material.transmission.extend(realigned(lighting)).to_array(),
-        gloss: [gloss.reflectance, gloss.roughness, 0.0, 0.0],
+        base_color: material.base_color.to_array(),
+        realigned: realigned(lighting),
+        transmission: material.transmission.to_array(),
+        specular_reflectance: gloss.reflectance,
+        roughness: gloss.roughness,
+        padding: [0.0; 3],
     }
 }

@@ -8,7 +8,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 use half::f16;
 
-use crate::bake::implicit::packing;
+use crate::bake::lighting::implicit::packing;
 
 /// A vertex of the full model or of its shadow proxy.
 #[repr(C)]

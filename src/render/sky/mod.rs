@@ -7,10 +7,8 @@
 
 use bevy::{
     app::{App, Plugin},
-    core_pipeline::{
-        Core3d, Core3dSystems,
-        core_3d::{CORE_3D_DEPTH_FORMAT, main_opaque_pass_3d, main_transparent_pass_3d},
-    },
+    asset::Handle,
+    core_pipeline::Core3d,
     ecs::{
         query::With,
         resource::Resource,
@@ -18,36 +16,36 @@ use bevy::{
         system::{Res, ResMut},
         world::{FromWorld, World},
     },
-    platform::collections::HashMap,
     render::{
-        GpuResourceAppExt, Render, RenderApp, RenderSystems,
+        GpuResourceAppExt, Render, RenderApp,
         camera::ExtractedCamera,
         diagnostic::RecordDiagnostics,
         render_resource::{
-            CachedRenderPipelineId, ColorTargetState, ColorWrites, CompareFunction, DepthBiasState, DepthStencilState,
-            FragmentState, MultisampleState, PipelineCache, RenderPassDescriptor, RenderPipelineDescriptor,
-            StencilState, StoreOp, Texture, TextureFormat, TextureView, VertexState,
+            CachedRenderPipelineId, DepthStencilState, PipelineCache, RenderPassDescriptor, RenderPipelineDescriptor,
+            SpecializedRenderPipeline, SpecializedRenderPipelines, StoreOp, Texture, TextureView,
         },
         renderer::{RenderContext, RenderDevice, RenderQueue, ViewQuery},
         view::{ViewDepthTexture, ViewTarget},
     },
+    shader::Shader,
 };
 
 use super::{
+    bindings::{FrameBindGroup, SharedTextures, frame_layout},
     components::{CanopyCamera, Daylight},
     extract::ExtractedScene,
-    frame::{FrameBindGroup, FrameLayout, PreparedFrame},
-    gpu,
+    gpu::{self, opaque_depth},
     report::FrameReport,
-    shaders::CanopyShaders,
+    sets::{CanopyPasses, CanopyRenderSystems},
+    shaders::{CanopyShaders, ShaderFile},
+    view::{PreparedFrame, ViewFormat},
 };
 use crate::light::atmosphere::SkyView;
 
 /// The sky's radiance on the GPU.
 #[derive(Resource)]
-pub struct SkyTexture {
-    /// For sampling.
-    pub view: TextureView,
+struct SkyTexture {
+    view: TextureView,
     texture: Texture,
     shows: Option<(Daylight, f32)>,
 }
@@ -60,11 +58,34 @@ impl FromWorld for SkyTexture {
     }
 }
 
-#[derive(Resource, Default)]
-struct SkyPipelines {
-    pipelines: HashMap<(TextureFormat, u32), CachedRenderPipelineId>,
-    current: Option<CachedRenderPipelineId>,
+/// The pipeline of the sky, specialised by the camera's attachment.
+#[derive(Resource)]
+struct SkyPipeline {
+    shader: Handle<Shader>,
 }
+
+impl FromWorld for SkyPipeline {
+    fn from_world(world: &mut World) -> Self {
+        Self { shader: world.resource::<CanopyShaders>().get(ShaderFile::SkyPass) }
+    }
+}
+
+impl SpecializedRenderPipeline for SkyPipeline {
+    type Key = ViewFormat;
+
+    fn specialize(&self, key: ViewFormat) -> RenderPipelineDescriptor {
+        let depth = DepthStencilState { depth_write_enabled: Some(false), ..opaque_depth() };
+        RenderPipelineDescriptor {
+            label: Some("canopy_sky".into()),
+            layout: vec![frame_layout()],
+            ..key.pipeline(&self.shader, Vec::new(), depth)
+        }
+    }
+}
+
+/// The pipeline of the prepared view.
+#[derive(Resource, Default)]
+struct CurrentSkyPipeline(Option<CachedRenderPipelineId>);
 
 /// Draws the sky.
 pub struct SkyPassPlugin;
@@ -74,21 +95,17 @@ impl Plugin for SkyPassPlugin {
         let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
         render_app
             .init_gpu_resource::<SkyTexture>()
-            .init_gpu_resource::<SkyPipelines>()
+            .init_gpu_resource::<SkyPipeline>()
+            .init_gpu_resource::<SpecializedRenderPipelines<SkyPipeline>>()
+            .init_resource::<CurrentSkyPipeline>()
             .add_systems(
                 Render,
-                (upload_sky, prepare_pipeline)
-                    .in_set(RenderSystems::PrepareResources)
-                    .after(super::frame::prepare_frame),
+                (
+                    upload_sky.in_set(CanopyRenderSystems::Light),
+                    prepare_pipeline.in_set(CanopyRenderSystems::Pipelines),
+                ),
             )
-            .add_systems(
-                Core3d,
-                sky_pass
-                    .after(main_opaque_pass_3d)
-                    .after(super::terrain::terrain_pass)
-                    .before(main_transparent_pass_3d)
-                    .in_set(Core3dSystems::MainPass),
-            );
+            .add_systems(Core3d, sky_pass.in_set(CanopyPasses::Sky));
     }
 }
 
@@ -98,7 +115,9 @@ fn upload_sky(
     queue: Res<RenderQueue>,
     report: Res<FrameReport>,
     mut sky: ResMut<SkyTexture>,
+    mut shared: ResMut<SharedTextures>,
 ) {
+    shared.sky = sky.view.clone();
     let (Some(view), Some(daylight)) = (&frame.view, &scene.daylight) else { return };
     let known = sky
         .shows
@@ -117,60 +136,29 @@ fn upload_sky(
 
 fn prepare_pipeline(
     frame: Res<PreparedFrame>,
-    layout: Res<FrameLayout>,
-    shaders: Res<CanopyShaders>,
+    pipeline: Res<SkyPipeline>,
     cache: Res<PipelineCache>,
     report: Res<FrameReport>,
-    mut pipelines: ResMut<SkyPipelines>,
+    mut pipelines: ResMut<SpecializedRenderPipelines<SkyPipeline>>,
+    mut current: ResMut<CurrentSkyPipeline>,
 ) {
     if frame.view.is_some() {
         report.ran("sky", "behind everything");
     }
-    pipelines.current = frame.view.as_ref().map(|view| {
-        *pipelines.pipelines.entry((view.format, view.samples)).or_insert_with(|| {
-            cache.queue_render_pipeline(RenderPipelineDescriptor {
-                label: Some("canopy_sky".into()),
-                layout: vec![layout.0.clone()],
-                vertex: VertexState {
-                    shader: shaders.get("sky/sky.wgsl"),
-                    entry_point: Some("vertex".into()),
-                    ..Default::default()
-                },
-                depth_stencil: Some(DepthStencilState {
-                    format: CORE_3D_DEPTH_FORMAT,
-                    depth_write_enabled: Some(false),
-                    depth_compare: Some(CompareFunction::GreaterEqual),
-                    stencil: StencilState::default(),
-                    bias: DepthBiasState::default(),
-                }),
-                multisample: MultisampleState { count: view.samples, ..Default::default() },
-                fragment: Some(FragmentState {
-                    shader: shaders.get("sky/sky.wgsl"),
-                    entry_point: Some("fragment".into()),
-                    targets: vec![Some(ColorTargetState {
-                        format: view.format,
-                        blend: None,
-                        write_mask: ColorWrites::ALL,
-                    })],
-                    ..Default::default()
-                }),
-                ..Default::default()
-            })
-        })
-    });
+    current.0 = frame.view.as_ref().map(|view| pipelines.specialize(&cache, &pipeline, view.attachment));
 }
 
 /// Fills what nothing else covers.
 fn sky_pass(
     view: ViewQuery<(&ViewTarget, &ViewDepthTexture, &ExtractedCamera), With<CanopyCamera>>,
     frame: Res<FrameBindGroup>,
-    pipelines: Res<SkyPipelines>,
+    pipeline: Res<CurrentSkyPipeline>,
     cache: Res<PipelineCache>,
     mut ctx: RenderContext,
 ) {
     let frame = frame.of(view.entity());
     let (target, depth, camera) = view.into_inner();
-    let (Some(frame), Some(pipeline)) = (frame, pipelines.current.and_then(|id| cache.get_render_pipeline(id))) else {
+    let (Some(frame), Some(pipeline)) = (frame, pipeline.0.and_then(|id| cache.get_render_pipeline(id))) else {
         return;
     };
     let diagnostics = ctx.diagnostic_recorder();

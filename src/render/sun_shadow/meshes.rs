@@ -29,11 +29,11 @@ use bevy::{
 };
 use glam::{DVec3, Mat4};
 
-use super::prepare::{CasterLayouts, caster_depth};
 use crate::render::{
+    bindings::{SHADOW_FORMAT, caster_layout},
     extract::ExtractedScene,
-    gpu::{self, UNIFORM_STRIDE},
-    shaders::CanopyShaders,
+    gpu::{self, UNIFORM_STRIDE, reversed_depth},
+    shaders::{CanopyShaders, ShaderFile},
 };
 
 /// Stride and topology: what a pipeline depends on.
@@ -144,7 +144,6 @@ impl MeshCasters {
 pub fn prepare_mesh_casters(
     scene: Res<ExtractedScene>,
     meshes: Res<RenderAssets<RenderMesh>>,
-    layouts: Res<CasterLayouts>,
     shaders: Res<CanopyShaders>,
     cache: Res<PipelineCache>,
     mut casters: ResMut<MeshCasters>,
@@ -168,9 +167,9 @@ pub fn prepare_mesh_casters(
         let pipeline = *casters.pipelines.entry((layout.array_stride, topology)).or_insert_with(|| {
             cache.queue_render_pipeline(RenderPipelineDescriptor {
                 label: Some("canopy_caster_mesh".into()),
-                layout: vec![layouts.cascade.clone(), casters.layout.clone()],
+                layout: vec![caster_layout(), casters.layout.clone()],
                 vertex: VertexState {
-                    shader: shaders.get("sun_shadow/mesh.wgsl"),
+                    shader: shaders.get(ShaderFile::SunShadowMesh),
                     shader_defs: Vec::new(),
                     entry_point: Some("vertex".into()),
                     buffers: vec![VertexBufferLayout {
@@ -184,7 +183,7 @@ pub fn prepare_mesh_casters(
                     }],
                 },
                 primitive: PrimitiveState { topology, ..Default::default() },
-                depth_stencil: Some(caster_depth()),
+                depth_stencil: Some(reversed_depth(SHADOW_FORMAT)),
                 fragment: None,
                 ..Default::default()
             })

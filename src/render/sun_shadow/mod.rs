@@ -1,6 +1,6 @@
 //! The shadow of the key light (sun or moon): our own depth maps, kept while nothing changed.
 //!
-//! Up to four square cascades around the camera ([`cascades`]), from near to far. Near trees cast as shadow proxies,
+//! Up to four square cascades around the camera ([`cascades`](crate::cull::cascades)), from near to far. Near trees cast as shadow proxies,
 //! far ones as one picture that faces the light's azimuth plus the level picture, so that a cross that the sun sees
 //! edge-on keeps its shadow. Casters between the light and a cascade are clamped onto its near plane.
 //!
@@ -11,20 +11,20 @@
 //! Limits: no translucent shadows; the terrain casts through [`GroundMap`](super::terrain::GroundMap), at its
 //! resolution.
 
-pub mod cascades;
+mod maps;
 mod meshes;
 mod pass;
-mod prepare;
+mod redraw;
 
 use bevy::{
     app::{App, Plugin},
-    core_pipeline::{Core3d, Core3dSystems},
+    core_pipeline::Core3d,
     ecs::schedule::IntoScheduleConfigs,
-    render::{GpuResourceAppExt, Render, RenderApp, RenderStartup, RenderSystems, init_gpu_resource},
+    render::{GpuResourceAppExt, Render, RenderApp},
 };
 
-use super::forest::ForestLayouts;
-pub use prepare::{CascadeViewUniform, ShadowMaps};
+use super::sets::{CanopyPasses, CanopyRenderSystems};
+pub use maps::ShadowMaps;
 
 /// Draws the sun's shadow maps.
 pub struct SunShadowPassPlugin;
@@ -33,23 +33,14 @@ impl Plugin for SunShadowPassPlugin {
     fn build(&self, app: &mut App) {
         let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
         render_app
-            .init_gpu_resource::<prepare::CasterLayouts>()
             .init_gpu_resource::<ShadowMaps>()
             .init_gpu_resource::<meshes::MeshCasters>()
-            // Made from other resources: the order of `init_gpu_resource` is nobody's.
-            .add_systems(
-                RenderStartup,
-                init_gpu_resource::<prepare::CasterPipelines>
-                    .after(init_gpu_resource::<prepare::CasterLayouts>)
-                    .after(init_gpu_resource::<ForestLayouts>),
-            )
             .add_systems(
                 Render,
-                (meshes::prepare_mesh_casters, prepare::prepare_shadows)
+                (meshes::prepare_mesh_casters, redraw::prepare_shadows, redraw::share_maps)
                     .chain()
-                    .in_set(RenderSystems::PrepareResources)
-                    .after(super::forest::prepare_forests),
+                    .in_set(CanopyRenderSystems::Cull),
             )
-            .add_systems(Core3d, pass::sun_shadow_pass.after(Core3dSystems::Prepass).before(Core3dSystems::MainPass));
+            .add_systems(Core3d, pass::sun_shadow_pass.in_set(CanopyPasses::SunShadow));
     }
 }

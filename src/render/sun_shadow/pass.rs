@@ -7,24 +7,20 @@ use bevy::{
         mesh::{RenderMesh, allocator::MeshAllocator},
         render_asset::RenderAssets,
         render_resource::{
-            IndexFormat, LoadOp, Operations, PipelineCache, RenderPassDepthStencilAttachment, RenderPassDescriptor,
-            StoreOp,
+            LoadOp, Operations, PipelineCache, RenderPassDepthStencilAttachment, RenderPassDescriptor, StoreOp,
         },
         renderer::{RenderContext, RenderDevice, ViewQuery},
     },
 };
 
-use super::{
-    meshes::MeshCasters,
-    prepare::{CasterPipelines, ShadowMaps},
-};
-use crate::{
-    plant::PartKind,
-    render::{components::CanopyCamera, forest::GpuForests, gpu::UNIFORM_STRIDE},
+use super::{maps::ShadowMaps, meshes::MeshCasters};
+use crate::render::{
+    components::CanopyCamera,
+    forest::{GpuForests, LevelPipelines, representation::LevelTarget},
+    gpu::UNIFORM_STRIDE,
 };
 
-/// Vertices that the caster shader pulls for one tree.
-const VERTICES_A_CROSS: u32 = 12;
+const TARGET: LevelTarget = LevelTarget::ShadowMap;
 
 /// Draws every cascade whose key changed, and notes what it shows now.
 pub fn sun_shadow_pass(
@@ -32,7 +28,7 @@ pub fn sun_shadow_pass(
     mut maps: ResMut<ShadowMaps>,
     forests: Res<GpuForests>,
     casters: Res<MeshCasters>,
-    pipelines: Res<CasterPipelines>,
+    pipelines: Res<LevelPipelines>,
     meshes: Res<RenderAssets<RenderMesh>>,
     allocator: Res<MeshAllocator>,
     cache: Res<PipelineCache>,
@@ -41,9 +37,9 @@ pub fn sun_shadow_pass(
 ) {
     let maps = &mut *maps;
     let Some(cascade_group) = &maps.cascade_bind_group else { return };
-    let [Some(wood), Some(foliage), Some(crosses)] = pipelines.0.map(|id| cache.get_render_pipeline(id)) else {
+    if !pipelines.ready(&forests, TARGET, &cache) {
         return;
-    };
+    }
     let diagnostics = ctx.diagnostic_recorder();
     let diagnostics = diagnostics.as_deref();
     for work in maps.work.drain(..) {
@@ -68,25 +64,12 @@ pub fn sun_shadow_pass(
         for cast in &work.forests {
             let Some(forest) = forests.get(cast.entity) else { continue };
             pass.set_bind_group(1, &cast.bind_group, &[offset]);
-            for (kind, pipeline) in [(PartKind::Wood, wood), (PartKind::Foliage, foliage)] {
-                pass.set_render_pipeline(pipeline);
-                for (range, parts) in cast.lists.models.iter().zip(&forest.parts) {
-                    if range.is_empty() {
-                        continue;
-                    }
-                    for part in parts.iter().filter(|part| part.kind == kind && part.proxy.index_count > 0) {
-                        pass.set_bind_group(2, &part.bind_group, &[]);
-                        pass.set_vertex_buffer(0, part.proxy.vertices.slice(..));
-                        pass.set_index_buffer(part.proxy.indices.slice(..), IndexFormat::Uint32);
-                        pass.draw_indexed(0..part.proxy.index_count, 0, range.clone());
-                    }
+            for (index, level) in forest.levels().filter(|(index, _)| cast.lists.count(*index) > 0) {
+                for features in level.gpu.features(TARGET) {
+                    let Some(pipeline) = pipelines.get(&*level.renderer, features, TARGET, &cache) else { continue };
+                    pass.set_render_pipeline(pipeline);
+                    level.gpu.draw(&mut pass, features, TARGET, cast.lists.ranges(index));
                 }
-            }
-            let range = &cast.lists.crosses;
-            if !range.is_empty() {
-                pass.set_render_pipeline(crosses);
-                pass.set_bind_group(2, &forest.cross_bind_group, &[]);
-                pass.draw(range.start * VERTICES_A_CROSS..range.end * VERTICES_A_CROSS, 0..1);
             }
         }
         let complete =

@@ -18,7 +18,14 @@ use glam::{DVec2, DVec3, Vec3};
 use half::f16;
 
 use crate::{
-    render::{components::Ground, extract::ExtractedScene, gpu, report::FrameReport},
+    render::{
+        bindings::{SharedPlacement, SharedTextures},
+        components::Ground,
+        extract::ExtractedScene,
+        gpu,
+        report::FrameReport,
+        view::PreparedFrame,
+    },
     scatter::CoverMap,
     terrain::{
         Terrain,
@@ -39,10 +46,8 @@ const SHADING_REACH: f64 = 32.0;
 /// surroundings (B).
 #[derive(Resource)]
 pub struct GroundMap {
-    /// For sampling.
-    pub view: TextureView,
-    /// Mean share of ground under crowns where the terrain is known.
-    pub mean_cover: f32,
+    view: TextureView,
+    mean_cover: f32,
     texture: Texture,
     size: (u32, u32),
     extent: DVec2,
@@ -73,24 +78,43 @@ impl GroundMap {
     }
 
     /// Camera-relative origin and inverse size of the map, for a camera at `camera` (scene metres).
-    pub fn placement(&self, camera: DVec3) -> [f32; 4] {
+    fn placement(&self, camera: DVec3) -> [f32; 4] {
         let origin = -0.5 * self.extent - DVec2::new(camera.x, camera.z);
         [origin.x as f32, origin.y as f32, (1.0 / self.extent.x) as f32, (1.0 / self.extent.y) as f32]
     }
 }
 
-/// Computes the map when the terrain, its cover or the key light's direction changed.
+/// Brings the map up to date and shares it with all passes.
 pub fn prepare_ground_map(
     scene: Res<ExtractedScene>,
+    frame: Res<PreparedFrame>,
     device: Res<RenderDevice>,
     queue: Res<RenderQueue>,
     report: Res<FrameReport>,
     mut map: ResMut<GroundMap>,
+    mut textures: ResMut<SharedTextures>,
+    mut placement: ResMut<SharedPlacement>,
+) {
+    update(&mut map, &scene, &device, &queue, &report);
+    textures.ground = map.view.clone();
+    placement.mean_cover = map.mean_cover;
+    if let Some(view) = &frame.view {
+        placement.ground = map.placement(view.camera);
+    }
+}
+
+/// Computes the map when the terrain, its cover or the key light's direction changed.
+fn update(
+    map: &mut GroundMap,
+    scene: &ExtractedScene,
+    device: &RenderDevice,
+    queue: &RenderQueue,
+    report: &FrameReport,
 ) {
     let Some((_, ground)) = &scene.ground else {
         // A ground that was despawned is let go, its shadow with it.
         if map.shows.is_some() {
-            *map = GroundMap::empty(&device, &queue);
+            *map = GroundMap::empty(device, queue);
         }
         return;
     };
@@ -112,7 +136,7 @@ pub fn prepare_ground_map(
     let texel = extent.max_element() / LONGEST_SIDE;
     let size = ((extent.x / texel).ceil().max(1.0) as u32, (extent.y / texel).ceil().max(1.0) as u32);
     if size != map.size {
-        (map.texture, map.view) = gpu::table(&device, "canopy_ground_map", size);
+        (map.texture, map.view) = gpu::table(device, "canopy_ground_map", size);
         map.size = size;
     }
     map.extent = extent;
@@ -132,7 +156,7 @@ pub fn prepare_ground_map(
         let sum: f32 = texels.iter().map(|texel| texel[1].to_f32()).sum();
         map.mean_cover = sum / texels.len().max(1) as f32;
     }
-    gpu::write_level(&queue, &map.texture, 0, 0, size.0, size.1, 8, bytemuck::cast_slice(&texels));
+    gpu::write_level(queue, &map.texture, 0, 0, size.0, size.1, 8, bytemuck::cast_slice(&texels));
     report.ran("terrain shadow", format!("{} × {} cells", size.0, size.1));
     map.shows = Some(Shown { terrain: ground.terrain.clone(), cover: ground.cover.clone(), light });
 }

@@ -10,21 +10,22 @@
 mod ground_map;
 mod noise_texture;
 mod pass;
-mod prepare;
+mod pipeline;
+mod tile_cache;
+mod tiles;
+mod vertex;
 
 use bevy::{
     app::{App, Plugin},
-    core_pipeline::{
-        Core3d, Core3dSystems,
-        core_3d::{main_opaque_pass_3d, main_transparent_pass_3d},
-    },
+    core_pipeline::Core3d,
     ecs::schedule::IntoScheduleConfigs,
-    render::{GpuResourceAppExt, Render, RenderApp, RenderSystems},
+    render::{GpuResourceAppExt, Render, RenderApp, render_resource::SpecializedRenderPipelines},
 };
 
+use super::sets::{CanopyPasses, CanopyRenderSystems};
 pub use ground_map::GroundMap;
-pub(crate) use pass::terrain_pass;
-pub use prepare::{GpuTile, GpuTileVertex, TerrainStatistics};
+pub use tiles::TerrainStatistics;
+pub use vertex::{GpuTile, GpuTileVertex};
 
 /// Draws the [`Ground`](super::components::Ground).
 pub struct TerrainPassPlugin;
@@ -34,23 +35,19 @@ impl Plugin for TerrainPassPlugin {
         let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
         render_app
             .init_gpu_resource::<GroundMap>()
-            .init_gpu_resource::<prepare::TerrainLayout>()
-            .init_gpu_resource::<prepare::GpuTerrain>()
-            .init_gpu_resource::<prepare::TerrainPipelines>()
+            .init_gpu_resource::<tiles::GpuTerrain>()
+            .init_gpu_resource::<pipeline::TerrainPipeline>()
+            .init_gpu_resource::<SpecializedRenderPipelines<pipeline::TerrainPipeline>>()
+            .init_resource::<pipeline::CurrentTerrainPipeline>()
             .init_resource::<TerrainStatistics>()
             .add_systems(
                 Render,
-                (ground_map::prepare_ground_map, prepare::prepare_tiles, prepare::prepare_pipeline)
-                    .chain()
-                    .in_set(RenderSystems::PrepareResources)
-                    .after(super::frame::prepare_frame),
+                (
+                    ground_map::prepare_ground_map.in_set(CanopyRenderSystems::Light),
+                    tiles::prepare_tiles.in_set(CanopyRenderSystems::Cull),
+                    pipeline::prepare_pipeline.in_set(CanopyRenderSystems::Pipelines),
+                ),
             )
-            .add_systems(
-                Core3d,
-                terrain_pass
-                    .after(main_opaque_pass_3d)
-                    .before(main_transparent_pass_3d)
-                    .in_set(Core3dSystems::MainPass),
-            );
+            .add_systems(Core3d, pass::terrain_pass.in_set(CanopyPasses::Terrain));
     }
 }

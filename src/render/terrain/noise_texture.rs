@@ -6,7 +6,7 @@ use bevy::render::{
 };
 
 use crate::{
-    plant::texture::MipChain,
+    math::MipChain,
     render::gpu,
     terrain::ground_noise::{NOISE_SIDE, noise_image},
 };

@@ -11,22 +11,22 @@ use bevy::{
     },
 };
 
-use super::prepare::{GpuTerrain, TerrainPipelines};
-use crate::render::{components::CanopyCamera, frame::FrameBindGroup};
+use super::{pipeline::CurrentTerrainPipeline, tiles::GpuTerrain};
+use crate::render::{bindings::FrameBindGroup, components::CanopyCamera};
 
 /// Draws the ground into the camera's colour and depth.
 pub fn terrain_pass(
     view: ViewQuery<(&ViewTarget, &ViewDepthTexture, &ExtractedCamera), With<CanopyCamera>>,
     frame: Res<FrameBindGroup>,
     terrain: Res<GpuTerrain>,
-    pipelines: Res<TerrainPipelines>,
+    pipeline: Res<CurrentTerrainPipeline>,
     cache: Res<PipelineCache>,
     mut ctx: RenderContext,
 ) {
     let frame = frame.of(view.entity());
     let (target, depth, camera) = view.into_inner();
     let (Some(frame), Some(tiles), Some(pipeline)) =
-        (frame, &terrain.bind_group, pipelines.current.and_then(|id| cache.get_render_pipeline(id)))
+        (frame, &terrain.bind_group, pipeline.0.and_then(|id| cache.get_render_pipeline(id)))
     else {
         return;
     };

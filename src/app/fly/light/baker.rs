@@ -18,9 +18,11 @@ use std::{
 use crate::{
     assets::threads::spare_cores,
     bake::{
-        billboard::{Cross, CrossSettings, bake_cross},
-        implicit::{ImplicitParameters, ImplicitSettings, NoSurface, bake_implicit, implicit_parameters},
-        lighting::{BakedLighting, ExpressiveLighting},
+        levels::cross::{Cross, CrossSettings, bake_cross},
+        lighting::{
+            BakedLighting, ExpressiveLighting,
+            implicit::{ImplicitParameters, ImplicitSettings, NoSurface, bake_implicit, implicit_parameters},
+        },
     },
     plant::Plant,
 };

@@ -21,9 +21,11 @@ use crate::{
     assets::{Stage, plants},
     bake::{
         BakedPlant,
-        billboard::CrossSettings,
-        implicit::{ImplicitParameters, ImplicitSettings},
-        lighting::LightingSettings,
+        levels::cross::CrossSettings,
+        lighting::{
+            LightingSettings,
+            implicit::{ImplicitParameters, ImplicitSettings},
+        },
     },
     render::components::Forest,
     scene::{Lighting, Transfer},

@@ -6,7 +6,7 @@
 use std::ops::RangeInclusive;
 
 use crate::{
-    bake::implicit::{AmbientField, ImplicitParameters, ImplicitSettings, NormalSource},
+    bake::lighting::implicit::{AmbientField, ImplicitParameters, ImplicitSettings, NormalSource},
     scene::{Lighting, lighting::word},
 };
 

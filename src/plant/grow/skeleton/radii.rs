@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::super::ROOT_DEPTH;
 use super::axis::{Knot, at};
 use super::{Grower, MIN_RADIUS, Node, Sprout};
+use crate::math::smoothstep;
 
 /// Distances from the ground, in metres, at which the trunk's foot has nodes for its flare.
 const FOOT: [f32; 7] = [0.12, 0.3, 0.55, 0.9, 1.35, 1.9, 2.6];
@@ -87,11 +88,6 @@ pub(in crate::plant::grow) fn node_at(nodes: &[Node], distance: f32) -> Node {
         lobe: mix(a.lobe, b.lobe),
         outward: mix(a.outward, b.outward),
     }
-}
-
-fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
-    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
 }
 
 #[cfg(test)]

@@ -7,7 +7,8 @@ use image::{Rgba, RgbaImage};
 use rayon::prelude::*;
 
 use super::BarkTextures;
-use super::lattice::{cell, octaves, smoothstep};
+use super::lattice::{cell, octaves};
+use crate::math::smoothstep;
 use crate::plant::grow::parameters::BarkKind;
 
 /// Width of the pictures.

@@ -87,12 +87,6 @@ pub(super) fn cell(x: f32, y: f32, period: [i32; 2], stretch: f32, seed: u32) ->
     Cell { border: border.max(0.0), to_point: own.1, value: own.2 }
 }
 
-/// Rises smoothly from 0 at `low` to 1 at `high`.
-pub(super) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
-    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -6,7 +6,8 @@ use glam::{Vec2, Vec3};
 use image::RgbaImage;
 
 use super::canvas::Canvas;
-use super::lattice::{noise, smoothstep};
+use super::lattice::noise;
+use crate::math::smoothstep;
 use crate::plant::grow::parameters::LeafShape;
 use crate::plant::grow::random::Random;
 

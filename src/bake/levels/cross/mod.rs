@@ -1,0 +1,337 @@
+//! Crossed billboards made from the model itself [Franzke 2005, 4.3, "Kreuzebenen"].
+//!
+//! Two vertical planes at right angles through the trunk's axis and a horizontal one through the foliage's centre.
+//! Each plane's picture is the *whole* plant seen along the plane's normal, so three quads stand for the tree from
+//! every side. No light is baked in: a texel keeps base colour, normal, ambient visibility k_a and whether it is
+//! leaf or wood, and is lit like the full model; of a plant lit by radiance transfer also how the sky reaches it (`light.rs`).
+//!
+//! ```text
+//!   plant + k_a --rasterise (rasterize.rs)--> samples --resolve--> texels --color.rs------> base colour, alpha
+//!                                                                         \-properties.rs-> normal, k_a, foliage
+//! ```
+//!
+//! Cost: three pictures of (resolution * supersampling)² samples. Limits: a plane looks right along its normal and
+//! loses parallax away from it; a plane seen from behind shows the picture of its front, mirrored.
+
+mod color;
+mod light;
+mod properties;
+
+pub use light::LIGHT_SCALE;
+
+use glam::{Mat3, Vec3, Vec4};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use self::properties::SpreadSum;
+use super::rasterize::{Hit, Raster, View};
+use crate::bake::lighting::BakedLighting;
+use crate::math::{MipChain, luminance};
+use crate::plant::{Bounds, PartKind, Plant, geometry};
+
+/// Crossed billboards of one plant.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cross {
+    /// The planes: facing +Z, facing +X, and facing up. Always three.
+    pub planes: Vec<CrossPlane>,
+    /// Their pictures, in the order of the planes.
+    pub textures: CrossTextures,
+    /// Transmission of the foliage (mean over its area), a factor as in [`crate::plant::PlantMaterial::transmission`], 0..2
+    /// each; applies to texels in the measure of their foliage.
+    pub transmission: Vec3,
+    /// Share of the leaves in a texel that face everywhere alike, 0..1, for each of the pictures' first mips (the last one
+    /// stands for all that follow): what their mean normal no longer tells. 0: one leaf with the texel's normal.
+    pub spread: [f32; SPREAD_LEVELS],
+}
+
+impl Cross {
+    /// Whether the lists go together, of a plant that is lit by radiance transfer or not, and all values are in their ranges.
+    pub fn is_whole(&self, of_transfer: bool) -> bool {
+        let CrossTextures { color, properties, light } = &self.textures;
+        let planes = self.planes.len();
+        let finite = |plane: &CrossPlane| [plane.center, plane.u, plane.v, plane.normal].iter().all(|v| v.is_finite());
+        self.planes.iter().all(finite)
+            && [color.len(), properties.len(), light.len()] == [planes, planes, if of_transfer { planes } else { 0 }]
+            && color.iter().chain(properties).chain(light).all(MipChain::is_whole)
+            && self.transmission.is_finite()
+            && self.spread.iter().all(|share| (0.0..=1.0).contains(share))
+    }
+}
+
+/// Mips for which [`Cross::spread`] is known.
+pub const SPREAD_LEVELS: usize = 8;
+
+/// A rectangle `center + s u + t v` with s and t in -1..=1; its picture's upper left is at `center - u + v`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CrossPlane {
+    /// Middle, metres, in the plant's frame.
+    pub center: Vec3,
+    /// From the middle to the right border of the picture, metres. Zero where the plant has no extent.
+    pub u: Vec3,
+    /// From the middle to the upper border of the picture, metres. Zero where the plant has no extent.
+    pub v: Vec3,
+    /// Unit normal, to the side from which the picture was taken; right-handed with u and v.
+    pub normal: Vec3,
+}
+
+impl CrossPlane {
+    /// Unit vectors to the right, up and to the front as columns: takes the normals stored in
+    /// [`CrossTextures::properties`] into the plant's frame. Columns without extent are completed from the others.
+    pub fn frame(&self) -> Mat3 {
+        let unit = |axis: Vec3| axis.try_normalize();
+        let (right, up) = match (unit(self.u), unit(self.v)) {
+            (Some(right), Some(up)) => (right, up),
+            (Some(right), None) => (right, self.normal.cross(right)),
+            (None, Some(up)) => (up.cross(self.normal), up),
+            (None, None) => self.normal.any_orthonormal_pair(),
+        };
+        Mat3::from_cols(right, up, self.normal)
+    }
+}
+
+/// The pictures of crossed billboards, one of each kind a plane.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CrossTextures {
+    /// Base colour: sRGB-encoded RGB, to be drawn with an alpha test at 0.5 or above. At 0.5 the outline covers what
+    /// the full model covers (in every mip); towards 1 the crown shrinks to its inside
+    /// ([`crate::plant::texture::fade_alpha`]), which fades a cross out without popping. Colours are dilated.
+    pub color: Vec<MipChain>,
+    /// RG: the normal, octahedral [Cigolle et al. 2014, "A Survey of Efficient Representations for Independent Unit
+    /// Vectors"; Bevy's `octahedral_decode`], **in the plane's frame** (x right, y up, z to the front): decode, flip
+    /// z where the plane is seen from behind, then multiply with [`CrossPlane::frame`]. In that frame the seam of
+    /// the encoding lies behind the plane, where no normal points, so the texture can be filtered.
+    /// B: ambient visibility k_a. A: share of foliage (1 leaf, 0 wood), the weight of transmission.
+    /// Linear 8 bit; texels outside the outline continue those inside.
+    pub properties: Vec<MipChain>,
+    /// How the light of the sky reaches the leaves, of plants that are lit by radiance transfer; none for others. Signed bytes,
+    /// of which 127 stands for [`LIGHT_SCALE`]: a vector in the plane's frame, whose third component is turned like the normal's
+    /// where the plane is seen from behind, and the mean over all directions. What leaves a texel under the sky is its base
+    /// colour times `1 + transmission` times the mean times the sky's first coefficient plus the vector times that of its second
+    /// band.
+    pub light: Vec<MipChain>,
+}
+
+/// How crossed billboards are made. Values out of range are moved into it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CrossSettings {
+    /// Edge of the square textures in texels, a power of two, 64..=1024 (rounded up to one). Larger: crosses may come
+    /// nearer to the viewer; memory grows with the square (256: 2.1 MB a plant, 3.1 MB of one lit by transfer).
+    pub resolution: u32,
+    /// Samples a texel along each axis, 1..=8. More: smoother colours and normals, time grows with the square.
+    pub supersampling: u32,
+    /// Standard deviation of the normals' smoothing as a share of the picture's width, 0..=0.1. 0: every leaf is lit for
+    /// itself; larger: the crown is lit as a rounded body. Either way [`Cross::spread`] keeps what a mean loses.
+    pub normal_smoothing: f32,
+}
+
+impl Default for CrossSettings {
+    fn default() -> Self {
+        Self { resolution: 256, supersampling: 4, normal_smoothing: 0.0 }
+    }
+}
+
+impl CrossSettings {
+    /// The settings with every value moved into its range; what is not finite becomes the default.
+    pub fn in_range(self) -> Self {
+        let smoothing =
+            if self.normal_smoothing.is_finite() { self.normal_smoothing } else { Self::default().normal_smoothing };
+        Self {
+            resolution: self.resolution.clamp(64, 1024).next_power_of_two(),
+            supersampling: self.supersampling.clamp(1, 8),
+            normal_smoothing: smoothing.clamp(0.0, 0.1),
+        }
+    }
+}
+
+/// Makes the crossed billboards of `plant` with the normals and the k_a of its `lighting`; what is missing there is the
+/// plant's own, or 1. The planes cover the plant's bounds exactly; an empty plant gets three planes without extent
+/// and wholly transparent pictures.
+pub fn bake_cross(plant: &Plant, lighting: &BakedLighting, settings: &CrossSettings) -> Cross {
+    let settings = settings.in_range();
+    let planes = planes(plant);
+    let resolution = settings.resolution as usize;
+    let sides = light::vertex_sides(lighting);
+    let pictures: Vec<_> = planes
+        .par_iter()
+        .map(|plane| {
+            let texels = picture(plant, lighting, sides.as_deref(), plane, &settings);
+            let properties = properties::mips(&texels, resolution, settings.normal_smoothing);
+            let light = sides.is_some().then(|| light::mips(&texels, resolution));
+            (color::mips(&texels, resolution), (properties, light))
+        })
+        .collect();
+    let (color, properties): (Vec<_>, Vec<_>) = pictures.into_iter().unzip();
+    let (properties, light): (Vec<_>, Vec<_>) = properties.into_iter().unzip();
+    let (properties, spreads): (Vec<_>, Vec<_>) = properties.into_iter().unzip();
+    let textures = CrossTextures { color, properties, light: light.into_iter().flatten().collect() };
+    Cross { planes, textures, transmission: mean_transmission(plant), spread: mean_spread(&spreads) }
+}
+
+/// Mean over the pictures, level by level; levels beyond the smallest picture repeat it.
+fn mean_spread(pictures: &[Vec<SpreadSum>]) -> [f32; SPREAD_LEVELS] {
+    std::array::from_fn(|level| {
+        let (mut spread, mut weight) = (0.0, 0.0);
+        for sum in pictures.iter().filter_map(|levels| levels.get(level).or(levels.last())) {
+            spread += sum.spread;
+            weight += sum.weight;
+        }
+        if weight > 0.0 { (spread / weight) as f32 } else { 0.0 }
+    })
+}
+
+fn planes(plant: &Plant) -> Vec<CrossPlane> {
+    let bounds = plant.bounds().filter(|bounds| bounds.min.is_finite() && bounds.max.is_finite());
+    let bounds = bounds.unwrap_or(Bounds { min: Vec3::ZERO, max: Vec3::ZERO });
+    let half = 0.5 * bounds.size();
+    let middle = bounds.center();
+    let height = foliage_height(plant).unwrap_or(middle.y).clamp(bounds.min.y, bounds.max.y);
+    let plane = |center: Vec3, right: Vec3, up: Vec3| CrossPlane {
+        center,
+        u: right * half,
+        v: up * half,
+        normal: right.cross(up),
+    };
+    vec![
+        plane(middle.with_z(0.0), Vec3::X, Vec3::Y),
+        plane(middle.with_x(0.0), Vec3::NEG_Z, Vec3::Y),
+        plane(middle.with_y(height), Vec3::X, Vec3::NEG_Z),
+    ]
+}
+
+/// Height of the centre of the foliage's area, metres.
+fn foliage_height(plant: &Plant) -> Option<f32> {
+    let (mut moment, mut total) = (0.0f64, 0.0f64);
+    for part in plant.parts.iter().filter(|part| part.kind == PartKind::Foliage) {
+        for (_, corners) in geometry::triangles(&part.mesh) {
+            let area = f64::from(geometry::area(&part.mesh, corners));
+            let heights: f64 = corners.iter().map(|&c| f64::from(part.mesh.positions[c].y)).sum();
+            moment += area * heights / 3.0;
+            total += area;
+        }
+    }
+    let height = (moment / total) as f32;
+    height.is_finite().then_some(height)
+}
+
+fn mean_transmission(plant: &Plant) -> Vec3 {
+    let (mut sum, mut total) = (Vec3::ZERO, 0.0);
+    for part in plant.parts.iter().filter(|part| part.kind == PartKind::Foliage) {
+        let area: f64 = geometry::triangles(&part.mesh).map(|(_, c)| f64::from(geometry::area(&part.mesh, c))).sum();
+        sum += area as f32 * part.material.transmission;
+        total += area as f32;
+    }
+    let mean = sum / total;
+    if mean.is_finite() { mean.clamp(Vec3::ZERO, Vec3::splat(2.0)) } else { Vec3::ZERO }
+}
+
+/// The mean of a texel's samples. All but `coverage` are weighted with it: sums over the samples that see the plant,
+/// divided by the number of all samples.
+#[derive(Clone, Copy, Debug, Default)]
+struct Texel {
+    /// Share of the samples that see the plant, 0..1.
+    coverage: f32,
+    /// Linear base colour.
+    color: Vec3,
+    /// Normal in the plane's frame; a leaf's own is turned towards the viewer.
+    normal: Vec3,
+    /// Ambient visibility.
+    ambient: f32,
+    /// Share of leaves.
+    foliage: f32,
+    /// How the sky's light reaches it, in the plane's frame ([`light::stored`]).
+    light: Vec4,
+}
+
+/// The picture of the plant on one plane, row by row from the top.
+fn picture(
+    plant: &Plant,
+    lighting: &BakedLighting,
+    sides: Option<&[Vec<light::Sides>]>,
+    plane: &CrossPlane,
+    settings: &CrossSettings,
+) -> Vec<Texel> {
+    const ROWS: u32 = 8;
+    let (resolution, samples) = (settings.resolution, settings.supersampling);
+    let view = View { center: plane.center, right: plane.u, up: plane.v, toward: plane.normal };
+    let side = resolution * samples;
+    let raster = Raster::new(plant, &view, side, side, ROWS * samples);
+    let shader =
+        Shader { plant, lighting, sides, raster: &raster, to_plane: plane.frame().transpose(), toward: plane.normal };
+    let (side, samples, resolution) = (side as usize, samples as usize, resolution as usize);
+    let bands: Vec<Vec<Texel>> = (0..raster.band_count())
+        .into_par_iter()
+        .map(|band| {
+            let hits = raster.draw(band);
+            let mut texels = vec![Texel::default(); hits.len() / (samples * samples)];
+            for (at, hit) in hits.iter().enumerate().filter(|(_, hit)| hit.is_some()) {
+                let (row, column) = (at / side / samples, at % side / samples);
+                shader.add(hit, &mut texels[row * resolution + column]);
+            }
+            let share = 1.0 / (samples * samples) as f32;
+            for texel in &mut texels {
+                texel.coverage *= share;
+                texel.color *= share;
+                texel.normal *= share;
+                texel.ambient *= share;
+                texel.foliage *= share;
+                texel.light *= share;
+            }
+            texels
+        })
+        .collect();
+    bands.concat()
+}
+
+/// Looks up what a sample sees.
+struct Shader<'a> {
+    plant: &'a Plant,
+    lighting: &'a BakedLighting,
+    raster: &'a Raster,
+    sides: Option<&'a [Vec<light::Sides>]>,
+    to_plane: Mat3,
+    toward: Vec3,
+}
+
+impl Shader<'_> {
+    fn add(&self, hit: &Hit, texel: &mut Texel) {
+        let part = &self.plant.parts[hit.part as usize];
+        let mesh = &part.mesh;
+        let corners = mesh.triangles[hit.triangle as usize].map(|c| c as usize);
+        let weights = Vec3::new(1.0 - hit.weights.x - hit.weights.y, hit.weights.x, hit.weights.y).to_array();
+        let weighted = || corners.into_iter().zip(weights);
+
+        let normals = self.lighting.normals(hit.part as usize).unwrap_or(&mesh.normals);
+        let normal: Vec3 = weighted().map(|(c, w)| w * normals.get(c).copied().unwrap_or(Vec3::Y)).sum();
+        let [a, b, c] = corners.map(|c| mesh.positions[c]);
+        // A leaf has two sides, the viewer sees the one that is turned to him; a crown has only its outside. Bark has one, but an open branch may
+        // be seen into; only then is its normal turned, a smooth one may well look over the edge.
+        let from_behind = match part.kind {
+            PartKind::Foliage => !self.lighting.is_realigned() && normal.dot(self.toward) < 0.0,
+            PartKind::Wood => (b - a).cross(c - a).dot(self.toward) < 0.0,
+        };
+        let normal = if from_behind { -normal } else { normal };
+        let normal = normal.try_normalize().unwrap_or(self.toward);
+
+        let values = self.lighting.ambient(hit.part as usize);
+        let ambient: f32 = weighted().map(|(c, w)| w * values.get(c).copied().unwrap_or(1.0)).sum();
+        let uv = weighted().map(|(c, w)| w * mesh.uvs[c]).sum();
+        let color = self.raster.surface(hit.part).color(uv);
+
+        if let Some(sides) = self.sides.and_then(|parts| parts.get(hit.part as usize)) {
+            let blended = |side: usize| -> Vec4 {
+                weighted().map(|(c, w)| w * sides.get(c).map_or(Vec4::ZERO, |sides| sides[side])).sum()
+            };
+            let front = usize::from(from_behind && part.kind == PartKind::Foliage);
+            let through = match part.kind {
+                PartKind::Foliage => luminance(part.material.transmitted(color)) / luminance(color).max(1e-6),
+                PartKind::Wood => 0.0,
+            };
+            texel.light += light::stored(blended(front), blended(1 - front), through, &self.to_plane);
+        }
+        texel.coverage += 1.0;
+        texel.color += if color.is_finite() { color.clamp(Vec3::ZERO, Vec3::ONE) } else { Vec3::ZERO };
+        texel.normal += self.to_plane * normal;
+        texel.ambient += if ambient.is_finite() { ambient.clamp(0.0, 1.0) } else { 1.0 };
+        texel.foliage += if part.kind == PartKind::Foliage { 1.0 } else { 0.0 };
+    }
+}

@@ -1,0 +1,222 @@
+//! How a plant is lit: what is baked for it, vertex by vertex, and what its billboards take over.
+//!
+//! | model | baked | vertex bytes beyond position, normal, texture coordinates |
+//! |---|---|--:|
+//! | [`LightingSettings::Local`] | nothing | 0 |
+//! | [`LightingSettings::Expressive`] | realigned normals, k_a ([`implicit`]) | 0: k_a is the normal's length |
+//! | [`LightingSettings::Transfer`] | how the sky reaches each side of each vertex ([`transfer`]) | see there; 40 for foliage with 4 bands |
+//!
+//! The models are alternatives: what a plant does not use is neither baked, nor kept, nor uploaded.
+
+pub mod implicit;
+pub mod transfer;
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::plant::Plant;
+use implicit::{ImplicitSettings, NoSurface, bake_implicit};
+use transfer::{PackedPart, PackedTransfer, SCATTERED, TransferFormat, TransferSettings, bake_transfer};
+
+/// How the sun (or the moon, where it is the brighter) lights a plant's full models. Nothing is baked for it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Serialize)]
+pub enum SunLight {
+    /// Each leaf by the angle of its own normal to the sun, front and back [Franzke 2005, 4.2.2]: sharp, and true.
+    #[default]
+    LeafShader,
+    /// The sun projected onto spherical harmonics, through the plant's transfer, dimmed by the shadow map, as published for
+    /// landscapes [Franzke 2005, 4.3.3]. A few bands hold no disc, and the plant's own shadow counts twice: soft and dark,
+    /// to compare with. Only for plants that are lit by transfer; others, and crosses, take the leaf shader.
+    Harmonics,
+}
+
+/// Which light a plant gets.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum LightingSettings {
+    /// The leaves' own normals, all light from everywhere: [Luft 2007, fig. 1a], to compare with.
+    Local,
+    /// Normals and ambient term of the crown's implicit surface [Luft 2007].
+    Expressive(ImplicitSettings),
+    /// The sky by radiance transfer, the sun by the leaves' own normals and the shadow map [Franzke 2005, 4.2].
+    Transfer(TransferSettings),
+}
+
+impl Default for LightingSettings {
+    fn default() -> Self {
+        Self::Transfer(TransferSettings::default())
+    }
+}
+
+impl LightingSettings {
+    /// The settings with every value moved into its range.
+    pub fn in_range(self) -> Self {
+        match self {
+            Self::Local => Self::Local,
+            Self::Expressive(settings) => Self::Expressive(settings.in_range()),
+            Self::Transfer(settings) => Self::Transfer(settings.in_range()),
+        }
+    }
+}
+
+/// What was baked. Lists have one entry a part in the plant's order, each with one value a vertex.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub enum BakedLighting {
+    /// Nothing.
+    #[default]
+    Local,
+    /// Of the implicit surface.
+    Expressive(ExpressiveLighting),
+    /// Of radiance transfer.
+    Transfer(TransferLighting),
+}
+
+/// What is kept of an implicit surface's bake.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ExpressiveLighting {
+    /// Unit normals. Those of foliage point out of the crown, whichever side of a leaf is seen, unless `no_surface`.
+    pub normals: Vec<Vec<Vec3>>,
+    /// k_a, 0..=1.
+    pub ambient: Vec<Vec<f32>>,
+    /// Why the foliage has its own normals after all.
+    pub no_surface: Option<NoSurface>,
+}
+
+/// What is kept of a transfer bake.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "PackedTransfer", into = "PackedTransfer")]
+pub struct TransferLighting {
+    /// The coefficients, as the vertex shader reads them.
+    pub packed: PackedTransfer,
+    /// k_a, 0..=1: the light under an even sky of both sides, as a share of what they would get in the open.
+    pub ambient: Vec<Vec<f32>>,
+}
+
+impl TransferLighting {
+    /// With k_a from the coefficients.
+    pub fn new(packed: PackedTransfer) -> Self {
+        /// The first coefficient of a side in the open.
+        const OPEN: f32 = 0.282_094_79;
+        let baked = packed.unpack();
+        let count = baked.settings.coefficients().max(1);
+        let channels = baked.settings.channels.count();
+        let mean = |side: &[f32]| side.iter().take(channels).sum::<f32>() / channels as f32;
+        let ambient = baked.parts.iter().map(|part| {
+            let front = part.front.chunks_exact(count).map(mean);
+            let back = part.back.chunks_exact(count).map(mean).map(Some).chain(std::iter::repeat(None));
+            let both = front.zip(back).map(|(front, back)| back.map_or(front, |back| 0.5 * (front + back)));
+            both.map(|first| (first / OPEN).clamp(0.0, 1.0)).collect()
+        });
+        Self { ambient: ambient.collect(), packed }
+    }
+}
+
+impl From<TransferLighting> for PackedTransfer {
+    fn from(lighting: TransferLighting) -> Self {
+        lighting.packed
+    }
+}
+
+impl TryFrom<PackedTransfer> for TransferLighting {
+    type Error = NotWhole;
+
+    fn try_from(packed: PackedTransfer) -> Result<Self, NotWhole> {
+        if packed.is_whole() { Ok(Self::new(packed)) } else { Err(NotWhole) }
+    }
+}
+
+/// Bytes of a transfer that do not fit its settings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the bytes of the transfer do not fit its settings: bake it again")]
+pub struct NotWhole;
+
+impl BakedLighting {
+    /// Bakes what `settings` ask for.
+    pub fn bake(plant: &Arc<Plant>, settings: &LightingSettings) -> Self {
+        match settings {
+            LightingSettings::Local => Self::Local,
+            LightingSettings::Expressive(settings) => {
+                let baked = bake_implicit(plant, settings);
+                let no_surface = baked.report.no_surface;
+                Self::Expressive(ExpressiveLighting { normals: baked.normals, ambient: baked.ambient, no_surface })
+            }
+            LightingSettings::Transfer(settings) => {
+                let packed = bake_transfer(plant, settings).pack(TransferFormat::Snorm8);
+                Self::Transfer(TransferLighting::new(packed))
+            }
+        }
+    }
+
+    /// Unit normals that replace the own ones of part `part`; `None` where the own ones stay.
+    pub fn normals(&self, part: usize) -> Option<&[Vec3]> {
+        match self {
+            Self::Expressive(lighting) if lighting.no_surface.is_none() => {
+                lighting.normals.get(part).map(Vec::as_slice)
+            }
+            _ => None,
+        }
+    }
+
+    /// k_a of the vertices of part `part`, 0..=1; empty where all of them are 1.
+    pub fn ambient(&self, part: usize) -> &[f32] {
+        match self {
+            Self::Local => &[],
+            Self::Expressive(lighting) => lighting.ambient.get(part).map_or(&[], Vec::as_slice),
+            Self::Transfer(lighting) => lighting.ambient.get(part).map_or(&[], Vec::as_slice),
+        }
+    }
+
+    /// The transfer of part `part`, with its settings; `None` where another model lights the plant.
+    pub fn transfer(&self, part: usize) -> Option<(&TransferSettings, &PackedPart)> {
+        match self {
+            Self::Transfer(TransferLighting { packed, .. }) => Some((&packed.settings, packed.parts.get(part)?)),
+            _ => None,
+        }
+    }
+
+    /// Light of a sun that leaves send each other, in the mean over the foliage's vertices: the first coefficient and the rise
+    /// of the second band towards the zenith ([`transfer::TransferPart::scattered`]); zeros where it was not baked.
+    pub fn scattered(&self) -> (f32, f32) {
+        let Self::Transfer(TransferLighting { packed, .. }) = self else { return (0.0, 0.0) };
+        let (mut mean, mut rise, mut count) = (0.0, 0.0, 0.0);
+        for part in packed.parts.iter().filter(|part| part.sides == 2) {
+            for vertex in part.scattered.chunks_exact(SCATTERED) {
+                let value = |index: usize| f64::from(vertex[index] as i8) / 127.0 * f64::from(part.scattered_scale);
+                mean += value(0);
+                rise += value(2);
+                count += 1.0;
+            }
+        }
+        if count > 0.0 { ((mean / count) as f32, (rise / count) as f32) } else { (0.0, 0.0) }
+    }
+
+    /// Whether the lists have as many entries as `plant` has parts and vertices, and all values are in their ranges.
+    pub fn fits(&self, plant: &Plant) -> bool {
+        let counts = || plant.parts.iter().map(|part| part.mesh.positions.len());
+        match self {
+            Self::Local => true,
+            Self::Expressive(lighting) => {
+                lighting.normals.iter().map(Vec::len).eq(counts())
+                    && lighting.ambient.iter().map(Vec::len).eq(counts())
+                    && lighting.normals.iter().flatten().all(|normal| normal.is_finite())
+                    && lighting.ambient.iter().flatten().all(|ambient| (0.0..=1.0).contains(ambient))
+                    && lighting.no_surface.is_none_or(|reason| reason.is_finite())
+            }
+            Self::Transfer(lighting) => lighting.ambient.iter().map(Vec::len).eq(counts()),
+        }
+    }
+
+    /// Whether the foliage's normals point out of the crown rather than out of each leaf.
+    pub fn is_realigned(&self) -> bool {
+        matches!(self, Self::Expressive(lighting) if lighting.no_surface.is_none())
+    }
+
+    /// What the user ought to know of the bake.
+    pub fn warning(&self) -> Option<String> {
+        match self {
+            Self::Expressive(lighting) => lighting.no_surface.map(|reason| reason.to_string()),
+            Self::Local | Self::Transfer(_) => None,
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! Which trees cast into a cascade of the sun's shadow, and in which representation.
+
+use std::ops::Range;
+
+use glam::DVec3;
+
+use super::{
+    Frustum,
+    cascades::{CascadeBox, LOWEST_SINE},
+    lists::{DrawLists, Grouping, ListBuilder},
+};
+use crate::scatter::{PackedStand, PlantSize};
+
+/// What a view can see of shadows: a caster counts only if the volume that it shades can be seen.
+#[derive(Clone, Debug)]
+pub struct SeenShadows<'a> {
+    /// The camera in scene metres.
+    pub camera: DVec3,
+    /// Its frustum, relative to it.
+    pub frustum: &'a Frustum,
+    /// Lowest ground in scene metres: a shadow goes no farther down.
+    pub lowest: f64,
+    /// How far from its own place a visible point may look the map up, metres.
+    pub margin: f64,
+}
+
+impl SeenShadows<'_> {
+    /// Whether the shadow of a caster in the sphere (scene metres) may be seen, for a light in `direction` (unit).
+    fn includes(&self, center: DVec3, radius: f64, direction: DVec3) -> bool {
+        let radius = radius + self.margin;
+        let drop = (center.y + radius - self.lowest).max(0.0);
+        let length = drop / direction.y.max(LOWEST_SINE);
+        let start = (center - self.camera).as_vec3();
+        let end = (center - direction * length - self.camera).as_vec3();
+        self.frustum.sees_swept_sphere(start, end, radius as f32)
+    }
+}
+
+/// Casters of one cascade, whose box lies in scene metres; `origin` is the stand's own origin there.
+///
+/// `casting` has a range of distances from the box's centre, metres, for each level: a tree casts in the first level whose
+/// range holds it, and not at all where none does. `groupings` has one entry a level. With `seen`, casters whose shadow
+/// no pixel of the view can show are left out.
+pub fn cull_cascade(
+    stand: &PackedStand,
+    sizes: &[PlantSize],
+    origin: DVec3,
+    cascade: &CascadeBox,
+    casting: &[Range<f64>],
+    groupings: &[Grouping],
+    seen: Option<&SeenShadows>,
+) -> DrawLists {
+    let mut lists = ListBuilder::new(groupings, sizes.len());
+    let center = cascade.center - origin;
+    let reach = cascade.reach();
+    let casts = |min: DVec3, max: DVec3| {
+        let (middle, radius) = (0.5 * (min + max), 0.5 * (max - min).length());
+        reach.includes(min, max) && seen.is_none_or(|seen| seen.includes(middle, radius, cascade.direction))
+    };
+    for cell in &stand.cells {
+        if !casts(cell.min + origin, cell.max + origin) {
+            continue;
+        }
+        for tree in cell.first..cell.first + cell.count {
+            let Some(packed) = stand.trees.get(tree as usize) else { continue };
+            let variant = packed.variant() as usize;
+            let Some(size) = sizes.get(variant) else { continue };
+            let scale = f64::from(packed.scale());
+            let foot = packed.position(stand.cell_size);
+            let (radius, height) = (f64::from(size.radius) * scale, f64::from(size.height) * scale);
+            let (min, max) = (foot - DVec3::new(radius, 0.0, radius), foot + DVec3::new(radius, height, radius));
+            if !casts(min + origin, max + origin) {
+                continue;
+            }
+            let offset = foot - center;
+            let distance = offset.x.hypot(offset.z);
+            let Some(level) = casting.iter().position(|range| range.contains(&distance)) else { continue };
+            if let Some(list) = lists.list(level, variant) {
+                list.push(((foot + DVec3::Y * height).dot(cascade.direction), tree));
+            }
+        }
+    }
+    // Nearest to the light first: what lies behind is hidden before its alpha is looked up.
+    let sorted = |mut list: Vec<(f64, u32)>| -> Vec<u32> {
+        list.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        list.into_iter().map(|(_, tree)| tree).collect()
+    };
+    let levels = lists.into_lists().into_iter().map(|groups| groups.into_iter().map(sorted).collect()).collect();
+    DrawLists::assemble(levels)
+}

@@ -1,0 +1,75 @@
+//! What a view or a cascade draws of one stand.
+
+use std::ops::Range;
+
+/// How the trees of a level are handed to its draw calls.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Grouping {
+    /// One range a variant: each variant has buffers of its own.
+    ByVariant,
+    /// One range for all variants, whose order front to back is kept.
+    Together,
+}
+
+/// What one view draws of one stand: ranges into `visible`, which holds indices of trees.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct DrawLists {
+    /// Indices into the stand's trees.
+    pub visible: Vec<u32>,
+    /// For each level its ranges: one a variant, or a single one ([`Grouping`]).
+    pub levels: Vec<Vec<Range<u32>>>,
+}
+
+impl DrawLists {
+    /// The lists of each level and group, one after another.
+    pub(super) fn assemble(levels: Vec<Vec<Vec<u32>>>) -> Self {
+        let mut visible = Vec::with_capacity(levels.iter().flatten().map(Vec::len).sum());
+        let mut range = |mut list: Vec<u32>| {
+            let first = visible.len() as u32;
+            visible.append(&mut list);
+            first..visible.len() as u32
+        };
+        let levels = levels.into_iter().map(|groups| groups.into_iter().map(&mut range).collect()).collect();
+        Self { visible, levels }
+    }
+
+    /// The ranges of `level`; none beyond the last level.
+    pub fn ranges(&self, level: usize) -> &[Range<u32>] {
+        self.levels.get(level).map_or(&[], Vec::as_slice)
+    }
+
+    /// Number of trees drawn in `level`.
+    pub fn count(&self, level: usize) -> usize {
+        self.ranges(level).iter().map(|range| range.len()).sum()
+    }
+}
+
+/// Lists under construction: entries by level and group.
+pub(super) struct ListBuilder<'a, T> {
+    groupings: &'a [Grouping],
+    lists: Vec<Vec<Vec<T>>>,
+}
+
+impl<'a, T> ListBuilder<'a, T> {
+    pub fn new(groupings: &'a [Grouping], variants: usize) -> Self {
+        let groups = |grouping: &Grouping| match grouping {
+            Grouping::ByVariant => variants,
+            Grouping::Together => 1,
+        };
+        let lists = groupings.iter().map(|grouping| (0..groups(grouping)).map(|_| Vec::new()).collect()).collect();
+        Self { groupings, lists }
+    }
+
+    /// The list of a tree of `variant` in `level`; `None` for a level or a variant that does not exist.
+    pub fn list(&mut self, level: usize, variant: usize) -> Option<&mut Vec<T>> {
+        let group = match self.groupings.get(level)? {
+            Grouping::ByVariant => variant,
+            Grouping::Together => 0,
+        };
+        self.lists.get_mut(level)?.get_mut(group)
+    }
+
+    pub fn into_lists(self) -> Vec<Vec<Vec<T>>> {
+        self.lists
+    }
+}

@@ -1,0 +1,18 @@
+//! Which trees a view or a cascade draws, and in which representation. Pure functions over a packed stand.
+//!
+//! Trees are sorted into square cells. Cells are tested against the frustum and sorted front to back, so that near
+//! crowns hide what lies behind before it is shaded; only cells that a fade band crosses are searched tree by
+//! tree. The lists are a function of the camera alone: no atomics, no race in their order.
+//!
+//! Cost: one test a cell (8,800 cells for 36 km²) and one append a visible tree.
+
+pub mod cascades;
+mod casters;
+mod frustum;
+mod lists;
+mod view;
+
+pub use casters::{SeenShadows, cull_cascade};
+pub use frustum::Frustum;
+pub use lists::{DrawLists, Grouping};
+pub use view::cull_view;

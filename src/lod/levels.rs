@@ -1,0 +1,166 @@
+//! The list of representations of a forest.
+
+use super::{FadeBand, GONE, WHOLE};
+
+/// The most levels that a forest has.
+pub const MAX_LEVELS: usize = 8;
+
+/// A way to draw a plant, by its name. The renderer has an implementation for each name that it knows
+/// (`render::forest::Representations`); a program can add its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Representation(&'static str);
+
+impl Representation {
+    /// The full model.
+    pub const MODEL: Self = Self("model");
+    /// Crossed billboards [Franzke 2005, 4.3].
+    pub const CROSS: Self = Self("cross");
+
+    /// The representation of that name.
+    pub const fn named(name: &'static str) -> Self {
+        Self(name)
+    }
+
+    /// Its name.
+    pub const fn name(self) -> &'static str {
+        self.0
+    }
+}
+
+/// The representations of a forest from near to far, and the bands over which each gives way to the next. Never empty.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Levels {
+    representations: Vec<Representation>,
+    /// One less than the representations: `fades[i]` lies between `i` and `i + 1`.
+    fades: Vec<FadeBand>,
+}
+
+impl Levels {
+    /// One representation at every distance.
+    pub fn only(representation: Representation) -> Self {
+        Self { representations: vec![representation], fades: Vec::new() }
+    }
+
+    /// Full models that give way to crossed billboards over `fade`.
+    pub fn model_and_cross(fade: FadeBand) -> Self {
+        Self::only(Representation::MODEL).then(fade, Representation::CROSS)
+    }
+
+    /// Beyond `fade`, `representation`. A band that begins before the one in front of it ends is moved behind it, so that
+    /// at most two representations overlap. Beyond [`MAX_LEVELS`] the list stays as it is.
+    #[must_use]
+    pub fn then(mut self, fade: FadeBand, representation: Representation) -> Self {
+        if self.representations.len() < MAX_LEVELS {
+            let earliest = self.fades.last().map_or(0.0, |before| before.end);
+            let start = fade.start.max(earliest);
+            self.fades.push(FadeBand { start, end: fade.end.max(start) });
+            self.representations.push(representation);
+        }
+        self
+    }
+
+    /// The representations, from near to far.
+    pub fn representations(&self) -> &[Representation] {
+        &self.representations
+    }
+
+    /// Number of levels, at least 1.
+    #[expect(clippy::len_without_is_empty, reason = "a list of levels is never empty")]
+    pub fn len(&self) -> usize {
+        self.representations.len()
+    }
+
+    /// The band over which `level` comes in; `None` for the nearest one.
+    pub fn fade_in(&self, level: usize) -> Option<FadeBand> {
+        level.checked_sub(1).and_then(|before| self.fades.get(before)).copied()
+    }
+
+    /// The band over which `level` goes out; `None` for the farthest one.
+    pub fn fade_out(&self, level: usize) -> Option<FadeBand> {
+        self.fades.get(level).copied()
+    }
+
+    /// Alpha threshold of `level` at `distance` metres: [`WHOLE`] to above [`GONE`].
+    pub fn threshold(&self, level: usize, distance: f32) -> f32 {
+        let coming = self.fade_in(level).map_or(WHOLE, |fade| fade.incoming_threshold(distance));
+        let going = self.fade_out(level).map_or(WHOLE, |fade| fade.outgoing_threshold(distance));
+        coming.max(going)
+    }
+
+    /// Whether `level` is drawn at `distance` metres.
+    pub fn draws(&self, level: usize, distance: f32) -> bool {
+        self.threshold(level, distance) < GONE
+    }
+
+    /// The level that alone is drawn, and whole, at every distance from `near` to `far` metres, if there is one.
+    pub fn sole_level(&self, near: f64, far: f64) -> Option<usize> {
+        (0..self.len()).find(|&level| {
+            self.fade_in(level).is_none_or(|fade| near > f64::from(fade.end))
+                && self.fade_out(level).is_none_or(|fade| far < f64::from(fade.start))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const CLOUD: Representation = Representation::named("cloud");
+
+    fn three_levels() -> impl Strategy<Value = Levels> {
+        (0.0f32..1e4, 0.0f32..1e3, 0.0f32..1e4, 0.0f32..1e3).prop_map(|(first, width, second, other)| {
+            Levels::only(Representation::MODEL)
+                .then(FadeBand::new(first, width), CLOUD)
+                .then(FadeBand::new(second, other), Representation::CROSS)
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn one_representation_is_always_whole(levels in three_levels(), distance in 0.0f32..3e4) {
+            let thresholds: Vec<f32> = (0..levels.len()).map(|level| levels.threshold(level, distance)).collect();
+            prop_assert!(thresholds.iter().all(|t| t.is_finite() && (WHOLE..=1.02).contains(t)));
+            prop_assert!(thresholds.contains(&WHOLE), "{thresholds:?}");
+            prop_assert!(thresholds.iter().filter(|t| **t < GONE).count() <= 2, "{thresholds:?}");
+        }
+
+        #[test]
+        fn far_from_the_band_only_one_is_drawn(start in 1.0f32..1e4, width in 1.0f32..1e3) {
+            let band = FadeBand::new(start, width);
+            let levels = Levels::model_and_cross(band);
+            prop_assert!(levels.draws(0, 0.99 * band.start) && !levels.draws(1, 0.99 * band.start));
+            prop_assert!(!levels.draws(0, 1.01 * band.end) && levels.draws(1, 1.01 * band.end));
+        }
+
+        #[test]
+        fn a_sole_level_is_the_only_one_and_whole(
+            levels in three_levels(), near in 0.0f32..2e4, depth in 0.0f32..500.0, share in 0.0f32..=1.0,
+        ) {
+            let far = near + depth;
+            if let Some(level) = levels.sole_level(f64::from(near), f64::from(far)) {
+                let distance = near + share * depth;
+                for other in 0..levels.len() {
+                    prop_assert_eq!(levels.draws(other, distance), other == level);
+                }
+                prop_assert_eq!(levels.threshold(level, distance), WHOLE);
+            }
+        }
+    }
+
+    #[test]
+    fn bands_that_overlap_are_moved_apart() {
+        let levels = Levels::only(Representation::MODEL)
+            .then(FadeBand::new(50.0, 20.0), CLOUD)
+            .then(FadeBand::new(10.0, 5.0), Representation::CROSS);
+        assert_eq!(levels.fade_out(1), Some(FadeBand { start: 70.0, end: 70.0 }));
+        assert_eq!(levels.representations(), [Representation::MODEL, CLOUD, Representation::CROSS]);
+    }
+
+    #[test]
+    fn there_are_at_most_eight_levels() {
+        let levels = (0..20).fold(Levels::only(CLOUD), |levels, i| levels.then(FadeBand::new(i as f32, 1.0), CLOUD));
+        assert_eq!(levels.len(), MAX_LEVELS);
+        assert_eq!(levels.fade_out(MAX_LEVELS - 1), None);
+    }
+}

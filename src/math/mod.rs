@@ -1,0 +1,37 @@
+//! Mathematics that several rooms need. This room knows no other one.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`radical_inverse`](mod@radical_inverse) | the radical inverse in any base, in integers |
+//! | [`sequence`] | Halton and Hammersley points |
+//! | [`discrepancy`] | how evenly a point set fills the unit square |
+//! | [`hash`] | numbers that depend on nothing but a seed, an index and a stream |
+//! | [`quadrature`] | Gauss-Legendre nodes, directions and solid angles that integrate over the sphere |
+//! | [`octahedral`] | unit vectors in two coordinates |
+//! | [`color`] | sRGB, luminance, 8-bit codes |
+//! | [`interpolation`] | the smooth step |
+//! | [`mip`] | a texture with its mip levels |
+//! | [`resample`] | images at another size: filtering in linear light with colours weighted by alpha |
+//! | [`digits`] | numbers as people read them |
+
+pub mod color;
+pub mod digits;
+pub mod discrepancy;
+mod error;
+pub mod hash;
+pub mod interpolation;
+pub mod mip;
+pub mod octahedral;
+pub mod quadrature;
+pub mod radical_inverse;
+pub mod resample;
+pub mod sequence;
+
+pub use color::{LUMINANCE_WEIGHTS, linear_to_srgb, luminance, srgb_to_linear};
+pub use discrepancy::star_discrepancy;
+pub use error::MathError;
+pub use interpolation::smoothstep;
+pub use mip::MipChain;
+pub use quadrature::SphereQuadrature;
+pub use radical_inverse::{RadicalInverse, radical_inverse};
+pub use sequence::{HaltonSequence, halton, hammersley};

@@ -1,0 +1,14 @@
+//! All of Canopy as one plugin group.
+
+use bevy::app::{PluginGroup, PluginGroupBuilder};
+
+use crate::render::{CanopyRenderPlugin, daylight::DaylightPlugin};
+
+/// All of Canopy for a Bevy program that has its `DefaultPlugins`.
+pub struct CanopyPlugins;
+
+impl PluginGroup for CanopyPlugins {
+    fn build(self) -> PluginGroupBuilder {
+        PluginGroupBuilder::start::<Self>().add(DaylightPlugin).add(CanopyRenderPlugin)
+    }
+}

@@ -1,0 +1,230 @@
+//! Bind group 0, which all passes of a view share: frame, light, shadow, and the textures that passes read from each
+//! other.
+//!
+//! The group imports no pass. A pass that has something for the others writes it into [`SharedTextures`] or
+//! [`SharedPlacement`] while resources are prepared; until then the group has a single texel there.
+
+mod light;
+pub mod uniforms;
+
+use bevy::{
+    app::{App, Plugin},
+    ecs::{
+        entity::Entity,
+        resource::Resource,
+        schedule::IntoScheduleConfigs,
+        system::{Res, ResMut},
+        world::{FromWorld, World},
+    },
+    render::{
+        GpuResourceAppExt, Render, RenderApp, RenderSystems,
+        render_resource::{
+            AddressMode, BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer,
+            BufferUsages, CompareFunction, Extent3d, FilterMode, PipelineCache, Sampler, SamplerBindingType,
+            SamplerDescriptor, ShaderStages, TextureDescriptor, TextureDimension, TextureFormat, TextureSampleType,
+            TextureUsages, TextureView, TextureViewDescriptor, TextureViewDimension,
+            binding_types::{sampler, texture_2d, texture_2d_array, uniform_buffer_sized},
+        },
+        renderer::{RenderDevice, RenderQueue},
+    },
+};
+
+use super::{extract::ExtractedScene, gpu, view::PreparedFrame};
+use uniforms::{
+    CascadeUniform, CascadeViewUniform, FrameUniform, LightUniform, MAX_CASCADES, NOISE_PERIOD, ShadowUniform,
+};
+
+/// Format of the shadow maps.
+pub const SHADOW_FORMAT: TextureFormat = TextureFormat::Depth32Float;
+
+/// Layout of bind group 0.
+pub fn frame_layout() -> BindGroupLayoutDescriptor {
+    let size = |bytes: usize| std::num::NonZeroU64::new(bytes as u64);
+    BindGroupLayoutDescriptor::new(
+        "canopy_frame",
+        &BindGroupLayoutEntries::sequential(
+            ShaderStages::VERTEX_FRAGMENT,
+            (
+                uniform_buffer_sized(false, size(size_of::<FrameUniform>())),
+                uniform_buffer_sized(false, size(size_of::<LightUniform>())),
+                uniform_buffer_sized(false, size(size_of::<ShadowUniform>())),
+                texture_2d(TextureSampleType::Float { filterable: true }),
+                sampler(SamplerBindingType::Filtering),
+                texture_2d_array(TextureSampleType::Depth),
+                sampler(SamplerBindingType::Comparison),
+                texture_2d(TextureSampleType::Float { filterable: true }),
+                texture_2d(TextureSampleType::Float { filterable: true }),
+            ),
+        ),
+    )
+}
+
+/// Group 0 of what casts into a shadow map: the cascade, with a dynamic offset.
+pub fn caster_layout() -> BindGroupLayoutDescriptor {
+    BindGroupLayoutDescriptor::new(
+        "canopy_cascade",
+        &BindGroupLayoutEntries::single(
+            ShaderStages::VERTEX,
+            uniform_buffer_sized(true, std::num::NonZeroU64::new(size_of::<CascadeViewUniform>() as u64)),
+        ),
+    )
+}
+
+/// The textures of group 0, each written by the pass that makes it.
+#[derive(Resource)]
+pub struct SharedTextures {
+    /// Radiance of the sky.
+    pub sky: TextureView,
+    /// Depth maps of the sun's shadow, one layer a cascade.
+    pub shadow_maps: TextureView,
+    /// Terrain shadow and canopy cover, seen from above.
+    pub ground: TextureView,
+    /// Light inside a stand.
+    pub stand_light: TextureView,
+}
+
+impl FromWorld for SharedTextures {
+    fn from_world(world: &mut World) -> Self {
+        let device = world.resource::<RenderDevice>();
+        let texel = || gpu::table(device, "canopy_nothing", (1, 1)).1;
+        let depth = device.create_texture(&TextureDescriptor {
+            label: Some("canopy_no_shadow"),
+            size: Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: TextureDimension::D2,
+            format: SHADOW_FORMAT,
+            usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        });
+        let layers = TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..Default::default() };
+        Self { sky: texel(), shadow_maps: depth.create_view(&layers), ground: texel(), stand_light: texel() }
+    }
+}
+
+/// Where the shared textures lie in the view of this frame, each written by the pass that makes the texture.
+#[derive(Resource, Clone, Copy, Debug, Default)]
+pub struct SharedPlacement {
+    /// Cascades of the shadow maps, from the finest to the widest.
+    pub cascades: [CascadeUniform; MAX_CASCADES],
+    /// Number of cascades.
+    pub cascade_count: usize,
+    /// Texels along a side of a shadow map.
+    pub shadow_map_size: u32,
+    /// Camera-relative origin (x, z) and inverse size of the ground texture.
+    pub ground: [f32; 4],
+    /// Mean share of ground under crowns where the terrain is known.
+    pub mean_cover: f32,
+}
+
+/// Group 0 of this frame and the view that it belongs to; nothing while a part of it is missing.
+#[derive(Resource, Default)]
+pub struct FrameBindGroup(Option<(Entity, BindGroup)>);
+
+impl FrameBindGroup {
+    /// Group 0 for the view `entity`; `None` for every view but the one that Canopy draws.
+    pub fn of(&self, entity: Entity) -> Option<&BindGroup> {
+        self.0.as_ref().filter(|(view, _)| *view == entity).map(|(_, group)| group)
+    }
+}
+
+#[derive(Resource)]
+struct FrameBuffers {
+    frame: Buffer,
+    light: Buffer,
+    shadow: Buffer,
+    clamp_sampler: Sampler,
+    shadow_sampler: Sampler,
+}
+
+impl FromWorld for FrameBuffers {
+    fn from_world(world: &mut World) -> Self {
+        let device = world.resource::<RenderDevice>();
+        let usage = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
+        let clamp = |compare: Option<CompareFunction>| {
+            device.create_sampler(&SamplerDescriptor {
+                label: Some("canopy_frame"),
+                address_mode_u: AddressMode::ClampToEdge,
+                address_mode_v: AddressMode::ClampToEdge,
+                mag_filter: FilterMode::Linear,
+                min_filter: FilterMode::Linear,
+                compare,
+                ..Default::default()
+            })
+        };
+        Self {
+            frame: gpu::buffer_with(device, "canopy_frame", usage, &[FrameUniform::default()]),
+            light: gpu::buffer_with(device, "canopy_light", usage, &[LightUniform::default()]),
+            shadow: gpu::buffer_with(device, "canopy_shadow", usage, &[ShadowUniform::default()]),
+            clamp_sampler: clamp(None),
+            // Reversed depth: a point is lit where it is at least as near to the light as the map.
+            shadow_sampler: clamp(Some(CompareFunction::GreaterEqual)),
+        }
+    }
+}
+
+/// Makes group 0 of each frame.
+pub struct BindingsPlugin;
+
+impl Plugin for BindingsPlugin {
+    fn build(&self, app: &mut App) {
+        let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
+        render_app
+            .init_gpu_resource::<FrameBuffers>()
+            .init_gpu_resource::<SharedTextures>()
+            .init_resource::<SharedPlacement>()
+            .init_resource::<FrameBindGroup>()
+            .add_systems(Render, prepare_bind_group.in_set(RenderSystems::PrepareBindGroups));
+    }
+}
+
+fn prepare_bind_group(
+    scene: Res<ExtractedScene>,
+    frame: Res<PreparedFrame>,
+    buffers: Res<FrameBuffers>,
+    textures: Res<SharedTextures>,
+    placement: Res<SharedPlacement>,
+    device: Res<RenderDevice>,
+    queue: Res<RenderQueue>,
+    pipelines: Res<PipelineCache>,
+    mut group: ResMut<FrameBindGroup>,
+) {
+    group.0 = None;
+    let (Some(view), Some(daylight)) = (&frame.view, &scene.daylight) else { return };
+    let modulo = |value: f64| value.rem_euclid(NOISE_PERIOD) as f32;
+    let frame_uniform = FrameUniform {
+        clip_from_relative: view.clip_from_relative.to_cols_array_2d(),
+        relative_from_clip: view.clip_from_relative.inverse().to_cols_array_2d(),
+        camera: [modulo(view.camera.x), view.camera.y as f32, modulo(view.camera.z)],
+        focal_length_pixels: view.focal_pixels,
+        mean_cover: placement.mean_cover,
+        padding: [0.0; 3],
+    };
+    let light_uniform = light::light_uniform(&daylight.0, view.exposure);
+    let shadow_uniform = ShadowUniform {
+        cascades: placement.cascades,
+        ground: placement.ground,
+        cascade_count: placement.cascade_count as i32,
+        inverse_map_size: 1.0 / placement.shadow_map_size.max(1) as f32,
+        padding: [0.0; 2],
+    };
+    queue.write_buffer(&buffers.frame, 0, bytemuck::bytes_of(&frame_uniform));
+    queue.write_buffer(&buffers.light, 0, bytemuck::bytes_of(&light_uniform));
+    queue.write_buffer(&buffers.shadow, 0, bytemuck::bytes_of(&shadow_uniform));
+    let made = device.create_bind_group(
+        "canopy_frame",
+        &pipelines.get_bind_group_layout(&frame_layout()),
+        &BindGroupEntries::sequential((
+            buffers.frame.as_entire_binding(),
+            buffers.light.as_entire_binding(),
+            buffers.shadow.as_entire_binding(),
+            &textures.sky,
+            &buffers.clamp_sampler,
+            &textures.shadow_maps,
+            &buffers.shadow_sampler,
+            &textures.ground,
+            &textures.stand_light,
+        )),
+    );
+    group.0 = Some((view.entity, made));
+}

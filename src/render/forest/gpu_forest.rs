@@ -1,0 +1,201 @@
+//! A forest on the device: made when the entity appears or changes, dropped when it is gone.
+
+use std::sync::Arc;
+
+use bevy::{
+    ecs::{
+        entity::Entity,
+        resource::Resource,
+        system::{Res, ResMut},
+    },
+    log::error_once,
+    platform::collections::HashMap,
+    render::render_resource::{Buffer, BufferUsages},
+};
+
+use super::{
+    leaves::Leaves,
+    representation::{ForestUpload, GpuLevel, LevelRenderer, Relight, Representations},
+    transfer::TransferLight,
+    uniforms::variants,
+};
+use crate::{
+    bake::BakedPlant,
+    cull::Grouping,
+    light::StandTrees,
+    render::{
+        components::Forest,
+        extract::ExtractedScene,
+        gpu::{self, Gpu},
+    },
+    scatter::{PackedStand, PackedTree, PlantSize},
+};
+
+/// A level of one forest on the device.
+pub struct ForestLevel {
+    /// What draws it.
+    pub renderer: Arc<dyn LevelRenderer>,
+    /// Its plants.
+    pub gpu: Box<dyn GpuLevel>,
+}
+
+/// A forest's side of the device.
+pub struct GpuForest {
+    stand: Arc<PackedStand>,
+    /// What the buffers and textures hold.
+    plants: Arc<Vec<BakedPlant>>,
+    /// What the entity asks for now.
+    pub forest: Forest,
+    /// [`PackedTree`]s.
+    pub trees: Buffer,
+    /// [`VariantUniform`](super::VariantUniform)s.
+    pub variants: Buffer,
+    leaves: Leaves,
+    /// Size of each variant, for culling.
+    pub sizes: Vec<PlantSize>,
+    /// Largest scale of any tree.
+    pub max_scale: f32,
+    /// The levels in the order of [`Forest::levels`]; `None` for a representation that nothing here can draw.
+    levels: Vec<Option<ForestLevel>>,
+    /// How each level wants its trees.
+    pub groupings: Vec<Grouping>,
+    /// Counts up with every change of content, so that shadows are drawn again.
+    pub generation: u64,
+}
+
+impl GpuForest {
+    /// The levels that can be drawn, with their index.
+    pub fn levels(&self) -> impl DoubleEndedIterator<Item = (usize, &ForestLevel)> {
+        self.levels.iter().enumerate().filter_map(|(index, level)| level.as_ref().map(|level| (index, level)))
+    }
+
+    /// The baked plants, by variant.
+    pub fn plants(&self) -> &[BakedPlant] {
+        &self.plants
+    }
+
+    fn new(forest: &Forest, generation: u64, known: &Representations, upload: &mut ForestUpload) -> Self {
+        let storage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
+        let device = &upload.gpu.device;
+        let sizes: Vec<PlantSize> = forest.plants.iter().map(BakedPlant::size).collect();
+        let trees = gpu::buffer_with::<PackedTree>(device, "canopy_trees", storage, &forest.stand.trees);
+        let variants = gpu::buffer_with(device, "canopy_variants", storage, &variants(&forest.plants, &sizes));
+        let level = |representation| {
+            let renderer = known.get(representation).cloned();
+            if renderer.is_none() {
+                let names: Vec<_> = known.iter().map(|renderer| renderer.representation().name()).collect();
+                error_once!(
+                    "a forest has the level `{}`, which nothing can draw (known: {}): register it with \
+                     `App::register_representation`",
+                    representation.name(),
+                    names.join(", ")
+                );
+            }
+            renderer.map(|renderer| ForestLevel { gpu: renderer.upload(forest, upload), renderer })
+        };
+        let levels: Vec<_> = forest.levels.representations().iter().copied().map(level).collect();
+        let grouping =
+            |level: &Option<ForestLevel>| level.as_ref().map_or(Grouping::Together, |level| level.renderer.grouping());
+        Self {
+            stand: forest.stand.clone(),
+            plants: forest.plants.clone(),
+            forest: forest.clone(),
+            trees,
+            variants,
+            leaves: Leaves::of(forest),
+            sizes,
+            max_scale: forest.stand.cells.iter().map(|cell| cell.max_scale).fold(0.0, f32::max),
+            groupings: levels.iter().map(grouping).collect(),
+            levels,
+            generation,
+        }
+    }
+
+    /// Whether what the device holds becomes that of `forest` by other light alone.
+    fn can_follow(&self, forest: &Forest) -> bool {
+        let same = |(old, new): (&BakedPlant, &BakedPlant)| {
+            Arc::ptr_eq(&old.plant, &new.plant) && self.levels().all(|(_, level)| level.renderer.same_shape(old, new))
+        };
+        Arc::ptr_eq(&self.stand, &forest.stand)
+            && self.forest.levels.representations() == forest.levels.representations()
+            && self.forest.suns == forest.suns
+            && (Arc::ptr_eq(&self.plants, &forest.plants)
+                || (self.plants.len() == forest.plants.len() && self.plants.iter().zip(forest.plants.iter()).all(same)))
+    }
+
+    /// Other light for plants that are drawn already: what a bake gives anew is written over what the device holds. Meshes,
+    /// outlines, the stand and so the shadow maps stay.
+    ///
+    /// Cost: 20 bytes a vertex written and their normals packed, and 1 MB a plant where its crosses changed (256 texels).
+    fn relight(&mut self, forest: &Forest, upload: &mut ForestUpload) {
+        let relight = Relight { old: &self.plants, new: &forest.plants, suns: &forest.suns };
+        for level in self.levels.iter_mut().flatten() {
+            level.gpu.relight(&relight, upload);
+        }
+        let variants = variants(&forest.plants, &self.sizes);
+        upload.gpu.queue.write_buffer(&self.variants, 0, bytemuck::cast_slice(&variants));
+        self.plants = forest.plants.clone();
+    }
+}
+
+/// All forests of the world by their main-world entity.
+#[derive(Resource, Default)]
+pub struct GpuForests {
+    forests: HashMap<Entity, GpuForest>,
+    /// Entities in a fixed order.
+    pub order: Vec<Entity>,
+    generations: u64,
+}
+
+impl GpuForests {
+    /// Forests in a fixed order.
+    pub fn iter(&self) -> impl Iterator<Item = (Entity, &GpuForest)> {
+        self.order.iter().filter_map(|entity| self.forests.get(entity).map(|forest| (*entity, forest)))
+    }
+
+    /// All levels of all forests.
+    pub fn levels(&self) -> impl Iterator<Item = &ForestLevel> {
+        self.iter().flat_map(|(_, forest)| forest.levels().map(|(_, level)| level))
+    }
+
+    /// What the trees of all of them are to light, in the mean over the areas of their leaves.
+    pub fn trees(&self) -> StandTrees {
+        self.iter().map(|(_, forest)| forest.leaves).fold(Leaves::default(), Leaves::add).trees()
+    }
+
+    /// One forest.
+    pub fn get(&self, entity: Entity) -> Option<&GpuForest> {
+        self.forests.get(&entity)
+    }
+}
+
+/// Uploads new and changed forests, forgets despawned ones.
+pub fn prepare_forests(
+    scene: Res<ExtractedScene>,
+    representations: Res<Representations>,
+    gpu: Gpu,
+    mut forests: ResMut<GpuForests>,
+    mut transfer: ResMut<TransferLight>,
+) {
+    let forests = &mut *forests;
+    let mut upload = ForestUpload { gpu: &gpu, transfer: &mut transfer };
+    forests.order = scene.forests.iter().map(|(entity, _)| *entity).collect();
+    let alive: Vec<Entity> = forests.order.clone();
+    forests.forests.retain(|entity, _| alive.contains(entity));
+    for (entity, forest) in &scene.forests {
+        if let Some(known) = forests.forests.get_mut(entity).filter(|known| known.can_follow(forest)) {
+            if !Arc::ptr_eq(&known.plants, &forest.plants) {
+                known.relight(forest, &mut upload);
+            }
+            if known.forest.origin != forest.origin {
+                forests.generations += 1;
+                known.generation = forests.generations;
+            }
+            known.forest = forest.clone();
+            continue;
+        }
+        forests.generations += 1;
+        let made = GpuForest::new(forest, forests.generations, &representations, &mut upload);
+        forests.forests.insert(*entity, made);
+    }
+}

@@ -1,0 +1,80 @@
+//! Group 1 of everything that draws trees: where they stand, which of them are drawn, and what their plants are.
+
+use bevy::render::render_resource::{
+    BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, BindingResource, Buffer,
+    BufferBinding, ShaderStages,
+    binding_types::{storage_buffer_read_only_sized, uniform_buffer_sized},
+};
+use glam::{DVec3, IVec2, Vec4};
+
+use super::{gpu_forest::GpuForest, uniforms::ForestViewUniform};
+use crate::{lod::FadeBand, render::gpu::Gpu};
+
+/// A distance in metres that no tree reaches.
+const NEVER: f32 = 1e30;
+
+/// How a level looks in a view.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LevelLook {
+    /// Over which distances it comes in.
+    pub fade_in: Option<FadeBand>,
+    /// Over which distances it goes out.
+    pub fade_out: Option<FadeBand>,
+    /// Linear colour of its tint and how much of it is mixed in.
+    pub tint: Vec4,
+}
+
+/// Layout of group 1: uniform with dynamic offset, trees, indices of the drawn ones, plants.
+pub fn instance_layout() -> BindGroupLayoutDescriptor {
+    BindGroupLayoutDescriptor::new(
+        "canopy_instances",
+        &BindGroupLayoutEntries::sequential(
+            ShaderStages::VERTEX,
+            (
+                uniform_buffer_sized(true, std::num::NonZeroU64::new(size_of::<ForestViewUniform>() as u64))
+                    .visibility(ShaderStages::VERTEX_FRAGMENT),
+                storage_buffer_read_only_sized(false, None),
+                storage_buffer_read_only_sized(false, None),
+                storage_buffer_read_only_sized(false, None).visibility(ShaderStages::VERTEX_FRAGMENT),
+            ),
+        ),
+    )
+}
+
+/// The uniform of a view or cascade whose positions are relative to `anchor` (scene metres).
+///
+/// `level`: whose fades and tint it has; those of no level for a cascade, where trees do not fade.
+pub fn forest_view(forest: &GpuForest, anchor: DVec3, level: Option<LevelLook>) -> ForestViewUniform {
+    let look = level.unwrap_or_default();
+    let local = anchor - forest.forest.origin;
+    let size = forest.forest.stand.cell_size;
+    let cell = (local / size).floor();
+    ForestViewUniform {
+        anchor_cell: IVec2::new(cell.x as i32, cell.z as i32).to_array(),
+        anchor_offset: [(local.x - cell.x * size) as f32, (local.z - cell.z * size) as f32],
+        anchor_y: local.y as f32,
+        cell_size: size as f32,
+        fade_in: look.fade_in.map_or([0.0; 2], |fade| [fade.start, fade.end]),
+        fade_out: look.fade_out.map_or([NEVER; 2], |fade| [fade.start, fade.end]),
+        padding: [0.0; 2],
+        tint: look.tint.to_array(),
+    }
+}
+
+/// Group 1 over a uniform buffer with dynamic offsets and a list of visible trees.
+pub fn instance_bind_group(gpu: &Gpu, forest: &GpuForest, uniform: &Buffer, visible: &Buffer) -> BindGroup {
+    gpu.bind_group(
+        "canopy_instances",
+        &instance_layout(),
+        &BindGroupEntries::sequential((
+            BindingResource::Buffer(BufferBinding {
+                buffer: uniform,
+                offset: 0,
+                size: std::num::NonZeroU64::new(size_of::<ForestViewUniform>() as u64),
+            }),
+            forest.trees.as_entire_binding(),
+            visible.as_entire_binding(),
+            forest.variants.as_entire_binding(),
+        )),
+    )
+}

@@ -1,0 +1,64 @@
+//! What the leaves of a forest are to light, in the mean over their areas.
+
+use glam::Vec3;
+
+use crate::{bake::BakedPlant, light::StandTrees, render::components::Forest};
+
+/// Sums over leaves, each counted by its area.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Leaves {
+    area: f32,
+    reflected: Vec3,
+    transmitted: Vec3,
+    crown_width: f32,
+    crown_length: f32,
+}
+
+impl Leaves {
+    /// Of all trees of a stand.
+    pub fn of(forest: &Forest) -> Self {
+        let mut areas = vec![0.0; forest.plants.len()];
+        for tree in &forest.stand.trees {
+            if let Some(area) = areas.get_mut(usize::from(tree.variant())) {
+                *area += tree.scale().powi(2);
+            }
+        }
+        let of_plant = |(plant, scaled): (&BakedPlant, f32)| {
+            let colors = plant.plant.leaf_colors();
+            let area = colors.area * scaled;
+            Self {
+                area,
+                reflected: colors.reflected * area,
+                transmitted: colors.transmitted * area,
+                crown_width: plant.plant.crown_width() * area,
+                crown_length: plant.plant.crown_length() * area,
+            }
+        };
+        forest.plants.iter().zip(areas).map(of_plant).fold(Self::default(), Self::add)
+    }
+
+    /// Of two forests.
+    pub fn add(self, other: Self) -> Self {
+        Self {
+            area: self.area + other.area,
+            reflected: self.reflected + other.reflected,
+            transmitted: self.transmitted + other.transmitted,
+            crown_width: self.crown_width + other.crown_width,
+            crown_length: self.crown_length + other.crown_length,
+        }
+    }
+
+    /// Means over the area; black where there is none.
+    pub fn trees(self) -> StandTrees {
+        if self.area > 0.0 && self.area.is_finite() {
+            StandTrees {
+                reflectance: self.reflected / self.area,
+                transmittance: self.transmitted / self.area,
+                crown_width: self.crown_width / self.area,
+                crown_length: self.crown_length / self.area,
+            }
+        } else {
+            StandTrees::BLACK
+        }
+    }
+}

@@ -1,0 +1,272 @@
+//! Crossed billboards [Franzke 2005, 4.3]: three planes a tree, the trees of all variants in one call of pulled vertices.
+//! Casts as one upright plane that faces the light's azimuth and the level one.
+
+use std::{ops::Range, sync::Arc};
+
+use bevy::{
+    asset::Handle,
+    render::{
+        render_phase::TrackedRenderPass,
+        render_resource::{
+            AddressMode, BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, FilterMode,
+            FragmentState, MipmapFilterMode, RenderPipelineDescriptor, SamplerBindingType, SamplerDescriptor,
+            ShaderStages, Texture, TextureFormat, TextureSampleType, VertexState,
+            binding_types::{sampler, texture_2d_array},
+        },
+    },
+    shader::{Shader, ShaderDefVal},
+};
+use glam::Vec3;
+
+use crate::{
+    bake::{BakedPlant, levels::cross::Cross},
+    cull::Grouping,
+    lod::Representation,
+    math::MipChain,
+    render::{
+        components::Forest,
+        forest::{
+            representation::{ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight},
+            uniforms::{CROSS_CASTER_VERTICES, CROSS_VERTICES, PLANES},
+        },
+        gpu::{self, Gpu},
+        shaders::{CanopyShaders, ShaderFile},
+    },
+};
+
+/// Draws crossed billboards.
+pub struct CrossRenderer {
+    shader: Handle<Shader>,
+    caster: Handle<Shader>,
+}
+
+impl CrossRenderer {
+    /// With Canopy's own shaders.
+    pub fn new(shaders: &CanopyShaders) -> Self {
+        Self { shader: shaders.get(ShaderFile::ForestCross), caster: shaders.get(ShaderFile::SunShadowCross) }
+    }
+}
+
+/// How the sky's light reaches the crosses of a forest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum CrossLight {
+    /// All by normal and k_a.
+    Plain,
+    /// Some by lighting pictures.
+    Mixed,
+    /// All by lighting pictures.
+    Pictures,
+}
+
+impl CrossLight {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Plain, Self::Mixed, Self::Pictures];
+
+    /// That of crosses of these plants.
+    pub fn of(plants: &[BakedPlant]) -> Self {
+        let lit = plants.iter().filter(|plant| !plant.cross.textures.light.is_empty()).count();
+        match lit {
+            0 => Self::Plain,
+            all if all == plants.len() => Self::Pictures,
+            _ => Self::Mixed,
+        }
+    }
+}
+
+/// Group 2: colours, properties, sampler.
+fn cross_layout() -> BindGroupLayoutDescriptor {
+    let float = TextureSampleType::Float { filterable: true };
+    BindGroupLayoutDescriptor::new(
+        "canopy_cross",
+        &BindGroupLayoutEntries::sequential(
+            ShaderStages::FRAGMENT,
+            (texture_2d_array(float), texture_2d_array(float), sampler(SamplerBindingType::Filtering)),
+        ),
+    )
+}
+
+/// Group 3 where some plants have lighting textures.
+fn light_layout() -> BindGroupLayoutDescriptor {
+    let float = TextureSampleType::Float { filterable: true };
+    BindGroupLayoutDescriptor::new(
+        "canopy_cross_light",
+        &BindGroupLayoutEntries::single(ShaderStages::FRAGMENT, texture_2d_array(float)),
+    )
+}
+
+impl LevelRenderer for CrossRenderer {
+    fn representation(&self) -> Representation {
+        Representation::CROSS
+    }
+
+    fn label(&self) -> &'static str {
+        "crosses"
+    }
+
+    fn tint(&self) -> Vec3 {
+        Vec3::new(0.2, 0.35, 1.0)
+    }
+
+    fn grouping(&self) -> Grouping {
+        Grouping::Together
+    }
+
+    fn coarsest_shadow_texel(&self) -> Option<f64> {
+        Some(f64::INFINITY)
+    }
+
+    fn upload(&self, forest: &Forest, upload: &mut ForestUpload) -> Box<dyn GpuLevel> {
+        let plants = &forest.plants;
+        let (properties, bind_group) = upload_textures(plants, upload.gpu);
+        let (light, light_textures) = (CrossLight::of(plants), upload_light(plants, upload.gpu));
+        Box::new(GpuCrosses { properties, bind_group, light, light_textures })
+    }
+
+    fn same_shape(&self, old: &BakedPlant, new: &BakedPlant) -> bool {
+        Arc::ptr_eq(&old.cross, &new.cross) || same_outline(&old.cross, &new.cross)
+    }
+
+    fn pipeline(&self, features: u32, target: LevelTarget) -> RenderPipelineDescriptor {
+        let mut defs: Vec<ShaderDefVal> = vec!["FOLIAGE".into()];
+        let mut groups = vec![cross_layout()];
+        let LevelTarget::View(attachment) = target else {
+            return RenderPipelineDescriptor {
+                label: Some("canopy_caster_crosses".into()),
+                layout: target.layouts(groups),
+                vertex: VertexState {
+                    shader: self.caster.clone(),
+                    shader_defs: defs.clone(),
+                    entry_point: Some("vertex".into()),
+                    buffers: Vec::new(),
+                },
+                depth_stencil: Some(target.depth()),
+                fragment: Some(FragmentState {
+                    shader: self.caster.clone(),
+                    shader_defs: defs,
+                    entry_point: Some("fragment".into()),
+                    targets: Vec::new(),
+                }),
+                ..Default::default()
+            };
+        };
+        let light = CrossLight::ALL[features as usize % CrossLight::ALL.len()];
+        if light != CrossLight::Plain {
+            defs.push("TRANSFER".into());
+            groups.push(light_layout());
+        }
+        if light == CrossLight::Mixed {
+            defs.push("PLAIN_TOO".into());
+        }
+        let to_coverage = attachment.samples > 1;
+        if to_coverage {
+            defs.push("ALPHA_TO_COVERAGE".into());
+        }
+        let mut pipeline = attachment.pipeline(&self.shader, defs, target.depth());
+        pipeline.label = Some("canopy_crosses".into());
+        pipeline.layout = target.layouts(groups);
+        pipeline.multisample.alpha_to_coverage_enabled = to_coverage;
+        pipeline
+    }
+}
+
+/// The crosses of a forest's plants.
+struct GpuCrosses {
+    /// Normals, k_a and foliage, three layers a variant.
+    properties: Texture,
+    /// Group 2.
+    bind_group: BindGroup,
+    /// Which pipeline draws them.
+    light: CrossLight,
+    /// Group 3, where some have lighting textures.
+    light_textures: Option<BindGroup>,
+}
+
+impl GpuLevel for GpuCrosses {
+    fn features(&self, target: LevelTarget) -> Vec<u32> {
+        match target {
+            LevelTarget::View(_) => {
+                vec![CrossLight::ALL.iter().position(|known| *known == self.light).unwrap_or(0) as u32]
+            }
+            LevelTarget::ShadowMap => vec![0],
+        }
+    }
+
+    fn triangles(&self, _: usize) -> usize {
+        CROSS_VERTICES as usize / 3
+    }
+
+    fn draw<'a>(&'a self, pass: &mut TrackedRenderPass<'a>, _: u32, target: LevelTarget, ranges: &[Range<u32>]) {
+        let Some(range) = ranges.first().filter(|range| !range.is_empty()) else { return };
+        pass.set_bind_group(2, &self.bind_group, &[]);
+        let vertices = match target {
+            LevelTarget::View(_) => CROSS_VERTICES,
+            LevelTarget::ShadowMap => CROSS_CASTER_VERTICES,
+        };
+        if let (LevelTarget::View(_), Some(textures)) = (target, &self.light_textures) {
+            pass.set_bind_group(3, textures, &[]);
+        }
+        pass.draw(range.start * vertices..range.end * vertices, 0..1);
+    }
+
+    fn relight(&mut self, relight: &Relight, upload: &mut ForestUpload) {
+        let changed = |(old, new): &(&BakedPlant, &BakedPlant)| !Arc::ptr_eq(&old.cross, &new.cross);
+        let pairs = || relight.old.iter().zip(relight.new);
+        for (index, (_, new)) in pairs().enumerate().filter(|(_, pair)| changed(pair)) {
+            for (plane, chain) in new.cross.textures.properties.iter().enumerate() {
+                gpu::write_layer(&upload.gpu.queue, &self.properties, (index * PLANES + plane) as u32, chain);
+            }
+        }
+        let has_light = |plant: &BakedPlant| !plant.cross.textures.light.is_empty();
+        if pairs().filter(changed).any(|(old, new)| has_light(old) || has_light(new)) {
+            // Plants whose lighting textures come or go move the layers of the others.
+            self.light = CrossLight::of(relight.new);
+            self.light_textures = upload_light(relight.new, upload.gpu);
+        }
+    }
+}
+
+/// The textures of all crosses: that of their properties, and both kinds in a bind group.
+fn upload_textures(plants: &[BakedPlant], gpu: &Gpu) -> (Texture, BindGroup) {
+    let colors: Vec<&MipChain> = plants.iter().flat_map(|plant| &plant.cross.textures.color).collect();
+    let properties: Vec<&MipChain> = plants.iter().flat_map(|plant| &plant.cross.textures.properties).collect();
+    let upload = |label: &str, format: TextureFormat, layers: &[&MipChain]| {
+        gpu::texture_array(&gpu.device, &gpu.queue, label, format, layers, gpu::SMALLEST_TESTED_MIP)
+    };
+    let (_, colors) = upload("canopy_cross_color", TextureFormat::Rgba8UnormSrgb, &colors);
+    let (texture, properties) = upload("canopy_cross_properties", TextureFormat::Rgba8Unorm, &properties);
+    let sampler = gpu.device.create_sampler(&SamplerDescriptor {
+        label: Some("canopy_cross"),
+        address_mode_u: AddressMode::ClampToEdge,
+        address_mode_v: AddressMode::ClampToEdge,
+        mag_filter: FilterMode::Linear,
+        min_filter: FilterMode::Linear,
+        mipmap_filter: MipmapFilterMode::Linear,
+        ..Default::default()
+    });
+    let bind_group = gpu.bind_group(
+        "canopy_cross",
+        &cross_layout(),
+        &BindGroupEntries::sequential((&colors, &properties, &sampler)),
+    );
+    (texture, bind_group)
+}
+
+/// The lighting textures, of those plants that have them.
+fn upload_light(plants: &[BakedPlant], gpu: &Gpu) -> Option<BindGroup> {
+    let layers: Vec<&MipChain> = plants.iter().flat_map(|plant| &plant.cross.textures.light).collect();
+    if layers.is_empty() {
+        return None;
+    }
+    let (label, format) = ("canopy_cross_light", TextureFormat::Rgba8Snorm);
+    let (_, view) = gpu::texture_array(&gpu.device, &gpu.queue, label, format, &layers, gpu::SMALLEST_TESTED_MIP);
+    Some(gpu.bind_group(label, &light_layout(), &BindGroupEntries::single(&view)))
+}
+
+/// Whether crosses have the same planes, colours and outlines. A bake under another light gives equal ones in other memory.
+fn same_outline(old: &Cross, new: &Cross) -> bool {
+    let sizes = |cross: &Cross| -> Vec<(u32, u32, usize)> {
+        let chains = cross.textures.properties.iter();
+        chains.map(|chain| (chain.width, chain.height, chain.levels.len())).collect()
+    };
+    old.planes == new.planes && sizes(old) == sizes(new) && old.textures.color == new.textures.color
+}

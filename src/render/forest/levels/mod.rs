@@ -1,0 +1,47 @@
+//! The representations that Canopy draws, one file each.
+
+mod cross;
+mod model;
+
+use std::sync::Arc;
+
+use super::representation::LevelRenderer;
+use crate::render::shaders::CanopyShaders;
+
+/// All of them.
+pub fn built_in(shaders: &CanopyShaders) -> [Arc<dyn LevelRenderer>; 2] {
+    [Arc::new(model::ModelRenderer::new(shaders)), Arc::new(cross::CrossRenderer::new(shaders))]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        bake::{
+            BakeSettings, BakedPlant, bake_plant,
+            lighting::{LightingSettings, implicit::ImplicitSettings},
+        },
+        plant::grow::{GrowParameters, grow},
+    };
+
+    #[test]
+    fn a_bake_under_another_light_has_the_same_shape_and_another_proxy_or_outline_has_not()
+    -> Result<(), Box<dyn std::error::Error>> {
+        let same_shape = |old: &BakedPlant, new: &BakedPlant| {
+            built_in(&CanopyShaders::default()).iter().all(|renderer| renderer.same_shape(old, new))
+        };
+        let plant = Arc::new(grow(&GrowParameters::broadleaf(), 1, 5000)?);
+        let baked = |lighting| bake_plant(plant.clone(), &BakeSettings { lighting, ..BakeSettings::default() }, None).0;
+        let local = baked(LightingSettings::Local);
+        let fresh = baked(LightingSettings::Expressive(ImplicitSettings::default()));
+        let (lighting, cross) = (fresh.lighting.clone(), fresh.cross.clone());
+        let lit = BakedPlant { lighting, cross, ..local.clone() };
+        assert!(local.cross != lit.cross && same_shape(&local, &lit));
+        // A fresh proxy casts another shadow, other colours have another outline.
+        assert!(!same_shape(&local, &fresh));
+        let mut cross = (*lit.cross).clone();
+        cross.textures.color[0].levels[0][3] ^= 0x80;
+        assert!(!same_shape(&local, &BakedPlant { cross: Arc::new(cross), ..lit }));
+        Ok(())
+    }
+}

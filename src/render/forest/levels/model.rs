@@ -1,0 +1,391 @@
+//! The full model: a plant's parts, instanced, one call a variant and part. Casts as the shadow proxy.
+
+use std::{ops::Range, sync::Arc};
+
+use bevy::{
+    asset::Handle,
+    render::{
+        render_phase::TrackedRenderPass,
+        render_resource::{
+            AddressMode, BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer,
+            BufferUsages, Face, FilterMode, FragmentState, IndexFormat, MipmapFilterMode, RenderPipelineDescriptor,
+            Sampler, SamplerBindingType, SamplerDescriptor, ShaderStages, TextureSampleType, VertexState,
+            binding_types::{sampler, texture_2d, uniform_buffer_sized},
+        },
+        renderer::RenderDevice,
+    },
+    shader::{Shader, ShaderDefVal},
+};
+use glam::Vec3;
+
+use crate::{
+    bake::{
+        BakedPlant,
+        lighting::BakedLighting,
+        lighting::transfer::{Channels, TransferSettings},
+    },
+    cull::Grouping,
+    lod::Representation,
+    plant::{PartKind, PlantMesh},
+    render::{
+        components::{Forest, SunLight},
+        forest::{
+            representation::{ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight},
+            textures::TextureCache,
+            transfer::transfer_layout,
+            uniforms::{PartUniform, part_uniform, scattered_tint},
+            vertex::PlantVertex,
+        },
+        gpu::{self, Gpu},
+        shaders::{CanopyShaders, ShaderFile},
+    },
+};
+
+/// Metres a texel of the coarsest shadow map that can show a shadow proxy.
+const COARSEST_SHADOW_TEXEL: f64 = 0.2;
+
+/// Draws full models.
+pub struct ModelRenderer {
+    shader: Handle<Shader>,
+    caster: Handle<Shader>,
+}
+
+impl ModelRenderer {
+    /// With Canopy's own shaders.
+    pub fn new(shaders: &CanopyShaders) -> Self {
+        Self { shader: shaders.get(ShaderFile::ForestModel), caster: shaders.get(ShaderFile::SunShadowModel) }
+    }
+}
+
+/// What light reaches a part's full model, and how.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PartLight {
+    /// Sky by normal and k_a, sun by the leaf shader.
+    Plain,
+    /// Sky by transfer.
+    Transfer {
+        /// Whether light takes on colour on its way through the crown.
+        color: bool,
+        /// What the sun comes by.
+        sun: SunLight,
+    },
+}
+
+impl PartLight {
+    /// All of them.
+    pub const ALL: [Self; 5] = [
+        Self::Plain,
+        Self::Transfer { color: false, sun: SunLight::LeafShader },
+        Self::Transfer { color: false, sun: SunLight::Harmonics },
+        Self::Transfer { color: true, sun: SunLight::LeafShader },
+        Self::Transfer { color: true, sun: SunLight::Harmonics },
+    ];
+
+    /// The light of a part, with the settings of its transfer if it has one.
+    pub fn new(transfer: Option<&TransferSettings>, sun: SunLight) -> Self {
+        transfer.map_or(Self::Plain, |settings| Self::Transfer { color: settings.channels == Channels::Rgb, sun })
+    }
+}
+
+/// Which pipeline draws a part, as the bits that [`LevelRenderer::pipeline`] takes. Wood has the lower numbers, as it is
+/// drawn first: what it hides of the leaves is not shaded.
+fn features(kind: PartKind, light: PartLight) -> u32 {
+    let kind = match kind {
+        PartKind::Wood => 0,
+        PartKind::Foliage => PartLight::ALL.len(),
+    };
+    let light = PartLight::ALL.iter().position(|known| *known == light).unwrap_or(0);
+    (kind + light) as u32
+}
+
+/// The inverse of [`features`].
+fn part_of(features: u32) -> (PartKind, PartLight) {
+    let (features, lights) = (features as usize, PartLight::ALL.len());
+    let kind = if features < lights { PartKind::Wood } else { PartKind::Foliage };
+    (kind, PartLight::ALL[features % lights])
+}
+
+/// Group 2: colour, normals, sampler, material.
+fn part_layout() -> BindGroupLayoutDescriptor {
+    let float = TextureSampleType::Float { filterable: true };
+    BindGroupLayoutDescriptor::new(
+        "canopy_plant_part",
+        &BindGroupLayoutEntries::sequential(
+            ShaderStages::FRAGMENT,
+            (
+                texture_2d(float),
+                texture_2d(float),
+                sampler(SamplerBindingType::Filtering),
+                uniform_buffer_sized(false, std::num::NonZeroU64::new(size_of::<PartUniform>() as u64)),
+            ),
+        ),
+    )
+}
+
+/// Filters between texels and levels; textures of plants repeat.
+fn part_sampler(device: &RenderDevice) -> Sampler {
+    device.create_sampler(&SamplerDescriptor {
+        label: Some("canopy_plant"),
+        address_mode_u: AddressMode::Repeat,
+        address_mode_v: AddressMode::Repeat,
+        mag_filter: FilterMode::Linear,
+        min_filter: FilterMode::Linear,
+        mipmap_filter: MipmapFilterMode::Linear,
+        ..Default::default()
+    })
+}
+
+impl LevelRenderer for ModelRenderer {
+    fn representation(&self) -> Representation {
+        Representation::MODEL
+    }
+
+    fn label(&self) -> &'static str {
+        "full models"
+    }
+
+    fn tint(&self) -> Vec3 {
+        Vec3::new(0.15, 0.9, 0.2)
+    }
+
+    fn grouping(&self) -> Grouping {
+        Grouping::ByVariant
+    }
+
+    fn coarsest_shadow_texel(&self) -> Option<f64> {
+        Some(COARSEST_SHADOW_TEXEL)
+    }
+
+    fn upload(&self, forest: &Forest, upload: &mut ForestUpload) -> Box<dyn GpuLevel> {
+        let mut textures = TextureCache::default();
+        let sampler = part_sampler(&upload.gpu.device);
+        let parts = |(index, plant): (usize, &BakedPlant)| {
+            let sun = forest.suns.get(index).copied().unwrap_or_default();
+            upload_parts(plant, sun, &sampler, &mut textures, upload)
+        };
+        Box::new(GpuModels { parts: forest.plants.iter().enumerate().map(parts).collect() })
+    }
+
+    fn same_shape(&self, old: &BakedPlant, new: &BakedPlant) -> bool {
+        Arc::ptr_eq(&old.plant, &new.plant) && Arc::ptr_eq(&old.shadow_proxy, &new.shadow_proxy)
+    }
+
+    fn pipeline(&self, features: u32, target: LevelTarget) -> RenderPipelineDescriptor {
+        let (kind, light) = part_of(features);
+        let foliage = kind == PartKind::Foliage;
+        let mut defs: Vec<ShaderDefVal> = Vec::new();
+        if foliage {
+            defs.push("FOLIAGE".into());
+        }
+        let LevelTarget::View(attachment) = target else {
+            return RenderPipelineDescriptor {
+                label: Some(format!("canopy_caster_{kind:?}").into()),
+                layout: target.layouts([part_layout()]),
+                vertex: VertexState {
+                    shader: self.caster.clone(),
+                    shader_defs: defs.clone(),
+                    entry_point: Some("vertex".into()),
+                    buffers: vec![PlantVertex::layout()],
+                },
+                depth_stencil: Some(target.depth()),
+                fragment: foliage.then(|| FragmentState {
+                    shader: self.caster.clone(),
+                    shader_defs: defs,
+                    entry_point: Some("fragment".into()),
+                    targets: Vec::new(),
+                }),
+                ..Default::default()
+            };
+        };
+        let mut groups = vec![part_layout()];
+        if let PartLight::Transfer { color, sun } = light {
+            defs.push("TRANSFER".into());
+            groups.push(transfer_layout());
+            if color {
+                defs.push("TRANSFER_COLOR".into());
+            }
+            if sun == SunLight::Harmonics {
+                defs.push("SUN_HARMONICS".into());
+            }
+        }
+        let to_coverage = attachment.samples > 1 && foliage;
+        if to_coverage {
+            defs.push("ALPHA_TO_COVERAGE".into());
+        }
+        let mut pipeline = attachment.pipeline(&self.shader, defs, target.depth());
+        pipeline.label = Some(if foliage { "canopy_foliage" } else { "canopy_wood" }.into());
+        pipeline.layout = target.layouts(groups);
+        pipeline.vertex.buffers = vec![PlantVertex::layout()];
+        pipeline.primitive.cull_mode = (!foliage).then_some(Face::Back);
+        pipeline.multisample.alpha_to_coverage_enabled = to_coverage;
+        pipeline
+    }
+}
+
+/// Vertices and indices of one part, full or proxy.
+struct GpuMesh {
+    /// [`PlantVertex`]es.
+    vertices: Buffer,
+    /// 32-bit indices.
+    indices: Buffer,
+    /// Number of indices; 0 draws nothing.
+    index_count: u32,
+}
+
+/// One part of a plant.
+struct GpuPart {
+    kind: PartKind,
+    /// [`PartUniform`] of group 2.
+    uniform: Buffer,
+    /// The full model.
+    model: GpuMesh,
+    /// What casts the near shadow.
+    proxy: GpuMesh,
+    /// Group 2.
+    bind_group: BindGroup,
+    /// Which pipeline draws it.
+    light: PartLight,
+    /// Group 3 of plants that are lit by radiance transfer.
+    transfer: Option<BindGroup>,
+}
+
+/// The full models of a forest's plants.
+struct GpuModels {
+    /// Parts by variant.
+    parts: Vec<Vec<GpuPart>>,
+}
+
+impl GpuLevel for GpuModels {
+    fn features(&self, target: LevelTarget) -> Vec<u32> {
+        let features_of = |part: &GpuPart| match target {
+            LevelTarget::View(_) => features(part.kind, part.light),
+            LevelTarget::ShadowMap => features(part.kind, PartLight::Plain),
+        };
+        let mut all: Vec<u32> = self.parts.iter().flatten().map(features_of).collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
+    fn triangles(&self, variant: usize) -> usize {
+        self.parts.get(variant).into_iter().flatten().map(|part| part.model.index_count as usize / 3).sum()
+    }
+
+    fn draw<'a>(&'a self, pass: &mut TrackedRenderPass<'a>, features: u32, target: LevelTarget, ranges: &[Range<u32>]) {
+        let (kind, light) = part_of(features);
+        for (range, parts) in ranges.iter().zip(&self.parts).filter(|(range, _)| !range.is_empty()) {
+            for part in parts.iter().filter(|part| part.kind == kind) {
+                let mesh = match target {
+                    LevelTarget::View(_) if part.light != light => continue,
+                    LevelTarget::View(_) => &part.model,
+                    LevelTarget::ShadowMap => &part.proxy,
+                };
+                if mesh.index_count == 0 {
+                    continue;
+                }
+                if let (LevelTarget::View(_), Some(group)) = (target, &part.transfer) {
+                    pass.set_bind_group(3, group, &[]);
+                }
+                pass.set_bind_group(2, &part.bind_group, &[]);
+                pass.set_vertex_buffer(0, mesh.vertices.slice(..));
+                pass.set_index_buffer(mesh.indices.slice(..), IndexFormat::Uint32);
+                pass.draw_indexed(0..mesh.index_count, 0, range.clone());
+            }
+        }
+    }
+
+    fn relight(&mut self, relight: &Relight, upload: &mut ForestUpload) {
+        for (index, (old, new)) in relight.old.iter().zip(relight.new).enumerate() {
+            if Arc::ptr_eq(&old.lighting, &new.lighting) {
+                continue;
+            }
+            let tint = scattered_tint(&new.plant.leaf_colors());
+            let sun = relight.suns.get(index).copied().unwrap_or_default();
+            let Some(parts) = self.parts.get_mut(index) else { continue };
+            for (number, (gpu_part, part)) in parts.iter_mut().zip(&new.plant.parts).enumerate() {
+                let vertices = vertices(&part.mesh, &new.lighting, number);
+                let uniform = part_uniform(&part.material, &new.lighting);
+                upload.gpu.queue.write_buffer(&gpu_part.model.vertices, 0, bytemuck::cast_slice(&vertices));
+                upload.gpu.queue.write_buffer(&gpu_part.uniform, 0, bytemuck::bytes_of(&uniform));
+                let traced = new.lighting.transfer(number);
+                gpu_part.light = PartLight::new(traced.map(|(settings, _)| settings), sun);
+                gpu_part.transfer = traced.map(|part| upload.transfer.bind_group(part, tint, sun, upload.gpu));
+            }
+        }
+    }
+}
+
+/// The parts of a plant that the sun lights by `sun`.
+fn upload_parts(
+    plant: &BakedPlant,
+    sun: SunLight,
+    sampler: &Sampler,
+    textures: &mut TextureCache,
+    upload: &mut ForestUpload,
+) -> Vec<GpuPart> {
+    let gpu = upload.gpu;
+    let tint = scattered_tint(&plant.plant.leaf_colors());
+    let mut parts = Vec::new();
+    for (index, part) in plant.plant.parts.iter().enumerate() {
+        let empty = PlantMesh::default();
+        let proxy = plant.shadow_proxy.get(index).unwrap_or(&empty);
+        let material = &part.material;
+        let coefficients = plant.lighting.transfer(index);
+        let usage = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
+        let uniform = part_uniform(material, &plant.lighting);
+        let uniform = gpu::buffer_with(&gpu.device, "canopy_plant_part", usage, &[uniform]);
+        let color = textures.color(material, part.kind, &gpu.device, &gpu.queue);
+        let normal = textures.normal(material, &gpu.device, &gpu.queue);
+        let bind_group = gpu.bind_group(
+            "canopy_plant_part",
+            &part_layout(),
+            &BindGroupEntries::sequential((&color, &normal, sampler, uniform.as_entire_binding())),
+        );
+        parts.push(GpuPart {
+            kind: part.kind,
+            uniform,
+            model: upload_mesh(&part.mesh, &vertices(&part.mesh, &plant.lighting, index), gpu),
+            proxy: upload_mesh(proxy, &vertices(proxy, &BakedLighting::Local, index), gpu),
+            bind_group,
+            light: PartLight::new(coefficients.map(|(settings, _)| settings), sun),
+            transfer: coefficients.map(|part| upload.transfer.bind_group(part, tint, sun, gpu)),
+        });
+    }
+    parts
+}
+
+/// The vertices of `mesh`, which is part `part` of a plant, with the normals and the k_a of its `lighting`; what is missing
+/// there is the mesh's own, or 1.
+fn vertices(mesh: &PlantMesh, lighting: &BakedLighting, part: usize) -> Vec<PlantVertex> {
+    let (normals, ambient) = (lighting.normals(part).unwrap_or(&mesh.normals), lighting.ambient(part));
+    let vertex = |(i, &position): (usize, &Vec3)| {
+        let normal = normals.get(i).copied().unwrap_or(Vec3::Y);
+        let uv = mesh.uvs.get(i).copied().unwrap_or_default();
+        PlantVertex::new(position, normal, ambient.get(i).copied().unwrap_or(1.0), uv)
+    };
+    mesh.positions.iter().enumerate().map(vertex).collect()
+}
+
+fn upload_mesh(mesh: &PlantMesh, vertices: &[PlantVertex], gpu: &Gpu) -> GpuMesh {
+    let indices: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
+    let vertex = BufferUsages::VERTEX | BufferUsages::COPY_DST;
+    GpuMesh {
+        vertices: gpu::buffer_with(&gpu.device, "canopy_plant_vertices", vertex, vertices),
+        indices: gpu::buffer_with(&gpu.device, "canopy_plant_indices", BufferUsages::INDEX, &indices),
+        index_count: indices.len() as u32,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_part_has_a_pipeline_of_its_own_and_wood_comes_first() {
+        let all = [PartKind::Wood, PartKind::Foliage].map(|kind| PartLight::ALL.map(|light| (kind, light)));
+        for (index, (kind, light)) in all.into_iter().flatten().enumerate() {
+            assert_eq!(features(kind, light), index as u32);
+            assert_eq!(part_of(index as u32), (kind, light));
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! What a level of detail must be able to do to be drawn: the renderer's side of a
+//! [`Representation`](crate::lod::Representation).
+//!
+//! ```text
+//!   Levels of a forest ── by name ──> LevelRenderer ── upload ──> GpuLevel, one a forest
+//!                                         │ pipeline                  │ draw (view, shadow maps), relight
+//!                                         v                           v
+//!                                    LevelPipelines ────────────> forest pass, sun shadow pass
+//! ```
+//!
+//! A new level is one file that bakes it (in `bake/levels`, if it needs a bake), one that implements both traits, one
+//! shader, and one line in [`levels::built_in`](super::levels). A program adds its own with [`RegisterRepresentation`];
+//! `examples/box_level.rs` is one of some eighty lines. What all levels share (lists of trees, thresholds, tints,
+//! statistics, reports) goes over the list and knows none of them.
+
+use std::{ops::Range, sync::Arc};
+
+use bevy::{
+    app::App,
+    ecs::resource::Resource,
+    log::warn,
+    render::{
+        render_phase::TrackedRenderPass,
+        render_resource::{BindGroupLayoutDescriptor, DepthStencilState, RenderPipelineDescriptor},
+    },
+};
+use glam::Vec3;
+
+use super::{instances::instance_layout, transfer::TransferLight};
+use crate::{
+    bake::BakedPlant,
+    cull::Grouping,
+    lod::Representation,
+    render::{
+        bindings::{SHADOW_FORMAT, caster_layout, frame_layout},
+        components::{Forest, SunLight},
+        gpu::{Gpu, opaque_depth, reversed_depth},
+        view::ViewFormat,
+    },
+};
+
+/// What a pipeline of a level draws into.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum LevelTarget {
+    /// Colour and depth of a view.
+    View(ViewFormat),
+    /// Depth of a shadow map.
+    ShadowMap,
+}
+
+impl LevelTarget {
+    /// Bind group layouts of a pipeline: group 0 (the view, or the cascade), group 1 (the trees), then the level's own.
+    pub fn layouts(self, own: impl IntoIterator<Item = BindGroupLayoutDescriptor>) -> Vec<BindGroupLayoutDescriptor> {
+        let first = match self {
+            Self::View(_) => frame_layout(),
+            Self::ShadowMap => caster_layout(),
+        };
+        [first, instance_layout()].into_iter().chain(own).collect()
+    }
+
+    /// Depth test and write.
+    pub fn depth(self) -> DepthStencilState {
+        match self {
+            Self::View(_) => opaque_depth(),
+            Self::ShadowMap => reversed_depth(SHADOW_FORMAT),
+        }
+    }
+}
+
+/// Draws one representation. One value serves all forests.
+pub trait LevelRenderer: Send + Sync + 'static {
+    /// Which representation it draws.
+    fn representation(&self) -> Representation;
+
+    /// What its trees are called in reports, in the plural: "crosses".
+    fn label(&self) -> &'static str;
+
+    /// Linear colour that its trees take on where levels are tinted.
+    fn tint(&self) -> Vec3;
+
+    /// How its draw calls want the trees.
+    fn grouping(&self) -> Grouping;
+
+    /// Metres a texel of the coarsest shadow map that can show it; it casts into no coarser one. `None`: it never casts.
+    /// The farthest level of a forest that casts at all does so into every map.
+    fn coarsest_shadow_texel(&self) -> Option<f64>;
+
+    /// Brings the plants of `forest` to the device.
+    fn upload(&self, forest: &Forest, upload: &mut ForestUpload) -> Box<dyn GpuLevel>;
+
+    /// Whether `new` has the same shape as `old`, so that [`GpuLevel::relight`] leads from one to the other.
+    fn same_shape(&self, old: &BakedPlant, new: &BakedPlant) -> bool;
+
+    /// The pipeline for `features`, bits that mean something to this renderer alone, into `target`. Both entry points of
+    /// its shader see group 0 and 1 as [`LevelTarget::layouts`] has them.
+    fn pipeline(&self, features: u32, target: LevelTarget) -> RenderPipelineDescriptor;
+}
+
+/// The plants of one forest in one representation on the device.
+pub trait GpuLevel: Send + Sync + 'static {
+    /// The pipelines that these plants need, in the order in which they draw.
+    fn features(&self, target: LevelTarget) -> Vec<u32>;
+
+    /// Triangles of a tree of `variant`.
+    fn triangles(&self, variant: usize) -> usize;
+
+    /// Draws the trees in `ranges` (one a variant or a single one, by the renderer's [`Grouping`]) that belong to the
+    /// pipeline of `features`, which is set, as are groups 0 and 1. `visible[range]` are the trees' indices.
+    fn draw<'a>(&'a self, pass: &mut TrackedRenderPass<'a>, features: u32, target: LevelTarget, ranges: &[Range<u32>]);
+
+    /// Writes the light of other bakes of the same shapes over what the device holds.
+    fn relight(&mut self, relight: &Relight, upload: &mut ForestUpload);
+}
+
+/// Other bakes of plants that are drawn already.
+#[derive(Clone, Copy, Debug)]
+pub struct Relight<'a> {
+    /// What the device holds.
+    pub old: &'a [BakedPlant],
+    /// What it shall hold, plant by plant of the same shape.
+    pub new: &'a [BakedPlant],
+    /// How the sun lights each plant; the default where the list ends.
+    pub suns: &'a [SunLight],
+}
+
+/// What an upload writes to.
+pub struct ForestUpload<'a, 'w> {
+    /// The device.
+    pub gpu: &'a Gpu<'w>,
+    /// The light for radiance transfer, which notes what plants ask of it.
+    pub transfer: &'a mut TransferLight,
+}
+
+/// All representations that can be drawn: a resource of the main world until the app is finished, then of the render world.
+#[derive(Resource, Clone, Default)]
+pub struct Representations(Vec<Arc<dyn LevelRenderer>>);
+
+impl Representations {
+    /// Adds a renderer; `false` where one of that name is there already, which stays.
+    pub fn add(&mut self, renderer: Arc<dyn LevelRenderer>) -> bool {
+        let new = self.get(renderer.representation()).is_none();
+        if new {
+            self.0.push(renderer);
+        }
+        new
+    }
+
+    /// The renderer of a representation.
+    pub fn get(&self, representation: Representation) -> Option<&Arc<dyn LevelRenderer>> {
+        self.0.iter().find(|renderer| renderer.representation() == representation)
+    }
+
+    /// All renderers in the order in which they were added.
+    pub fn iter(&self) -> impl Iterator<Item = &Arc<dyn LevelRenderer>> {
+        self.0.iter()
+    }
+}
+
+/// Adds representations of a program's own.
+pub trait RegisterRepresentation {
+    /// Makes `renderer` known, before the app runs; the order to Canopy's plugins does not matter.
+    fn register_representation(&mut self, renderer: impl LevelRenderer) -> &mut Self;
+}
+
+impl RegisterRepresentation for App {
+    fn register_representation(&mut self, renderer: impl LevelRenderer) -> &mut Self {
+        let name = renderer.representation().name();
+        let mut known = self.world_mut().get_resource_or_init::<Representations>();
+        if !known.add(Arc::new(renderer)) {
+            warn!("a representation called `{name}` is registered already: the second one is not used");
+        }
+        self
+    }
+}

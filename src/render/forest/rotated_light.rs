@@ -1,0 +1,57 @@
+//! Rotates the light for radiance transfer into every yaw where it has changed.
+
+use std::sync::Arc;
+
+use bevy::{
+    ecs::system::{Res, ResMut},
+    render::renderer::RenderQueue,
+};
+
+use super::{
+    gpu_forest::GpuForests,
+    transfer::{SET_BYTES, TransferLight, Wanted, YAWS, beam, turned},
+};
+use crate::{
+    bake::lighting::BakedLighting,
+    light::LightState,
+    render::{extract::ExtractedScene, report::FrameReport, view::PreparedFrame},
+};
+
+/// Turns the light where it, the exposure or what is asked of it has changed.
+pub fn prepare_transfer_light(
+    scene: Res<ExtractedScene>,
+    frame: Res<PreparedFrame>,
+    forests: Res<GpuForests>,
+    queue: Res<RenderQueue>,
+    report: Res<FrameReport>,
+    mut transfer: ResMut<TransferLight>,
+) {
+    let transfer = &mut *transfer;
+    // Plants may have come into another light since.
+    let lit = || {
+        let mut plants = forests.iter().flat_map(|(_, forest)| forest.plants());
+        plants.any(|plant| matches!(*plant.lighting, BakedLighting::Transfer(_)))
+    };
+    let Some(buffer) = transfer.buffer.as_ref().filter(|_| lit()) else {
+        report.skipped("transfer light", "no plant is lit by radiance transfer");
+        return;
+    };
+    let (Some(view), Some(daylight)) = (&frame.view, &scene.daylight) else { return };
+    let same = |(light, exposure, wanted): &(Arc<LightState>, f32, Wanted)| {
+        Arc::ptr_eq(light, &daylight.0) && *exposure == view.exposure && *wanted == transfer.wanted
+    };
+    if transfer.known.as_ref().is_some_and(same) {
+        report.skipped("transfer light", "the light rests");
+        return;
+    }
+    let Wanted { bands, sun } = transfer.wanted;
+    let sky = daylight.0.surroundings().project(bands);
+    queue.write_buffer(buffer, 0, bytemuck::cast_slice(&turned(&sky, view.exposure)));
+    if sun {
+        let light = beam(daylight.0.key_direction, daylight.0.key_illuminance, bands);
+        queue.write_buffer(buffer, SET_BYTES, bytemuck::cast_slice(&turned(&light, view.exposure)));
+    }
+    transfer.known = Some((daylight.0.clone(), view.exposure, transfer.wanted));
+    let of = if sun { "sky and sun, " } else { "" };
+    report.ran("transfer light", format!("{of}{bands} bands turned into {YAWS} yaws"));
+}

@@ -1,0 +1,56 @@
+//! The order of Canopy's work in the render world, as public system sets. A program orders its own systems against
+//! these; the passes name no system of each other.
+
+use bevy::{
+    app::SubApp,
+    core_pipeline::{
+        Core3d, Core3dSystems,
+        core_3d::{main_opaque_pass_3d, main_transparent_pass_3d},
+    },
+    ecs::schedule::{IntoScheduleConfigs, SystemSet},
+    render::{Render, RenderSystems},
+};
+
+/// What happens before a frame is drawn, in this order, within [`RenderSystems::PrepareResources`].
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum CanopyRenderSystems {
+    /// The view is found: its camera in f64, its frustum, its exposure.
+    View,
+    /// Plants, trees and textures that are new or have changed go to the device.
+    Upload,
+    /// Trees, casters and terrain tiles are chosen.
+    Cull,
+    /// Tables of light follow the sun and the exposure.
+    Light,
+    /// Pipelines are requested.
+    Pipelines,
+}
+
+/// What a view's frame draws, in this order, in the schedule [`Core3d`].
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum CanopyPasses {
+    /// Depth maps from the sun or the moon, before [`Core3dSystems::MainPass`].
+    SunShadow,
+    /// Trees, after Bevy's opaque meshes.
+    Forest,
+    /// The ground.
+    Terrain,
+    /// What is left of the picture, before Bevy's transparent meshes.
+    Sky,
+}
+
+/// Orders the sets in the schedules of `render_app`.
+pub(super) fn configure(render_app: &mut SubApp) {
+    use CanopyRenderSystems::{Cull, Light, Pipelines, Upload, View};
+    render_app
+        .configure_sets(Render, (View, Upload, Cull, Light, Pipelines).chain().in_set(RenderSystems::PrepareResources))
+        .configure_sets(Core3d, CanopyPasses::SunShadow.after(Core3dSystems::Prepass).before(Core3dSystems::MainPass))
+        .configure_sets(
+            Core3d,
+            (CanopyPasses::Forest, CanopyPasses::Terrain, CanopyPasses::Sky)
+                .chain()
+                .after(main_opaque_pass_3d)
+                .before(main_transparent_pass_3d)
+                .in_set(Core3dSystems::MainPass),
+        );
+}

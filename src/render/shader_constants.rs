@@ -1,0 +1,125 @@
+//! Constants that Rust and the shaders share: the WGSL module `canopy::constants`, written from the Rust constants.
+//!
+//! A number stands once, in the room that it belongs to. Shaders import it by its name here; the test that validates every
+//! shader composes them with the same text.
+
+use std::fmt::Write as _;
+
+use super::{
+    bindings::uniforms,
+    forest::{transfer, uniforms as forest},
+};
+use crate::{
+    bake::{levels::cross, lighting::implicit::packing},
+    light::{atmosphere::SkyView, night, stand},
+    lod,
+    scatter::packed,
+    terrain::tiles,
+};
+
+/// A scalar of WGSL.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Value {
+    /// `f32`; finite.
+    Float(f32),
+    /// `i32`.
+    Int(i32),
+    /// `u32`.
+    Uint(u32),
+}
+
+impl From<f32> for Value {
+    fn from(value: f32) -> Self {
+        Self::Float(value)
+    }
+}
+
+impl From<u32> for Value {
+    fn from(value: u32) -> Self {
+        Self::Uint(value)
+    }
+}
+
+/// All shared constants: name in WGSL, what it is, value.
+pub fn constants() -> Vec<(&'static str, &'static str, Value)> {
+    let uint = |value: usize| Value::Uint(value as u32);
+    let float = |value: usize| Value::Float(value as f32);
+    vec![
+        ("MAX_CASCADES", "Most cascades a view can have.", Value::Int(uniforms::MAX_CASCADES as i32)),
+        ("SKY_COLUMNS", "Columns of the sky's table.", float(SkyView::WIDTH)),
+        ("SKY_ROWS", "Its rows.", float(SkyView::HEIGHT)),
+        ("SKY_HORIZON_ROW", "Its row of the horizon.", float(SkyView::HORIZON_ROW)),
+        ("LUX_OF_MAGNITUDE_0", "Illuminance of a star of magnitude 0, lux.", night::LUX_OF_MAGNITUDE_0.into()),
+        ("STAND_COVERS", "Canopy covers of the table of light in a stand.", float(stand::COVERS)),
+        ("STAND_DEPTHS", "Its depths in the crowns; one more row is the ground's.", float(stand::DEPTHS)),
+        ("TILE_SIDE", "Vertices along a side of a terrain tile.", uint(tiles::TILE_QUADS + 1)),
+        ("PLACE_STEPS", "Steps of a tree's position along a cell's side.", packed::PLACE_STEPS.into()),
+        ("YAW_BITS", "Bits of a tree's yaw, the lowest of `look`.", packed::YAW_BITS.into()),
+        ("YAWS", "Yaws that a tree can have.", uint(transfer::YAWS)),
+        ("SCALE_SHIFT", "First bit of its scale.", packed::SCALE_SHIFT.into()),
+        ("SCALE_BITS", "Bits of its scale.", packed::SCALE_BITS.into()),
+        ("SCALE_STEPS", "Steps of its scale, even in the logarithm.", packed::SCALE_STEPS.into()),
+        ("SCALE_OCTAVES", "Binary logarithm of the largest scale over the smallest.", packed::SCALE_OCTAVES.into()),
+        ("LEAST_SCALE_LOG2", "Binary logarithm of the smallest scale.", packed::LEAST_SCALE_LOG2.into()),
+        ("VARIANT_SHIFT", "First bit of a tree's variant.", packed::VARIANT_SHIFT.into()),
+        ("VARIANT_BITS", "Bits of its variant.", packed::VARIANT_BITS.into()),
+        ("TINT_SHIFT", "First bit of its tint.", packed::TINT_SHIFT.into()),
+        ("TINT_BITS", "Bits of its tint, two's complement.", packed::TINT_BITS.into()),
+        ("TINT_STEPS", "Steps of its tint on either side of 0.", packed::TINT_STEPS.into()),
+        ("WHOLE", "Alpha threshold at which a representation is whole.", lod::WHOLE.into()),
+        ("FADE_SPAN", "What fading adds to `WHOLE` until nothing is left.", lod::FADE_SPAN.into()),
+        ("GONE", "Alpha threshold from which on nothing is left.", lod::GONE.into()),
+        ("PLANES", "Planes of a cross.", uint(forest::PLANES)),
+        ("CROSS_VERTICES", "Vertices of a tree's cross.", forest::CROSS_VERTICES.into()),
+        ("CASTER_VERTICES", "Vertices of a tree's cross as a caster.", forest::CROSS_CASTER_VERTICES.into()),
+        ("SPREAD_LEVELS", "Mips for which the isotropic fraction is known.", uint(cross::SPREAD_LEVELS)),
+        ("SPREAD_VECTORS", "Vectors of four of them.", uint(cross::SPREAD_LEVELS / 4)),
+        ("LIGHT_SCALE", "What 1 stands for in lighting textures.", cross::LIGHT_SCALE.into()),
+        ("NORMAL_STEPS", "Steps of a packed normal on either side of 0.", packing::STEPS.into()),
+        ("NORMAL_LEAST_LENGTH", "Its length where the ambient visibility is 0.", packing::LEAST_LENGTH.into()),
+        ("TRANSFER_WORDS", "Words of four coefficients after the first, of all bands.", uint(forest::WORDS)),
+        (
+            "LIGHT_STRIDE",
+            "Vectors from one yaw's light to the next: the first coefficient, then red, green and blue of each word.",
+            uint(transfer::STRIDE),
+        ),
+    ]
+}
+
+/// The WGSL text of the module.
+pub fn source() -> String {
+    let mut text = "// Written by src/render/shader_constants.rs.\n#define_import_path canopy::constants\n".to_owned();
+    for (name, comment, value) in constants() {
+        // The shortest decimal number that reads as the same float.
+        let _ = match value {
+            Value::Float(value) => writeln!(text, "\n// {comment}\nconst {name}: f32 = {value:?}f;"),
+            Value::Int(value) => writeln!(text, "\n// {comment}\nconst {name}: i32 = {value}i;"),
+            Value::Uint(value) => writeln!(text, "\n// {comment}\nconst {name}: u32 = {value}u;"),
+        };
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use naga::{Expression, Literal};
+
+    use super::*;
+
+    #[test]
+    fn shaders_read_the_values_to_the_bit() {
+        let module = naga::front::wgsl::parse_str(&source().replace("#define_import_path", "//")).expect("valid WGSL");
+        assert_eq!(module.constants.len(), constants().len(), "a name stands twice");
+        for (name, _, value) in constants() {
+            let found = module.constants.iter().find(|(_, constant)| constant.name.as_deref() == Some(name));
+            let (_, constant) = found.unwrap_or_else(|| panic!("{name} is missing"));
+            let same = match (&module.global_expressions[constant.init], value) {
+                (Expression::Literal(Literal::F32(read)), Value::Float(value)) => read.to_bits() == value.to_bits(),
+                (Expression::Literal(Literal::I32(read)), Value::Int(value)) => *read == value,
+                (Expression::Literal(Literal::U32(read)), Value::Uint(value)) => *read == value,
+                _ => false,
+            };
+            assert!(same, "{name}");
+        }
+    }
+}

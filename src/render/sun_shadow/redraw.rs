@@ -1,0 +1,191 @@
+//! Where the cascades of a frame lie, which of them must be drawn again, and with which casters.
+
+use std::ops::Range;
+
+use bevy::{
+    ecs::system::{Res, ResMut},
+    render::render_resource::{BindGroupEntries, BindingResource, BufferBinding},
+};
+use glam::{DVec2, DVec3};
+
+use super::{
+    maps::{CascadeForest, CascadeKey, CascadeWork, CasterBuffers, DrawnCascade, ShadowMaps},
+    meshes::MeshCasters,
+};
+use crate::{
+    cull::{
+        SeenShadows,
+        cascades::{CascadeBox, cascade_radii},
+        cull_cascade,
+    },
+    render::{
+        bindings::{
+            SharedPlacement, SharedTextures, caster_layout,
+            uniforms::{CascadeViewUniform, MAX_CASCADES},
+        },
+        extract::ExtractedScene,
+        forest::{GpuForest, GpuForests, forest_view, instance_bind_group},
+        gpu::{self, Gpu, GrowingBuffer, UNIFORM_STRIDE},
+        report::FrameReport,
+        view::PreparedFrame,
+    },
+    scatter::PlantSize,
+};
+
+/// Places the cascades and gathers the casters of those that changed.
+pub fn prepare_shadows(
+    scene: Res<ExtractedScene>,
+    frame: Res<PreparedFrame>,
+    forests: Res<GpuForests>,
+    meshes: Res<MeshCasters>,
+    gpu: Gpu,
+    report: Res<FrameReport>,
+    mut maps: ResMut<ShadowMaps>,
+) {
+    let maps = &mut *maps;
+    maps.work.clear();
+    maps.cascades.clear();
+    maps.casters.retain(|entity, _| forests.get(*entity).is_some());
+    let (Some(view), Some(daylight)) = (&frame.view, &scene.daylight) else { return };
+    let settings = scene.shadow;
+    let light = &daylight.0;
+    let direction = light.key_direction.as_dvec3();
+    let why_none = if settings.cascades == 0 {
+        Some("no cascades are asked for")
+    } else if light.key_illuminance.max_element() <= 0.0 || direction.y <= 0.0 {
+        Some("no light that casts a shadow is above the horizon")
+    } else if forests.order.is_empty() && meshes.is_empty() {
+        Some("nothing casts a shadow")
+    } else {
+        None
+    };
+    if let Some(why) = why_none {
+        report.skipped("sun_shadow", why);
+        return;
+    }
+    maps.resize(&gpu.device, &settings);
+    let largest = |measure: fn(&PlantSize) -> f32| {
+        forests.iter().flat_map(move |(_, f)| f.sizes.iter().map(move |size| measure(size) * f.max_scale))
+    };
+    let tallest = largest(|size| size.height).fold(10.0f32, f32::max);
+    let widest = largest(|size| size.radius).fold(0.0f32, f32::max);
+    let radii = cascade_radii(maps.layers.len(), settings.distance.max(1.0), settings.finest_radius.max(1.0));
+    maps.cascades = radii
+        .iter()
+        .map(|&radius| CascadeBox::new(view.camera, radius, maps.map_size, direction, f64::from(tallest)))
+        .collect();
+
+    for (index, &place) in maps.cascades.iter().enumerate() {
+        // Near the camera, a finer map has the trees' own shadows already.
+        let served = index.checked_sub(1).map_or(0.0, |finer| 0.7 * maps.cascades[finer].radius);
+        let content = forests.iter().map(|(entity, forest)| {
+            let casting = casting_distances(forest, served..settings.proxy_distance, place.texel);
+            (entity, forest.generation, forest.forest.origin, casting)
+        });
+        let key = CascadeKey { place, forests: content.collect(), meshes: meshes.state() };
+        let name = format!("sun_shadow cascade {index}");
+        let this_view = (view.camera, view.clip_from_relative);
+        let drawn = maps.drawn[index].as_ref();
+        let fits = |drawn: &DrawnCascade| drawn.key == key && drawn.seen_by.is_none_or(|seen_by| seen_by == this_view);
+        if drawn.is_some_and(fits) {
+            report.skipped(name, "light, box and casters rest");
+            continue;
+        }
+        // Under a new light the map is drawn for this view only: while the light moves, it will not live to see another.
+        // If it does, it is completed once and kept. What this view shows is the same either way, as the margin holds what
+        // the shaders add to a place before they look it up: a few texels, half a crown for crosses.
+        let same_light = drawn.is_some_and(|drawn| drawn.key.place.direction == key.place.direction);
+        let margin = 6.0 * place.texel + 0.6 * f64::from(widest);
+        let lowest = lowest_receiver(&scene, view.camera, place.radius) - margin;
+        let seen = (!same_light).then_some(SeenShadows { camera: view.camera, frustum: &view.frustum, lowest, margin });
+        let casting: Vec<_> = key.forests.iter().map(|(.., casting)| casting.clone()).collect();
+        let content = DrawnCascade { key, seen_by: seen.as_ref().map(|_| this_view) };
+        let uniform = CascadeViewUniform {
+            clip_from_anchor: place.clip_from_anchor().to_cols_array_2d(),
+            direction: place.direction.as_vec3().to_array(),
+            padding: 0.0,
+        };
+        gpu.queue.write_buffer(&maps.cascade_uniforms, index as u64 * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));
+        let mut work = CascadeWork { index, content, forests: Vec::new() };
+        for ((entity, forest), casting) in forests.iter().zip(&casting) {
+            let lists = cull_cascade(
+                &forest.forest.stand,
+                &forest.sizes,
+                forest.forest.origin,
+                &place,
+                casting,
+                &forest.groupings,
+                seen.as_ref(),
+            );
+            let buffers = maps.casters.entry(entity).or_insert_with(|| CasterBuffers {
+                uniform: gpu::uniform_slots(&gpu.device, "canopy_caster_views", MAX_CASCADES as u64),
+                visible: (0..MAX_CASCADES).map(|_| GrowingBuffer::new(&gpu.device, "canopy_casters")).collect(),
+            });
+            let uniform = forest_view(forest, place.center, None);
+            gpu.queue.write_buffer(&buffers.uniform, index as u64 * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));
+            let visible = &mut buffers.visible[index];
+            visible.write(&gpu.device, &gpu.queue, &lists.visible);
+            let bind_group = instance_bind_group(&gpu, forest, &buffers.uniform, visible.buffer());
+            work.forests.push(CascadeForest { entity, lists, bind_group });
+        }
+        let trees: usize = work.forests.iter().map(|forest| forest.lists.visible.len()).sum();
+        report.ran(name, format!("{trees} trees within {:.0} m", place.radius));
+        maps.work.push(work);
+    }
+    maps.cascade_bind_group = Some(gpu.bind_group(
+        "canopy_cascade",
+        &caster_layout(),
+        &BindGroupEntries::single(BindingResource::Buffer(BufferBinding {
+            buffer: &maps.cascade_uniforms,
+            offset: 0,
+            size: std::num::NonZeroU64::new(size_of::<CascadeViewUniform>() as u64),
+        })),
+    ));
+}
+
+/// Height in scene metres below which nothing within `radius` metres of the camera can be in shadow.
+fn lowest_receiver(scene: &ExtractedScene, camera: DVec3, radius: f64) -> f64 {
+    let middle = DVec2::new(camera.x, camera.z);
+    let ground = scene
+        .ground
+        .as_ref()
+        .map(|(_, ground)| f64::from(ground.terrain.height_bounds(middle - radius, middle + radius).0));
+    ground.unwrap_or(f64::NEG_INFINITY).max(camera.y - radius)
+}
+
+/// Distances from a cascade's centre in metres at which each level of `forest` casts into a map of `texel` metres a texel;
+/// `near` are those of the first one.
+///
+/// A tree casts in the first level whose range holds it: in the one in which the view shows it, but for levels that are too
+/// fine for the map, in whose place the farthest one casts.
+fn casting_distances(forest: &GpuForest, near: Range<f64>, texel: f64) -> Vec<Range<f64>> {
+    let levels = &forest.forest.levels;
+    let mut casting = vec![0.0..0.0; levels.len()];
+    let mut ends = near.end;
+    for (index, level) in forest.levels() {
+        let start = if index == 0 { near.start } else { near.start.max(ends) };
+        ends = if index == 0 { ends } else { levels.fade_out(index).map_or(ends, |fade| ends.max(fade.end.into())) };
+        if level.renderer.coarsest_shadow_texel().is_some_and(|coarsest| texel < coarsest) {
+            casting[index] = start..ends;
+        }
+    }
+    if let Some((last, _)) = forest.levels().rev().find(|(_, level)| level.renderer.coarsest_shadow_texel().is_some()) {
+        casting[last] = 0.0..f64::INFINITY;
+    }
+    casting
+}
+
+/// Shares the maps with the passes that read them.
+pub fn share_maps(
+    frame: Res<PreparedFrame>,
+    maps: Res<ShadowMaps>,
+    mut textures: ResMut<SharedTextures>,
+    mut placement: ResMut<SharedPlacement>,
+) {
+    textures.shadow_maps = maps.view.clone();
+    placement.shadow_map_size = maps.map_size;
+    placement.cascade_count = maps.cascades.len();
+    if let Some(view) = &frame.view {
+        placement.cascades = maps.uniforms(view.camera);
+    }
+}

@@ -1,0 +1,176 @@
+//! The tiles that a frame draws.
+
+use bevy::{
+    ecs::{
+        resource::Resource,
+        system::{Res, ResMut},
+        world::{FromWorld, World},
+    },
+    log::error_once,
+    render::{
+        render_resource::{
+            AddressMode, BindGroup, BindGroupEntries, Buffer, BufferUsages, FilterMode, MipmapFilterMode,
+            PipelineCache, Sampler, SamplerDescriptor, TextureView,
+        },
+        renderer::{RenderDevice, RenderQueue},
+    },
+};
+use glam::DVec3;
+
+use super::{
+    noise_texture::noise_texture,
+    pipeline::terrain_layout,
+    tile_cache::{TILE_VERTICES, TileCache},
+    vertex::GpuTile,
+};
+use crate::{
+    render::{
+        extract::ExtractedScene,
+        gpu::{self, GrowingBuffer},
+        report::FrameReport,
+        view::PreparedFrame,
+    },
+    terrain::tiles::{Tile, TileSettings, tile_indices},
+};
+
+/// Finest vertex spacing in metres.
+const FINEST_SPACING: f64 = 1.0;
+
+/// The terrain on the GPU.
+#[derive(Resource)]
+pub struct GpuTerrain {
+    cache: Option<TileCache>,
+    tiles: GrowingBuffer,
+    /// Indices that all tiles share.
+    pub indices: Buffer,
+    /// Number of [`indices`](Self::indices).
+    pub index_count: u32,
+    /// Tiles of this frame.
+    pub count: u32,
+    /// Group 1.
+    pub bind_group: Option<BindGroup>,
+    noise: Option<TextureView>,
+    sampler: Sampler,
+    frame: u64,
+}
+
+impl FromWorld for GpuTerrain {
+    fn from_world(world: &mut World) -> Self {
+        let device = world.resource::<RenderDevice>();
+        let indices = tile_indices();
+        Self {
+            cache: None,
+            tiles: GrowingBuffer::new(device, "canopy_terrain_tiles"),
+            indices: gpu::buffer_with(device, "canopy_terrain_indices", BufferUsages::INDEX, &indices),
+            index_count: indices.len() as u32,
+            count: 0,
+            bind_group: None,
+            noise: None,
+            sampler: device.create_sampler(&SamplerDescriptor {
+                label: Some("canopy_ground_noise"),
+                address_mode_u: AddressMode::Repeat,
+                address_mode_v: AddressMode::Repeat,
+                mag_filter: FilterMode::Linear,
+                min_filter: FilterMode::Linear,
+                mipmap_filter: MipmapFilterMode::Linear,
+                ..Default::default()
+            }),
+            frame: 0,
+        }
+    }
+}
+
+/// Counts of the last prepared frame.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TerrainStatistics {
+    /// Tiles drawn.
+    pub tiles: usize,
+    /// Triangles of these.
+    pub triangles: usize,
+}
+
+/// Chooses the tiles of the view and uploads those that are new.
+pub fn prepare_tiles(
+    scene: Res<ExtractedScene>,
+    frame: Res<PreparedFrame>,
+    device: Res<RenderDevice>,
+    queue: Res<RenderQueue>,
+    pipelines: Res<PipelineCache>,
+    report: Res<FrameReport>,
+    mut terrain: ResMut<GpuTerrain>,
+    mut statistics: ResMut<TerrainStatistics>,
+) {
+    let gpu = &mut *terrain;
+    gpu.count = 0;
+    *statistics = TerrainStatistics::default();
+    let Some((_, ground)) = &scene.ground else {
+        gpu.cache = None;
+        gpu.bind_group = None;
+        report.skipped("terrain", "the scene has no ground");
+        return;
+    };
+    let Some(view) = &frame.view else { return };
+    let settings = TileSettings {
+        finest_spacing: FINEST_SPACING,
+        max_distance: ground.view_distance,
+        pixel_error: ground.error_pixels,
+        ..TileSettings::default()
+    };
+    if !gpu.cache.as_ref().is_some_and(|cache| cache.is_of(&ground.terrain, &settings)) {
+        gpu.cache = match TileCache::new(&device, &ground.terrain, &settings) {
+            Ok(cache) => Some(cache),
+            Err(error) => {
+                error_once!("the ground cannot be drawn: {error}");
+                None
+            }
+        };
+    }
+    let Some(cache) = &mut gpu.cache else { return };
+    gpu.frame += 1;
+    let mut chosen: Vec<Tile> = Vec::new();
+    let clearance = cache.tree.select(
+        view.camera,
+        f64::from(view.focal_pixels),
+        |min: DVec3, max: DVec3| view.frustum.sees_box((min - view.camera).as_vec3(), (max - view.camera).as_vec3()),
+        &mut chosen,
+    );
+    cache.reserve(&device, chosen.len());
+    let mut made = 0;
+    let mut tiles = Vec::with_capacity(chosen.len());
+    for tile in &chosen {
+        let Some(slot) = cache.slot((tile.level, tile.ix, tile.iz), gpu.frame, &queue, &mut made) else {
+            error_once!("the view needs more terrain tiles than the device can hold; raise `terrain_error`");
+            break;
+        };
+        let origin = cache.tree.tile_origin(tile.level, tile.ix, tile.iz);
+        tiles.push(GpuTile {
+            origin: [(origin.x - view.camera.x) as f32, (origin.y - view.camera.z) as f32],
+            spacing: cache.tree.spacing(tile.level) as f32,
+            first: (slot * TILE_VERTICES) as u32,
+            morph_start: tile.morph_start,
+            morph_end: tile.morph_end,
+            clearance: clearance as f32,
+            level: tile.level as f32,
+        });
+    }
+    gpu.tiles.write(&device, &queue, &tiles);
+    gpu.count = tiles.len() as u32;
+    *statistics = TerrainStatistics { tiles: tiles.len(), triangles: tiles.len() * gpu.index_count as usize / 3 };
+    report.ran("terrain", format!("{} tiles", tiles.len()));
+    if made == 0 {
+        report.skipped("terrain tiles", "all tiles of the view are on the GPU");
+    } else {
+        report.ran("terrain tiles", format!("{made} made"));
+    }
+    let noise = gpu.noise.get_or_insert_with(|| noise_texture(&device, &queue));
+    gpu.bind_group = Some(device.create_bind_group(
+        "canopy_terrain",
+        &pipelines.get_bind_group_layout(&terrain_layout()),
+        &BindGroupEntries::sequential((
+            cache.vertices.as_entire_binding(),
+            gpu.tiles.buffer().as_entire_binding(),
+            &*noise,
+            &gpu.sampler,
+        )),
+    ));
+}
