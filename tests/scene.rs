@@ -8,9 +8,10 @@ use canopy::light::MoonSetting;
 use canopy::plant::Gloss;
 use canopy::scatter::{LengthUnit, Sequence};
 use canopy::scene::{
-    GltfPlants, Ground, GroundFile, GrownForm, GrownPlants, InventoryTrees, Lighting, Overrides, Path, PlantSource,
-    Position, ScatteredTrees, Scene, SceneError, Species, Transfer, Trees,
+    Anchor, GltfPlants, Ground, GroundFile, GrownForm, GrownPlants, InventoryTrees, Lighting, Overrides, Path,
+    PlantSource, Position, ScatteredTrees, Scene, SceneError, Species, Transfer, Trees,
 };
+use canopy::terrain::CoordinateSystem;
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
 
@@ -222,6 +223,19 @@ fn inventories_state_units_and_species() -> Outcome {
     assert_eq!(inventory.path, FilePath::new("folder/stand.csv"));
     assert_eq!(inventory.species.get("Pinus").map(String::as_str), Some("pine"));
 
+    // Older files say `Centre` and `Middle`, which do not tell whose centre they mean.
+    for (word, anchor) in [
+        ("TerrainCentre", Anchor::TerrainCentre),
+        ("Centre", Anchor::TerrainCentre),
+        ("StandCentre", Anchor::StandCentre),
+        ("Middle", Anchor::StandCentre),
+    ] {
+        let Trees::Inventory(inventory) = parse(&text.replace("SouthWest", word))?.trees else {
+            return Err("no inventory".into());
+        };
+        assert_eq!(inventory.anchor, anchor, "{word}");
+    }
+
     let wrong = text.replace("\"pine\"}", "\"pin\"}");
     let error = parse(&wrong).err().ok_or("accepted")?;
     let SceneError::Invalid { problems, .. } = &error else { return Err(error.into()) };
@@ -377,6 +391,9 @@ fn terrain_files_have_their_own_rules() -> Outcome {
     }
     let zone = coordinates("Utm(zone: 61)").err().ok_or("accepted")?.to_string();
     assert!(zone.contains("1:54: `terrain.coordinates.zone` is 61; write a whole number from 1 to 60"), "{zone}");
+    let scene = parse("(terrain: File(path: \"a.asc\", coordinates: Epsg(32733)))")?;
+    let Ground::File(file) = scene.terrain else { return Err("no file".into()) };
+    assert_eq!(file.coordinates, Some(CoordinateSystem::Utm { zone: 33, south: true }));
     assert!(coordinates("Epsg(5)").is_err_and(|error| error.to_string().contains("1024 to 32767")));
     let place_less = coordinates("Projected(metres_per_unit: 0.3048)").err().ok_or("accepted")?.to_string();
     assert!(place_less.contains("`place.latitude` is missing"), "{place_less}");
