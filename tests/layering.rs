@@ -162,3 +162,9 @@ fn circles_of_files_are_found() {
     circle[2].1 = "use super::Layer;";
     assert_eq!(circles(&files_graph("render", &files(&circle))), [["render/mod.rs", "render/sky.rs"]]);
 }
+
+#[test]
+fn render_has_no_circles() {
+    let circles = circles(&files_graph("render", &sources()));
+    assert!(circles.is_empty(), "these files of the render room use each other in circles: {circles:#?}");
+}

@@ -1,13 +1,9 @@
 //! Group 1 of everything that draws trees: where they stand, which of them are drawn, and what their plants are.
 
-use bevy::render::render_resource::{
-    BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, BindingResource, Buffer,
-    BufferBinding, ShaderStages,
-    binding_types::{storage_buffer_read_only_sized, uniform_buffer_sized},
-};
+use bevy::render::render_resource::{BindGroup, BindGroupEntries, BindingResource, Buffer, BufferBinding};
 use glam::{DVec3, IVec2, Vec4};
 
-use super::{gpu_forest::GpuForest, uniforms::ForestViewUniform};
+use super::{gpu_forest::GpuForest, instance_layout::instance_layout, uniforms::ForestViewUniform};
 use crate::{lod::FadeBand, render::gpu::Gpu};
 
 /// A distance in metres that no tree reaches.
@@ -22,23 +18,6 @@ pub struct LevelLook {
     pub fade_out: Option<FadeBand>,
     /// Linear colour of its tint and how much of it is mixed in.
     pub tint: Vec4,
-}
-
-/// Layout of group 1: uniform with dynamic offset, trees, indices of the drawn ones, plants.
-pub fn instance_layout() -> BindGroupLayoutDescriptor {
-    BindGroupLayoutDescriptor::new(
-        "canopy_instances",
-        &BindGroupLayoutEntries::sequential(
-            ShaderStages::VERTEX,
-            (
-                uniform_buffer_sized(true, std::num::NonZeroU64::new(size_of::<ForestViewUniform>() as u64))
-                    .visibility(ShaderStages::VERTEX_FRAGMENT),
-                storage_buffer_read_only_sized(false, None),
-                storage_buffer_read_only_sized(false, None),
-                storage_buffer_read_only_sized(false, None).visibility(ShaderStages::VERTEX_FRAGMENT),
-            ),
-        ),
-    )
 }
 
 /// The uniform of a view or cascade whose positions are relative to `anchor` (scene metres).

@@ -7,6 +7,7 @@
 //! Limits: at most 64 variants a forest; no motion vectors; one camera.
 
 mod gpu_forest;
+mod instance_layout;
 mod instances;
 mod leaves;
 mod levels;
@@ -32,7 +33,8 @@ use super::{
     shaders::CanopyShaders,
 };
 pub use gpu_forest::{ForestLevel, GpuForest, GpuForests};
-pub use instances::{forest_view, instance_bind_group, instance_layout};
+pub use instance_layout::instance_layout;
+pub use instances::{forest_view, instance_bind_group};
 pub use lists::{ForestStatistics, LevelStatistics};
 pub use pipelines::LevelPipelines;
 pub use representation::Representations;

@@ -12,8 +12,9 @@ use bevy::{
 };
 
 use super::{
-    GpuForests, LevelPipelines,
+    gpu_forest::GpuForests,
     lists::{PreparedForest, PreparedForests},
+    pipelines::LevelPipelines,
     representation::LevelTarget,
 };
 use crate::render::{bindings::FrameBindGroup, components::CanopyCamera, view::PreparedFrame};

@@ -26,7 +26,7 @@ use bevy::{
 };
 use glam::Vec3;
 
-use super::{instances::instance_layout, transfer::TransferLight};
+use super::{instance_layout::instance_layout, transfer::TransferLight};
 use crate::{
     bake::BakedPlant,
     cull::Grouping,
