@@ -39,6 +39,7 @@ impl Ours {
             map_size: look.shadow_size,
             cascades: look.cascades,
             distance: look.shadow_distance,
+            proxy_distance: f64::from(look.near),
             ..SunShadowSettings::default()
         };
         let (plant, fade) = if look.is_full() {

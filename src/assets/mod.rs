@@ -11,11 +11,10 @@
 mod error;
 pub(crate) mod ground;
 pub(crate) mod plants;
-mod stage;
+pub(crate) mod stage;
 pub(crate) mod threads;
 mod together;
 pub(crate) mod trees;
 
 pub use error::StageError;
 pub use stage::Stage;
-pub(crate) use stage::observer;

@@ -107,7 +107,7 @@ impl Default for Sun {
             },
             instant: DateTime::from_timestamp(1_782_040_500, 0).unwrap_or_default(),
             rate: 0.0,
-            moon: MoonSetting::FullOpposite,
+            moon: MoonSetting::Full,
             visibility_km: 40.0,
             compensation_ev: 0.9,
         }

@@ -22,6 +22,8 @@ use crate::{
     terrain::Terrain,
 };
 
+pub use crate::bake::lighting::SunLight;
+
 /// From the camera's exposed radiance to what a screen shows: the tone curve for which Canopy's light is made.
 pub const TONEMAPPING: Tonemapping = Tonemapping::BlenderFilmic;
 
@@ -78,17 +80,6 @@ pub struct Forest {
     pub view_distance: f32,
 }
 
-/// How the sun (or the moon, where it is the brighter) lights a plant's full models.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum SunLight {
-    /// Each leaf by the angle of its own normal to the sun, front and back [Franzke 2005, 4.2.2].
-    #[default]
-    LeafShader,
-    /// The sun projected onto spherical harmonics, through the plant's transfer, dimmed by the shadow map [Franzke 2005,
-    /// 4.3.3]. Only for plants that are lit by transfer; others, and crosses, take the leaf shader.
-    Harmonics,
-}
-
 /// The ground under everything. One at a time is drawn, the first that can be seen.
 ///
 /// As for a [`Forest`], its global translation, inherited visibility and render layers take effect.
@@ -126,8 +117,9 @@ pub struct SunShadowSettings {
 }
 
 impl Default for SunShadowSettings {
+    /// As a scene with the default quality has them.
     fn default() -> Self {
-        Self { map_size: 2048, cascades: 3, finest_radius: 30.0, distance: 500.0, proxy_distance: 30.0 }
+        Self { map_size: 2048, cascades: 4, finest_radius: 30.0, distance: 800.0, proxy_distance: 80.0 }
     }
 }
 

@@ -33,8 +33,7 @@ use tracing::{error, info, warn};
 use super::{Sun, sets::CanopySystems};
 use crate::{
     assets::{Stage, StageError},
-    light::MoonSetting,
-    scene::{self, Overrides, SceneSource},
+    scene::{Overrides, SceneSource},
 };
 use job::Job;
 use progress::Said;
@@ -133,11 +132,7 @@ impl Stage {
         Sun {
             observer: self.observer,
             instant,
-            moon: match self.scene.place.moon {
-                scene::Moon::Full => MoonSetting::FullOpposite,
-                scene::Moon::Astronomical => MoonSetting::Astronomical,
-                scene::Moon::None => MoonSetting::None,
-            },
+            moon: self.scene.place.moon,
             visibility_km: self.scene.place.visibility * 1e-3,
             ..Sun::default()
         }
