@@ -14,10 +14,7 @@ pub fn plugin(app: &mut App) {
 
 fn set_up(mut commands: Commands) {
     // Its DirectionalLight lights the meshes as the forest is lit; `shadow_maps_enabled` is Bevy's own switch.
-    commands.spawn((
-        Sun::default(),
-        DirectionalLight { shadow_maps_enabled: true, ..DirectionalLight::default() },
-    ));
+    commands.spawn((Sun::default(), DirectionalLight { shadow_maps_enabled: true, ..DirectionalLight::default() }));
     commands.spawn(CanopyScene::new("assets/scenes/one_tree.ron")).observe(place);
 }
 

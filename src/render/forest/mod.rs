@@ -6,6 +6,7 @@
 //!
 //! Limits: at most 64 variants a forest; no motion vectors; one camera.
 
+mod draw;
 mod gpu_forest;
 mod instance_layout;
 mod instances;
@@ -32,6 +33,7 @@ use super::{
     sets::{CanopyPasses, CanopyRenderSystems},
     shaders::CanopyShaders,
 };
+pub use draw::draw_levels;
 pub use gpu_forest::{ForestLevel, GpuForest, GpuForests};
 pub use instance_layout::instance_layout;
 pub use instances::{forest_view, instance_bind_group};
