@@ -2,8 +2,6 @@
 //!
 //! A level needs a shader, a [`LevelRenderer`] and a [`GpuLevel`]; lists, statistics and tints come with [`Forest::levels`].
 
-use std::ops::Range;
-
 use bevy::{
     prelude::*,
     render::{render_phase::TrackedRenderPass, render_resource::RenderPipelineDescriptor},
@@ -38,10 +36,10 @@ struct Varying {
     return finish(in.relative, tint_level(vec3(0.9, 0.02, 0.02) * lit), 1.0);
 }";
 
-/// The name of the level in [`Levels`].
+/// The level.
 pub const BOX: Representation = Representation::named("box");
 
-/// Makes [`BOX`] known; its forests show it beyond 40 m.
+/// Makes the level known; all forests show it beyond 40 m.
 pub struct BoxLevelPlugin;
 
 impl Plugin for BoxLevelPlugin {
@@ -82,7 +80,7 @@ struct GpuBoxes;
 impl GpuLevel for GpuBoxes {
     fn features(&self, target: LevelTarget) -> Vec<u32> { if target == LevelTarget::ShadowMap { vec![] } else { vec![0] } }
     fn triangles(&self, _variant: usize) -> usize { 12 }
-    fn draw<'a>(&'a self, pass: &mut TrackedRenderPass<'a>, _: u32, _: LevelTarget, ranges: &[Range<u32>]) {
+    fn draw<'a>(&'a self, pass: &mut TrackedRenderPass<'a>, _: u32, _: LevelTarget, ranges: &[std::ops::Range<u32>]) {
         ranges.iter().for_each(|trees| pass.draw(36 * trees.start..36 * trees.end, 0..1));
     }
     fn relight(&mut self, _: &Relight, _: &mut ForestUpload) {}

@@ -1,8 +1,14 @@
 //! A level of detail that a program adds: the example `box_level`.
 
-use bevy::{prelude::*, render::RenderApp};
+use std::sync::Arc;
+
+use bevy::{
+    prelude::*,
+    render::{RenderApp, renderer::RenderDevice},
+};
 use canopy::{
     app::{Picture, Renderer},
+    bake::{BakedLevel, BakedPlant},
     prelude::*,
     render::forest::{ForestStatistics, LevelStatistics},
 };
@@ -99,4 +105,56 @@ fn a_level_that_nothing_draws_is_named_and_the_others_are_drawn() {
         "{told:?}"
     );
     assert_eq!(statistics(&mut renderer).len(), 1);
+}
+
+#[test]
+fn plants_without_a_bake_are_not_drawn_and_named_once() {
+    let gpu = gpu();
+    let built = trees_at(&[DVec2::new(-4.0, -20.0), DVec2::new(4.0, -25.0)], 1);
+    let stage = &built.stage;
+    let from = view(stage, (0.0, 9.0, 60.0), 0.0, -5.0);
+    let picture = |levels: &[BakedLevel], view_distance: f32| {
+        let mut renderer = renderer(1);
+        renderer.show(stage);
+        let plants = stage.plants.iter().map(|plant| BakedPlant { levels: levels.to_vec(), ..plant.clone() });
+        let plants = Arc::new(plants.collect::<Vec<_>>());
+        let world = renderer.app().world_mut();
+        for mut forest in world.query::<&mut Forest>().iter_mut(world) {
+            forest.plants = plants.clone();
+            forest.levels = Levels::only(Representation::CROSS);
+            forest.view_distance = view_distance;
+        }
+        draw(&mut renderer, stage, &from, NOON)
+    };
+    let all = stage.plants[0].levels.clone();
+    assert!(picture(&all, 2000.0) != picture(&all, 0.0), "a control: with a bake there are trees");
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+    assert!(picture(&[], 2000.0) == picture(&[], 0.0), "something is drawn without a bake");
+    let told = gpu.messages();
+    assert!(told.len() == 1 && told[0].contains("`broadleaf") && told[0].contains("Representation::CROSS"), "{told:?}");
+}
+
+#[test]
+fn more_crosses_than_a_texture_array_holds_are_refused_with_the_number_that_fits() {
+    let gpu = gpu();
+    let built = trees_at(&[DVec2::new(0.0, 40.0)], 1);
+    let stage = &built.stage;
+    let from = view(stage, (0.0, 9.0, 60.0), 0.0, -5.0);
+    let mut renderer = renderer(1);
+    renderer.show(stage);
+    let limit = renderer.app().world().resource::<RenderDevice>().limits().max_texture_array_layers as usize;
+    let plants = Arc::new(vec![stage.plants[0].clone(); limit / 3 + 1]);
+    let world = renderer.app().world_mut();
+    for mut forest in world.query::<&mut Forest>().iter_mut(world) {
+        forest.plants = plants.clone();
+        forest.levels = Levels::only(Representation::CROSS);
+    }
+    draw(&mut renderer, stage, &from, NOON);
+    let told = gpu.messages();
+    let remedy = format!("at most {} plants", limit / 3);
+    assert!(told.len() == 1 && told[0].contains("texture layers") && told[0].contains(&remedy), "{told:?}");
+    // A scene is refused before it is shown.
+    let crowded = Stage { plants, ..built.stage };
+    let refused = crowded.check_device(renderer.app().world().resource::<RenderDevice>());
+    assert!(refused.is_err_and(|error| error.to_string().contains(&format!("at most {}", limit / 3))));
 }
