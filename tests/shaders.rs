@@ -13,7 +13,10 @@ use canopy::{
         bindings::uniforms::{
             CascadeUniform, CascadeViewUniform, FrameUniform, LightUniform, NOISE_PERIOD, ShadowUniform,
         },
-        forest::{ForestViewUniform, PartUniform, PlaneUniform, PlantVertex, TransferUniform, VariantUniform},
+        forest::{
+            CrossVariantUniform, ForestViewUniform, PartUniform, PlaneUniform, PlantVertex, TransferUniform,
+            VariantUniform,
+        },
         shaders::{ShaderFile, sources},
         terrain::{GpuTile, GpuTileVertex},
     },
@@ -226,21 +229,21 @@ fn gpu_structs_are_what_the_shaders_think() {
         layouts,
         "Variant",
         VariantUniform {
-            planes,
             height,
             crown_radius,
-            first_layer,
-            first_light_layer,
-            transmission,
             radiance_transfer,
-            isotropic_fraction,
             specular_reflectance,
             roughness,
             realigned,
             indirect_sun_zenith,
-            indirect_sun_color,
             indirect_sun_mean,
+            indirect_sun_color,
         }
+    );
+    twin!(
+        layouts,
+        "CrossVariant",
+        CrossVariantUniform { planes, transmission, first_layer, isotropic_fraction, first_light_layer }
     );
     twin!(layouts, "Part", PartUniform { base_color, realigned, transmission, specular_reflectance, roughness });
     twin!(
@@ -272,6 +275,7 @@ fn every_bound_struct_has_its_twin_tested() {
         "CascadeView",
         "ForestView",
         "Variant",
+        "CrossVariant",
         "Part",
         "Transfer",
         "Tree",

@@ -95,7 +95,7 @@ fn gather(
             let variant = packed.variant() as usize;
             let Some(size) = sizes.get(variant) else { continue };
             let scale = f64::from(packed.scale());
-            let foot = packed.position(stand.cell_size);
+            let foot = packed.position(&stand.grid);
             let (radius, height) = (f64::from(size.radius) * scale, f64::from(size.height) * scale);
             let (min, max) = (foot - DVec3::new(radius, 0.0, radius), foot + DVec3::new(radius, height, radius));
             if !casts(min, max) {

@@ -13,7 +13,7 @@ use canopy::{
     app::{Picture, Renderer},
     assets::Stage,
     bake::{
-        BakeSettings, BakedPlant, bake_plant,
+        BakeSettings, BakedLevel, BakedPlant, bake_plant,
         levels::cross::CrossSettings,
         lighting::{LightingSettings, implicit::ImplicitSettings},
     },
@@ -190,7 +190,8 @@ fn another_light_is_drawn_as_if_it_had_always_been_there() {
     };
     let lit = |plant: &BakedPlant| {
         let (baked, _) = bake_plant(plant.plant.clone(), &settings, None);
-        BakedPlant { lighting: baked.lighting, cross: baked.cross, ..plant.clone() }
+        let cross = baked.cross().expect("a cross").clone();
+        BakedPlant { lighting: baked.lighting, ..plant.clone() }.with_level(BakedLevel::Cross(cross))
     };
     let plants = Arc::new(stage.plants.iter().map(lit).collect::<Vec<_>>());
 
