@@ -91,15 +91,17 @@ pub struct ImplicitSettings {
     pub weighting: Weighting,
     /// Where the normals come from.
     pub normals: NormalSource,
-    /// Share of a leaf's own normal in the result, 0..=1; the publication shows 0.
+    /// Share of a leaf's own normal in the result, 0..=1; the publication shows 0. 1: the leaves' own normals, unchanged.
     pub own_normal: f32,
     /// Whether the surface is extracted where the normals do not need it.
     pub surface: bool,
     /// Cells of the surface a radius ρ, 1..=16. More: a finer surface, with the square in triangles.
     pub resolution: f32,
     /// Triangles of the surface that is returned as a share of the foliage's, 0..=1 (the presets
-    /// [`COARSE_SHARE`](super::COARSE_SHARE) and [`FINE_SHARE`](super::FINE_SHARE)); `None` leaves it as extracted.
-    /// Normals always come from the surface as extracted.
+    /// [`COARSE_SHARE`](super::COARSE_SHARE) and [`FINE_SHARE`](super::FINE_SHARE)); `None` leaves it as extracted. The share
+    /// is reached: a surface with fewer triangles is extracted again with finer cells. Exceptions: more separate lobes than
+    /// the share has tetrahedra for, and more cells than [`MOST_CELLS`](super::isosurface::MOST_CELLS). Normals always come
+    /// from the surface as `resolution` gives it.
     pub surface_share: Option<f32>,
 }
 
