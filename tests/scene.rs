@@ -2,6 +2,7 @@
 
 use std::path::Path as FilePath;
 
+use canopy::plant::LeafKind;
 use canopy::scene::{
     Ground, GrownForm, LeafGloss, LengthUnit, Lighting, Moon, Overrides, Path, PlantSource, Position, Scene,
     SceneError, Sequence, SunLight, Transfer, Trees, parse_lighting,
@@ -143,6 +144,14 @@ fn everything_is_read() -> Outcome {
 }
 
 #[test]
+fn the_kind_of_leaf_is_read() -> Outcome {
+    assert_eq!(parse(FULL)?.species[1].leaf, None);
+    let scene = parse(&FULL.replace("name: \"pine\",", "name: \"pine\", leaf: Needle,"))?;
+    assert_eq!(scene.species[1].leaf, Some(LeafKind::Needle));
+    Ok(())
+}
+
+#[test]
 fn gloss_and_the_way_of_the_sun_are_read() -> Outcome {
     let plain = parse(FULL)?;
     assert_eq!(plain.species[0].gloss, LeafGloss { share: 0.045, roughness: 0.4 });
@@ -247,6 +256,7 @@ fn unknown_choices_are_listed() {
     faulty("sequence: Hammersley", "sequence: Halten", 10, &["did you mean `Halton`", "`Random`"]);
     faulty("form: Broadleaf", "form: Palm", 6, &["unknown choice `Palm`", "`Conifer`"]);
     faulty("moon: Astronomical", "moon: New", 6, &["unknown choice `New`", "`None`"]);
+    faulty("weight: 3,", "leaf: Rubber,", 6, &["unknown choice `Rubber`", "`Leathery`", "`Needle`"]);
 }
 
 #[test]

@@ -108,7 +108,7 @@ pub fn plan(scene: &Scene) -> Result<PlantPlan, AppError> {
         let lighting = lighting_settings(species.lighting.as_ref());
         let gloss =
             Gloss { reflectance: species.gloss.share as f32, roughness: species.gloss.roughness as f32 }.in_range();
-        let individuals = sources(species)?.into_iter().map(|source| Individual { source, gloss, lighting });
+        let individuals = sources(species, gloss)?.into_iter().map(|source| Individual { source, gloss, lighting });
         plan.individuals.extend(individuals);
         plan.variants.push(first as u16..plan.individuals.len() as u16);
     }
@@ -118,10 +118,10 @@ pub fn plan(scene: &Scene) -> Result<PlantPlan, AppError> {
     Ok(plan)
 }
 
-fn sources(species: &Species) -> Result<Vec<IndividualSource>, AppError> {
+fn sources(species: &Species, gloss: Gloss) -> Result<Vec<IndividualSource>, AppError> {
     Ok(match &species.plant {
         PlantSource::Grown(grown) => {
-            let (parameters, from) = match &grown.form {
+            let (mut parameters, from) = match &grown.form {
                 GrownForm::Broadleaf => (GrowParameters::broadleaf(), "broadleaf".into()),
                 GrownForm::Conifer => (GrowParameters::conifer(), "conifer".into()),
                 GrownForm::File(path) => {
@@ -132,6 +132,9 @@ fn sources(species: &Species) -> Result<Vec<IndividualSource>, AppError> {
                     (parameters, path.clone())
                 }
             };
+            if let Some(leaf) = species.leaf {
+                parameters.leaves.transmission = leaf.transmission().to_array();
+            }
             (0..grown.individuals)
                 .map(|individual| IndividualSource::Grown {
                     parameters: Box::new(parameters.clone()),
@@ -146,6 +149,8 @@ fn sources(species: &Species) -> Result<Vec<IndividualSource>, AppError> {
                 height: Some(species.mean_height() as f32),
                 foliage_materials: files.foliage.clone(),
                 wood_materials: files.wood.clone(),
+                leaf: species.leaf.unwrap_or_default(),
+                gloss: Some(gloss),
                 ..GltfOptions::default()
             };
             files

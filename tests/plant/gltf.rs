@@ -3,13 +3,14 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use canopy::plant::gltf::{GltfOptions, LEAF_TRANSMISSION, PlantError, PlantReport, Warning, WarningKind, load_plant};
+use canopy::plant::gltf::{GltfOptions, PlantError, PlantReport, Warning, WarningKind, load_plant};
 use canopy::plant::texture::{alpha_tested_mips, fade_alpha};
-use canopy::plant::{PartKind, Plant};
+use canopy::plant::{Gloss, LeafColors, LeafKind, PartKind, Plant};
 use glam::{Vec2, Vec3};
 use proptest::prelude::*;
 
 use super::texture::leaves;
+use crate::support::glb::TreeFile;
 
 /// Builds a small GLB file piece by piece.
 #[derive(Default)]
@@ -139,7 +140,7 @@ fn wood_and_foliage_come_from_the_alpha_mode() {
     assert_eq!(plant.parts[0].material.base_color, Vec3::new(0.5, 0.4, 0.3));
     assert_eq!(plant.parts[0].material.transmission, Vec3::ZERO);
     assert_eq!(plant.parts[1].material.alpha_cutoff, 0.4);
-    assert_eq!(plant.parts[1].material.transmission, LEAF_TRANSMISSION);
+    assert_eq!(plant.parts[1].material.transmission, LeafKind::Thin.transmission());
     assert!(warnings.iter().any(|w| w.kind == WarningKind::Repaired && w.message.contains("normal")));
     for normal in &plant.parts[0].mesh.normals {
         assert!((*normal - Vec3::Z).length() < 1e-6);
@@ -158,6 +159,7 @@ fn options_name_materials_and_scale() {
         wood_materials: vec!["leaves".into(), "twigs".into()],
         transmission: Some(Vec3::splat(0.3)),
         name: Some("inverted".into()),
+        ..GltfOptions::default()
     };
     let (plant, warnings) = tree().load_with(&options).expect("a plant");
     assert!((plant.height() - 10.0).abs() < 1e-4);
@@ -168,6 +170,82 @@ fn options_name_materials_and_scale() {
     for height in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         let failed = tree().load_with(&GltfOptions { height: Some(height), ..options.clone() });
         assert!(matches!(failed, Err(PlantError::Option { .. })));
+    }
+}
+
+/// A tree whose leaves have these members in their material, and what they do to light.
+fn leafy(leaf_members: &'static str, options: &GltfOptions) -> (LeafColors, Vec<Warning>) {
+    let file = TreeFile { leaf_members, ..TreeFile::default() };
+    let (plant, warnings) = load_bytes(&file.bytes(), "tree.glb", options).expect("a plant");
+    (plant.leaf_colors(), warnings)
+}
+
+#[test]
+fn leaves_pass_as_much_light_as_their_kind_does() {
+    let of = |leaf: LeafKind| leafy("", &GltfOptions { leaf, ..GltfOptions::default() }).0;
+    let thin = of(LeafKind::default());
+    for kind in LeafKind::ALL {
+        let leaf = of(kind);
+        assert_eq!(leaf.reflected, thin.reflected);
+        let ratio = leaf.transmitted / thin.transmitted;
+        assert!((ratio - kind.factor() / 1.3).abs().max_element() < 1e-4, "{kind:?}: {ratio}");
+    }
+}
+
+#[test]
+fn a_file_that_states_its_diffuse_transmission_is_believed() {
+    let plain = leafy("", &GltfOptions::default()).0;
+    let stated = r#","extensions":{"KHR_materials_diffuse_transmission":{"diffuseTransmissionFactor":0.3,
+        "diffuseTransmissionColorFactor":[0.02,0.15,0.002]}}"#;
+    // Whatever kind of leaf the scene has it for, and whatever gloss.
+    for (leaf, gloss) in [(LeafKind::Thin, None), (LeafKind::Needle, Some(Gloss::MATT))] {
+        let (leaf, warnings) = leafy(stated, &GltfOptions { leaf, gloss, ..GltfOptions::default() });
+        assert!((leaf.reflected / plain.reflected - 0.7).abs().max_element() < 1e-3, "{leaf:?}");
+        let wanted = 0.3 * Vec3::new(0.02, 0.15, 0.002);
+        assert!((leaf.transmitted / wanted - 1.0).abs().max_element() < 0.01, "{leaf:?}");
+        assert_eq!(warnings, []);
+    }
+    // The caller's own number goes before the file's.
+    let (leaf, _) = leafy(stated, &GltfOptions { transmission: Some(Vec3::ZERO), ..GltfOptions::default() });
+    assert_eq!((leaf.transmitted, leaf.reflected), (Vec3::ZERO, plain.reflected));
+    // By its defaults the extension lets nothing pass.
+    let (leaf, _) = leafy(r#","extensions":{"KHR_materials_diffuse_transmission":{}}"#, &GltfOptions::default());
+    assert_eq!((leaf.transmitted, leaf.reflected), (Vec3::ZERO, plain.reflected));
+}
+
+#[test]
+fn textures_of_transmitted_light_count_by_their_mean_over_the_leaf() {
+    // The leaves' own picture: its alpha is 1 wherever there is leaf, which is less than half of it.
+    let stated = r#","extensions":{"KHR_materials_diffuse_transmission":{"diffuseTransmissionFactor":0.2,
+        "diffuseTransmissionTexture":{"index":0},"diffuseTransmissionColorFactor":[0.5,0.5,0.5],
+        "diffuseTransmissionColorTexture":{"index":0}}}"#;
+    let plain = leafy("", &GltfOptions::default()).0;
+    let (leaf, warnings) = leafy(stated, &GltfOptions::default());
+    assert!((leaf.reflected / plain.reflected - 0.8).abs().max_element() < 1e-3, "{leaf:?}");
+    assert!((leaf.transmitted / (0.2 * 0.5 * plain.reflected) - 1.0).abs().max_element() < 0.01, "{leaf:?}");
+    assert!(
+        warnings.iter().any(|w| w.kind == WarningKind::Ignored && w.message.contains("means over the leaf: 0.200"))
+    );
+}
+
+#[test]
+fn what_no_leaf_can_transmit_is_repaired_with_a_word() {
+    for (members, word) in [
+        (
+            r#","extensions":{"KHR_materials_diffuse_transmission":{"diffuseTransmissionFactor":"much"}}"#,
+            "cannot be read",
+        ),
+        (r#","extensions":{"KHR_materials_diffuse_transmission":[]}"#, "cannot be read"),
+        (r#","extensions":{"KHR_materials_diffuse_transmission":{"diffuseTransmissionFactor":1e9}}"#, "no room"),
+        (
+            r#","extensions":{"KHR_materials_diffuse_transmission":{"diffuseTransmissionFactor":0.1,
+            "diffuseTransmissionTexture":{"index":99}}}"#,
+            "transmission texture 99 does not exist",
+        ),
+    ] {
+        let (leaf, warnings) = leafy(members, &GltfOptions::default());
+        assert!(warnings.iter().any(|warning| warning.message.contains(word)), "{word}: {warnings:?}");
+        assert!(leaf.transmitted.min_element() >= 0.0 && (leaf.transmitted + leaf.reflected).max_element() <= 1.0);
     }
 }
 

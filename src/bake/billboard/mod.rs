@@ -28,7 +28,7 @@ use super::lighting::BakedLighting;
 use super::rasterize::{Hit, Raster, View};
 use crate::light::atmosphere::luminance;
 use crate::plant::texture::MipChain;
-use crate::plant::{Bounds, PartKind, Plant};
+use crate::plant::{Bounds, PartKind, Plant, PlantMaterial};
 
 /// Crossed billboards of one plant.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,8 +37,7 @@ pub struct Cross {
     pub planes: Vec<CrossPlane>,
     /// Their pictures, in the order of the planes.
     pub textures: CrossTextures,
-    /// Transmission of the foliage (mean over its area), a factor as in [`crate::plant::PlantMaterial::transmission`], 0..2
-    /// each; applies to texels in the measure of their foliage.
+    /// Transmission of the foliage (mean over its area), a factor as in [`PlantMaterial::transmission`]; applies to texels in the measure of their foliage.
     pub transmission: Vec3,
     /// Share of the leaves in a texel that face everywhere alike, 0..1, for each of the pictures' first mips (the last one
     /// stands for all that follow): what their mean normal no longer tells. 0: one leaf with the texel's normal.
@@ -208,7 +207,8 @@ fn mean_transmission(plant: &Plant) -> Vec3 {
         total += area as f32;
     }
     let mean = sum / total;
-    if mean.is_finite() { mean.clamp(Vec3::ZERO, Vec3::splat(2.0)) } else { Vec3::ZERO }
+    let most = Vec3::splat(PlantMaterial::MOST_TRANSMISSION);
+    if mean.is_finite() { mean.clamp(Vec3::ZERO, most) } else { Vec3::ZERO }
 }
 
 /// The mean of a texel's samples. All but `coverage` are weighted with it: sums over the samples that see the plant,

@@ -5,6 +5,7 @@ use super::parameters::{
     BarkKind, BarkParameters, BranchParameters, CrownShape, GrowParameters, LeafParameters, LeafShape, Pruning,
     StemParameters,
 };
+use crate::plant::LeafKind;
 
 impl GrowParameters {
     /// A broadleaf of the closed forest, between oak and beech: about 22 m high, a crown of 7 to 9 m across from a
@@ -177,7 +178,7 @@ impl GrowParameters {
                 shell: 0.25,
                 tint: [0.82, 0.84, 0.9],
                 tint_variation: 0.1,
-                transmission: [0.8, 0.8, 0.8],
+                transmission: LeafKind::Needle.transmission().to_array(),
             },
             bark: BarkParameters { kind: BarkKind::Scaly, tile: 0.6, tint: [1.0, 1.0, 1.0] },
             wood_share: 0.28,
@@ -243,7 +244,7 @@ impl Default for LeafParameters {
             shell: 0.65,
             tint: [0.62, 0.66, 0.72],
             tint_variation: 0.12,
-            transmission: [1.3, 1.3, 1.3],
+            transmission: LeafKind::Thin.transmission().to_array(),
         }
     }
 }
