@@ -457,7 +457,7 @@ proptest! {
             prop_assert!(lighting.ambient(part).iter().all(|k| (0.0..=1.0).contains(k)));
             prop_assert!(lighting.normals(part).unwrap_or_default().iter().all(|normal| normal.is_normalized()));
         }
-        let settings = CrossSettings { resolution: 3, supersampling: 0, normal_smoothing: smoothing };
+        let settings = CrossSettings { resolution: 3, supersampling: 0, normal_smoothing: smoothing, ..CrossSettings::default() };
         let cross = bake_cross(&plant, &lighting, &settings);
         prop_assert_eq!(cross.textures.color[0].width, 64);
         prop_assert!(cross.transmission.is_finite());

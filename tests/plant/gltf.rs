@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use canopy::plant::gltf::{GltfOptions, PlantError, PlantReport, Warning, WarningKind, load_plant};
-use canopy::plant::texture::{alpha_tested_mips, fade_alpha};
+use canopy::plant::texture::{AlphaFade, alpha_tested_mips, fade_alpha};
 use canopy::plant::{Gloss, LeafColors, LeafKind, PartKind, Plant};
 use glam::{Vec2, Vec3};
 use proptest::prelude::*;
@@ -606,7 +606,7 @@ fn real_trees_have_their_triangles() {
         let leaf = plant.parts[1].material.base_color_texture.clone().expect("a leaf texture");
         assert!(warnings.iter().all(|w| w.kind == WarningKind::Repaired), "{warnings:?}");
 
-        let chain = alpha_tested_mips(&fade_alpha(&leaf, 0.5));
+        let chain = alpha_tested_mips(&fade_alpha(&leaf, 0.5, AlphaFade::PerLeaf));
         for level in 1..=7 {
             for threshold in [0.5, 0.6, 0.7, 0.8, 0.9, 0.95] {
                 let (drawn, wanted) = (chain.drawn_coverage(level, threshold), chain.drawn_coverage(0, threshold));
