@@ -10,6 +10,7 @@ use glam::{Vec2, Vec3};
 use proptest::prelude::*;
 
 use super::texture::leaves;
+use crate::support::data::data;
 use crate::support::glb::TreeFile;
 
 /// Builds a small GLB file piece by piece.
@@ -516,16 +517,6 @@ proptest! {
     }
 }
 
-/// The folder of real data, or `None` with a word about what is skipped.
-fn data(relative: &str) -> Option<PathBuf> {
-    let path = std::env::var_os("CANOPY_DATA").map(|folder| PathBuf::from(folder).join(relative));
-    let found = path.filter(|path| path.exists());
-    if found.is_none() {
-        println!("skipped: no {relative}");
-    }
-    found
-}
-
 fn files_below(folder: &Path) -> Vec<PathBuf> {
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).expect("a readable folder") {
@@ -563,10 +554,9 @@ const FATAL: [&str; 17] = [
 ];
 
 #[test]
+#[ignore = "needs the data folder CANOPY_DATA"]
 fn broken_files_never_panic_and_unusable_ones_are_refused() {
-    let Some(folder) = data("gltf-broken") else {
-        return;
-    };
+    let folder = data("gltf-broken");
     let mut read = 0;
     for path in files_below(&folder) {
         if !path.extension().is_some_and(|extension| extension == "gltf" || extension == "glb") {
@@ -590,12 +580,11 @@ fn broken_files_never_panic_and_unusable_ones_are_refused() {
 }
 
 #[test]
+#[ignore = "needs the data folder CANOPY_DATA"]
 fn real_trees_have_their_triangles() {
     // Of the pine's 19,872 triangles 8 have no area.
     for (name, triangles, height) in [("oak", 13_806, 19.73), ("aspen", 7_200, 21.61), ("pine", 19_864, 15.59)] {
-        let Some(path) = data(&format!("trees/{name}-medium.glb")) else {
-            return;
-        };
+        let path = data(&format!("trees/{name}-medium.glb"));
         let (plant, warnings) = load_plant(&path, &GltfOptions::default()).expect("a sound file");
         assert!(is_sound(&plant));
         let (wood, foliage) = (plant.triangle_count(PartKind::Wood), plant.triangle_count(PartKind::Foliage));

@@ -111,30 +111,48 @@ impl Progress for Speaker {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
+    use std::path::PathBuf;
 
     use super::*;
 
-    #[test]
-    fn a_scene_is_given_up_when_nobody_listens() -> Result<(), Box<dyn std::error::Error>> {
-        let folder = tempfile::tempdir()?;
+    /// A scene of many plants.
+    fn many(folder: &tempfile::TempDir) -> std::io::Result<PathBuf> {
         let path = folder.path().join("many.ron");
         let species =
             r#"(name: "a", lighting: Local, plant: Grown(form: Broadleaf, individuals: 16, triangles: 5000))"#;
         let place = "place: (latitude: 48, longitude: 9), quality: (cross_resolution: 64)";
         let trees = "trees: Scattered(stems_per_hectare: 100)";
         std::fs::write(&path, format!("(terrain: Flat(size: 100), species: [{species}], {trees}, {place})"))?;
-        let Job { line, thread, .. } = Job::start(LoadScene::new(path))?;
+        Ok(path)
+    }
+
+    #[test]
+    fn a_scene_is_given_up_when_nobody_listens() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let Job { line, thread, .. } = Job::start(LoadScene::new(many(&folder)?))?;
         let at_plants = |line: &Line| {
             let said = line.lock().unwrap_or_else(PoisonError::into_inner);
             said.iter().any(|said| matches!(said, Said::Begin(step, _) if step == "Plants"))
         };
         while !at_plants(&line) && !thread.is_finished() {
-            thread::sleep(Duration::from_millis(1));
+            thread::yield_now();
         }
         drop(line);
         let outcome = thread.join().map_err(|_| "a panic")?;
         assert!(matches!(outcome, Err(AppError::Cancelled)), "{:?}", outcome.err());
+        Ok(())
+    }
+
+    #[test]
+    fn a_job_that_is_dropped_waits_for_nobody() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let job = Job::start(LoadScene::new(many(&folder)?))?;
+        // While the line is held its thread cannot end, for it has something to say first.
+        let line = job.line.clone();
+        let held = line.lock().unwrap_or_else(PoisonError::into_inner);
+        drop(job);
+        assert_eq!(Arc::strong_count(&line), 2, "the thread is still at it");
+        drop(held);
         Ok(())
     }
 
