@@ -2,6 +2,7 @@
 
 mod foliage;
 mod pictures;
+mod plate;
 mod plugins;
 mod shadows;
 mod world;

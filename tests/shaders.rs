@@ -239,9 +239,14 @@ fn gpu_structs_are_what_the_shaders_think() {
             indirect_sun_zenith,
             indirect_sun_color,
             indirect_sun_mean,
+            ambient_term,
         }
     );
-    twin!(layouts, "Part", PartUniform { base_color, realigned, transmission, specular_reflectance, roughness });
+    twin!(
+        layouts,
+        "Part",
+        PartUniform { base_color, realigned, transmission, specular_reflectance, roughness, ambient_term }
+    );
     twin!(
         layouts,
         "Transfer",

@@ -168,7 +168,8 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         );
     }
     let sunlit = mix(1.0, hot_spot(surface.viewer), smoothstep(0.25, 0.85, ground.surrounding_cover));
-    let among = select(leaf_visibility(properties.b), sunlit, by_transfer);
+    let dimmed = select(1.0, leaf_visibility(properties.b), variants[variant].ambient_term == 1u);
+    let among = select(dimmed, sunlit, by_transfer);
     visibility *= mix(1.0, among, foliage);
     var color = shade(surface, visibility, sky);
     color = mix(color, vec3(0.2, 0.35, 1.0) * dot(color, vec3(0.5)), 0.6 * frame.level_tint);

@@ -22,6 +22,8 @@ struct Part {
     transmission: vec3<f32>,
     specular_reflectance: f32,
     roughness: f32,
+    // 1 where the ambient visibility is the ambient term of a density field, else 0.
+    ambient_term: u32,
 }
 
 @group(2) @binding(0) var color_texture: texture_2d<f32>;
@@ -209,7 +211,7 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
     }
 #ifdef FOLIAGE
 #ifndef TRANSFER
-    visibility *= leaf_visibility(look.ambient_visibility);
+    visibility *= select(1.0, leaf_visibility(look.ambient_visibility), part.ambient_term == 1u);
 #endif
 #endif
 #ifdef SUN_HARMONICS

@@ -172,6 +172,15 @@ impl BakedLighting {
         matches!(self, Self::Expressive(lighting) if lighting.no_surface.is_none())
     }
 
+    /// Whether k_a is known of the leaves: an ambient term that is not 1 throughout. By it the shaders take light from the sun
+    /// too, for the leaves around a leaf that the shadow maps are too coarse for.
+    pub fn has_ambient_term(&self) -> bool {
+        match self {
+            Self::Expressive(lighting) => lighting.ambient.iter().flatten().any(|ambient| *ambient < 1.0),
+            Self::Local | Self::Transfer(_) => false,
+        }
+    }
+
     /// What the user ought to know of the bake.
     pub fn warning(&self) -> Option<String> {
         match self {

@@ -76,6 +76,10 @@ pub struct VariantUniform {
     pub indirect_sun_color: [f32; 3],
     /// Its first coefficient.
     pub indirect_sun_mean: f32,
+    /// 1 where its ambient visibility is the ambient term of a density field, else 0.
+    pub ambient_term: u32,
+    /// WGSL rounds the size up to 16 bytes.
+    pub padding: [u32; 3],
 }
 
 /// `Part` of `shaders/forest/model.wgsl`.
@@ -92,8 +96,10 @@ pub struct PartUniform {
     pub specular_reflectance: f32,
     /// Root mean square slope of its facets.
     pub roughness: f32,
+    /// 1 where its ambient visibility is the ambient term of a density field, else 0.
+    pub ambient_term: u32,
     /// WGSL rounds the size up to 16 bytes.
-    pub padding: [f32; 3],
+    pub padding: [f32; 2],
 }
 
 /// What the shaders know of each plant.
@@ -139,6 +145,8 @@ fn variant(index: usize, plant: &BakedPlant, size: &VariantSize, light_layer: us
         indirect_sun_zenith: zenith,
         indirect_sun_color: scattered_tint(&plant.plant.leaf_colors()).to_array(),
         indirect_sun_mean: mean,
+        ambient_term: u32::from(plant.lighting.has_ambient_term()),
+        padding: [0; 3],
     }
 }
 
@@ -156,6 +164,7 @@ pub fn part_uniform(material: &PlantMaterial, lighting: &BakedLighting) -> PartU
         transmission: material.transmission.to_array(),
         specular_reflectance: gloss.reflectance,
         roughness: gloss.roughness,
-        padding: [0.0; 3],
+        ambient_term: u32::from(lighting.has_ambient_term()),
+        padding: [0.0; 2],
     }
 }
