@@ -143,7 +143,9 @@ fn detail_normal(normal: vec3<f32>, relative: vec3<f32>, uv: vec2<f32>) -> vec3<
     let t = p2 * duv1.x + p1 * duv2.x;
     // The image's v runs down, the map's green runs up.
     let b = -(p2 * duv1.y + p1 * duv2.y);
-    let scale = inverseSqrt(max(max(dot(t, t), dot(b, b)), 1e-30));
+    // Both are gradients times this volume, whose sign is that of the seen side: pixels count downwards.
+    let volume = dot(normal, cross(dp1, dp2));
+    let scale = sign(volume) * inverseSqrt(max(max(dot(t, t), dot(b, b)), 1e-30));
     return normalize(normal * texel.z + (t * texel.x + b * texel.y) * scale);
 }
 

@@ -15,6 +15,7 @@ use canopy::{
     scene::Pose,
 };
 use glam::{DVec3, Vec2, Vec3};
+use image::{Rgba, RgbaImage};
 
 use super::{SIZE, again, renderer};
 use crate::support::{
@@ -98,6 +99,33 @@ fn a_leaf_without_an_ambient_term_has_the_light_of_a_board() {
         for (what, fade) in [("model", 1e4), ("cross", 0.0)] {
             let ratio = seen(&leaf, fade, true, hour) / board;
             assert!((ratio - 1.0).abs() < 0.02, "{hour}, {what}: {ratio} of the board's light");
+        }
+    }
+}
+
+/// The texel of a normal map that leans to the east and the south, and the same normal in the world.
+fn leaning() -> (RgbaImage, Vec3) {
+    let normal = Vec3::new(0.35, -0.45, 0.82).normalize();
+    let texel = (normal * 127.5 + 127.5).to_array().map(|value| value.round() as u8);
+    let image = RgbaImage::from_pixel(8, 8, Rgba([texel[0], texel[1], texel[2], 255]));
+    (image, Vec3::new(normal.x, normal.z, -normal.y))
+}
+
+/// Those of bark were once taken for their negative.
+#[test]
+fn a_normal_map_leans_the_surface_as_its_normals_would() {
+    let _gpu = gpu();
+    let (map, normal) = leaning();
+    let mapped = PlantMaterial { normal_texture: Some(Arc::new(map)), ..material() };
+    for (kind, above) in [(PartKind::Wood, true)] {
+        for hour in HOURS {
+            let of =
+                |normal: Vec3, material: &PlantMaterial| seen(&plate(kind, normal, material.clone()), 1e4, above, hour);
+            let (flat, leaning, by_map) = (of(Vec3::Y, &material()), of(normal, &material()), of(Vec3::Y, &mapped));
+            // A control: it matters.
+            assert!((leaning / flat - 1.0).abs() > 0.03, "{kind:?} {hour}: {leaning} leaning, {flat} flat");
+            let ratio = by_map / leaning;
+            assert!((ratio - 1.0).abs() < 0.02, "{kind:?}, above {above}, {hour}: {ratio}; {by_map} of {flat} flat");
         }
     }
 }
