@@ -26,7 +26,8 @@ use naga::{
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 
 /// All that the pipelines switch on or off.
-const DEFINES: [&str; 6] = ["FOLIAGE", "ALPHA_TO_COVERAGE", "TRANSFER", "TRANSFER_COLOR", "SUN_HARMONICS", "PLAIN_TOO"];
+const DEFINES: [&str; 7] =
+    ["FOLIAGE", "ALPHA_TO_COVERAGE", "NORMAL_MAP", "TRANSFER", "TRANSFER_COLOR", "SUN_HARMONICS", "PLAIN_TOO"];
 
 /// All combinations of [`DEFINES`]; the last three mean something with transfer only.
 fn variants() -> impl Iterator<Item = Vec<&'static str>> {

@@ -131,6 +131,7 @@ fn hash(p: vec3<f32>) -> f32 {
     return f32((h ^ (h >> 15u)) >> 8u) / 16777216.0;
 }
 
+#ifdef NORMAL_MAP
 // Tangent-space detail without stored tangents [Schüler 2013, "Normal Mapping Without Precomputed Tangents"].
 fn detail_normal(normal: vec3<f32>, relative: vec3<f32>, uv: vec2<f32>) -> vec3<f32> {
     let texel = textureSample(normal_texture, part_sampler, uv).xyz * 2.0 - 1.0;
@@ -148,12 +149,17 @@ fn detail_normal(normal: vec3<f32>, relative: vec3<f32>, uv: vec2<f32>) -> vec3<
     let scale = sign(volume) * inverseSqrt(max(max(dot(t, t), dot(b, b)), 1e-30));
     return normalize(normal * texel.z + (t * texel.x + b * texel.y) * scale);
 }
+#endif
 
 @fragment
 fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
     let look = unpack_look(in.look);
     let texel = textureSample(color_texture, part_sampler, in.uv);
-    var normal = normalize(in.normal);
+    let smooth_normal = normalize(in.normal);
+    var normal = smooth_normal;
+#ifdef NORMAL_MAP
+    normal = detail_normal(smooth_normal, in.relative, in.uv);
+#endif
     var coverage = 1.0;
 #ifdef FOLIAGE
     let across = fwidth(in.uv);
@@ -170,11 +176,12 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
         discard;
     }
 #endif
-    // A leaf has two sides, and its own normal is that of the side that is seen.
-    let behind = (part.realigned < 0.5) & (dot(normal, in.relative) > 0.0);
-    normal = select(normal, -normal, behind);
+    // A leaf has two sides, and its own normal is that of the side that is seen. A normal that points out of the crown is none
+    // that a map of the leaf could lean.
+    let is_leafs = part.realigned < 0.5;
+    let behind = is_leafs & (dot(smooth_normal, in.relative) > 0.0);
+    normal = select(smooth_normal, select(normal, -normal, behind), is_leafs);
 #else
-    normal = detail_normal(normal, in.relative, in.uv);
     let keep = hash(vec3(in.uv * 97.0, look.height * 31.0));
     if WHOLE + (1.0 - WHOLE) * keep < in.threshold - 1e-4 {
         discard;

@@ -111,13 +111,13 @@ fn leaning() -> (RgbaImage, Vec3) {
     (image, Vec3::new(normal.x, normal.z, -normal.y))
 }
 
-/// Those of bark were once taken for their negative.
+/// Maps of leaves were uploaded and never sampled, those of bark were taken for their negative.
 #[test]
 fn a_normal_map_leans_the_surface_as_its_normals_would() {
     let _gpu = gpu();
     let (map, normal) = leaning();
     let mapped = PlantMaterial { normal_texture: Some(Arc::new(map)), ..material() };
-    for (kind, above) in [(PartKind::Wood, true)] {
+    for (kind, above) in [(PartKind::Wood, true), (PartKind::Foliage, true), (PartKind::Foliage, false)] {
         for hour in HOURS {
             let of =
                 |normal: Vec3, material: &PlantMaterial| seen(&plate(kind, normal, material.clone()), 1e4, above, hour);

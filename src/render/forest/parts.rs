@@ -33,10 +33,31 @@ pub struct GpuMesh {
     pub index_count: u32,
 }
 
+/// What a part's pipeline depends on beside its light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct PartSurface {
+    /// Wood or foliage.
+    pub kind: PartKind,
+    /// Whether its material has a normal map.
+    pub normal_map: bool,
+}
+
+impl PartSurface {
+    /// All of them, wood first.
+    pub const ALL: [Self; 4] = [
+        Self { kind: PartKind::Wood, normal_map: false },
+        Self { kind: PartKind::Wood, normal_map: true },
+        Self { kind: PartKind::Foliage, normal_map: false },
+        Self { kind: PartKind::Foliage, normal_map: true },
+    ];
+}
+
 /// One part of a plant.
 pub struct GpuPart {
     /// Wood or foliage.
     pub kind: PartKind,
+    /// Whether its material has a normal map.
+    pub normal_map: bool,
     /// [`PartUniform`](super::PartUniform) of group 2.
     pub(super) uniform: Buffer,
     /// The full model.
@@ -63,6 +84,13 @@ pub enum PartLight {
         /// What the sun comes by.
         sun: SunLight,
     },
+}
+
+impl GpuPart {
+    /// What its pipeline depends on beside its light.
+    pub fn surface(&self) -> PartSurface {
+        PartSurface { kind: self.kind, normal_map: self.normal_map }
+    }
 }
 
 impl PartLight {
@@ -112,6 +140,7 @@ pub fn upload_parts(
         );
         parts.push(GpuPart {
             kind: part.kind,
+            normal_map: material.normal_texture.is_some(),
             uniform,
             model: upload_mesh(&part.mesh, &vertices(&part.mesh, &plant.lighting, index), device),
             proxy: upload_mesh(proxy, &vertices(proxy, &BakedLighting::Local, index), device),

@@ -11,11 +11,8 @@ use bevy::{
     },
 };
 
-use super::{ForestPipelines, GpuForests, PLANES, PreparedForests, crosses::CrossLight, parts::PartLight};
-use crate::{
-    plant::PartKind,
-    render::{components::CanopyCamera, frame::FrameBindGroup},
-};
+use super::{ForestPipelines, GpuForests, PLANES, PreparedForests, crosses::CrossLight};
+use crate::render::{components::CanopyCamera, frame::FrameBindGroup};
 
 /// Vertices that the cross shader pulls for one tree.
 pub const VERTICES_A_CROSS: u32 = 6 * PLANES as u32;
@@ -32,7 +29,7 @@ pub fn forest_pass(
 ) {
     let frame = frame.of(view.entity());
     let (target, depth, camera) = view.into_inner();
-    let (Some(frame), Some(current)) = (frame, pipelines.current) else { return };
+    let (Some(frame), Some(current)) = (frame, &pipelines.current) else { return };
     let something = forests.iter().any(|(entity, _)| {
         prepared.get(entity).is_some_and(|forest| forest.lists.model_count() + forest.lists.cross_count() > 0)
     });
@@ -43,15 +40,11 @@ pub fn forest_pass(
         let Some(pipeline) = ready(id) else { return };
         crosses.push((light, pipeline));
     }
-    let mut models = Vec::with_capacity(2 * PartLight::ALL.len());
-    for (light, ids) in PartLight::ALL.into_iter().zip(current.models) {
-        for (kind, id) in [PartKind::Wood, PartKind::Foliage].into_iter().zip(ids.into_iter().flatten()) {
-            let Some(pipeline) = ready(id) else { return };
-            models.push((kind, light, pipeline));
-        }
+    let mut models = Vec::with_capacity(current.models.len());
+    for &(surface, light, id) in &current.models {
+        let Some(pipeline) = ready(id) else { return };
+        models.push((surface, light, pipeline));
     }
-    // All wood first: what it hides of the leaves is not shaded.
-    models.sort_by_key(|(kind, ..)| *kind == PartKind::Foliage);
     if !something {
         return;
     }
@@ -73,13 +66,13 @@ pub fn forest_pass(
         let Some(lists) = prepared.get(entity) else { continue };
         pass.set_bind_group(0, frame, &[]);
         pass.set_bind_group(1, &lists.bind_group, &[0]);
-        for &(kind, light, pipeline) in &models {
+        for &(surface, light, pipeline) in &models {
             pass.set_render_pipeline(pipeline);
             for (range, parts) in lists.lists.models.iter().zip(&forest.parts) {
                 if range.is_empty() {
                     continue;
                 }
-                for part in parts.iter().filter(|part| part.kind == kind && part.light == light) {
+                for part in parts.iter().filter(|part| part.surface() == surface && part.light == light) {
                     if part.model.index_count == 0 {
                         continue;
                     }

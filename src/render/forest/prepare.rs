@@ -24,7 +24,7 @@ use glam::{DVec3, IVec2};
 use super::{
     crosses::CrossLight,
     layouts::ForestLayouts,
-    parts::PartLight,
+    parts::{PartLight, PartSurface},
     resources::{GpuForest, GpuForests},
     uniforms::ForestViewUniform,
     vertex::PlantVertex,
@@ -166,7 +166,7 @@ pub fn prepare_view_lists(
 /// What a pipeline of the forest pass depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum PipelineKey {
-    Model { kind: PartKind, light: PartLight, format: TextureFormat, samples: u32 },
+    Model { surface: PartSurface, light: PartLight, format: TextureFormat, samples: u32 },
     Cross { light: CrossLight, format: TextureFormat, samples: u32 },
 }
 
@@ -179,10 +179,10 @@ pub struct ForestPipelines {
 }
 
 /// Pipelines of one view.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct CurrentPipelines {
-    /// Wood and foliage in each light of [`PartLight::ALL`] that a plant has; `None` for the others.
-    pub models: [Option<[CachedRenderPipelineId; 2]>; PartLight::ALL.len()],
+    /// Of full models, for each surface and light that a part has.
+    pub models: Vec<(PartSurface, PartLight, CachedRenderPipelineId)>,
     /// Crosses, by [`CrossLight::ALL`]; `None` for those that no forest has.
     pub crosses: [Option<CachedRenderPipelineId>; 3],
 }
@@ -208,13 +208,16 @@ pub fn prepare_pipelines(
             .entry(key)
             .or_insert_with(|| cache.queue_render_pipeline(describe(key, &frame_layout.0, &layouts, &shaders)))
     };
-    let models = PartLight::ALL.map(|light| {
+    // All wood first: what it hides of the leaves is not shaded.
+    let mut models = Vec::new();
+    for (surface, light) in
+        PartSurface::ALL.into_iter().flat_map(|surface| PartLight::ALL.map(|light| (surface, light)))
+    {
         let mut parts = forests.iter().flat_map(|(_, forest)| forest.parts.iter().flatten());
-        parts.any(|part| part.light == light).then(|| {
-            [PartKind::Wood, PartKind::Foliage]
-                .map(|kind| pipeline(PipelineKey::Model { kind, light, format, samples }))
-        })
-    });
+        if parts.any(|part| part.surface() == surface && part.light == light) {
+            models.push((surface, light, pipeline(PipelineKey::Model { surface, light, format, samples })));
+        }
+    }
     let crosses = CrossLight::ALL.map(|light| {
         let wanted = forests.iter().any(|(_, forest)| forest.cross_light == light);
         wanted.then(|| pipeline(PipelineKey::Cross { light, format, samples }))
@@ -229,8 +232,8 @@ fn describe(
     shaders: &CanopyShaders,
 ) -> RenderPipelineDescriptor {
     let (label, file, group, buffers, format, samples, foliage, cull_mode) = match key {
-        PipelineKey::Model { kind, format, samples, .. } => {
-            let foliage = kind == PartKind::Foliage;
+        PipelineKey::Model { surface, format, samples, .. } => {
+            let foliage = surface.kind == PartKind::Foliage;
             let cull = (!foliage).then_some(Face::Back);
             let group = layouts.part.clone();
             let label = if foliage { "canopy_foliage" } else { "canopy_wood" };
@@ -243,6 +246,9 @@ fn describe(
     let mut defs: Vec<ShaderDefVal> = Vec::new();
     if foliage {
         defs.push("FOLIAGE".into());
+    }
+    if matches!(key, PipelineKey::Model { surface, .. } if surface.normal_map) {
+        defs.push("NORMAL_MAP".into());
     }
     let mut layout = vec![frame.clone(), layouts.instances.clone(), group];
     match key {
