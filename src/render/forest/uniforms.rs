@@ -168,3 +168,35 @@ pub fn part_uniform(material: &PlantMaterial, lighting: &BakedLighting) -> PartU
         padding: [0.0; 2],
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::{
+        bake::{BakeSettings, bake_plant, implicit::ImplicitSettings, lighting::LightingSettings},
+        plant::grow::{GrowParameters, grow},
+    };
+
+    #[test]
+    fn a_share_of_1_of_their_own_normals_lights_leaves_as_leaves() -> Result<(), Box<dyn std::error::Error>> {
+        let plant = Arc::new(grow(&GrowParameters::broadleaf(), 1, 5000)?);
+        let baked = |lighting| bake_plant(plant.clone(), &BakeSettings { lighting, ..BakeSettings::default() }, None).0;
+        let expressive =
+            |own_normal| baked(LightingSettings::Expressive(ImplicitSettings { own_normal, ..Default::default() }));
+        let (local, own, half) = (baked(LightingSettings::Local), expressive(1.0), expressive(0.5));
+        for (part, source) in plant.parts.iter().enumerate() {
+            let realigned = |plant: &BakedPlant| part_uniform(&source.material, &plant.lighting).realigned;
+            assert_eq!([realigned(&local), realigned(&own), realigned(&half)], [0.0, 0.0, 1.0]);
+            assert_eq!(own.lighting.normals(part), None, "the leaves keep their own");
+        }
+        // Crosses too: their texels' normals are those of leaves, of which the seen side counts.
+        let normals = |plant: &BakedPlant| -> Vec<[u8; 2]> {
+            let textures = plant.cross.textures.properties.iter();
+            textures.flat_map(|chain| chain.levels[0].chunks_exact(4).map(|texel| [texel[0], texel[1]])).collect()
+        };
+        assert!(normals(&own) == normals(&local) && normals(&half) != normals(&local));
+        Ok(())
+    }
+}
