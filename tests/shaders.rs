@@ -241,12 +241,23 @@ fn gpu_structs_are_what_the_shaders_think() {
             indirect_sun_color,
             indirect_sun_mean,
             ambient_term,
+            lobe_gain,
+            lobe_limit,
         }
     );
     twin!(
         layouts,
         "Part",
-        PartUniform { base_color, realigned, transmission, specular_reflectance, roughness, ambient_term }
+        PartUniform {
+            base_color,
+            realigned,
+            transmission,
+            specular_reflectance,
+            roughness,
+            ambient_term,
+            lobe_gain,
+            lobe_limit
+        }
     );
     twin!(
         layouts,

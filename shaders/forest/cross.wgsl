@@ -129,6 +129,8 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.isotropic_fraction = isotropic_fraction(variant, level) * foliage;
     surface.specular_reflectance = reflectance * foliage;
     surface.roughness = variants[variant].roughness;
+    surface.lobe_gain = variants[variant].lobe_gain;
+    surface.lobe_limit = variants[variant].lobe_limit;
     surface.gloss_isotropy = max(surface.isotropic_fraction, variants[variant].realigned);
     let ground = sample_ground(in.relative);
     let by_transfer = variants[variant].radiance_transfer == 1u;

@@ -58,6 +58,9 @@ struct Variant {
     indirect_sun_mean: f32,
     // 1 where its ambient visibility is the ambient term of a density field, else 0.
     ambient_term: u32,
+    // As in `Surface`.
+    lobe_gain: f32,
+    lobe_limit: f32,
 }
 
 struct Instance {

@@ -24,6 +24,9 @@ struct Part {
     roughness: f32,
     // 1 where the ambient visibility is the ambient term of a density field, else 0.
     ambient_term: u32,
+    // As in `Surface`.
+    lobe_gain: f32,
+    lobe_limit: f32,
 }
 
 @group(2) @binding(0) var color_texture: texture_2d<f32>;
@@ -195,6 +198,8 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
     surface.viewer = -normalize(in.relative);
     surface.specular_reflectance = part.specular_reflectance;
     surface.roughness = part.roughness;
+    surface.lobe_gain = part.lobe_gain;
+    surface.lobe_limit = part.lobe_limit;
     // A pixel that covers half a texture of leaves covers several of them, and each faces elsewhere: highlights of one would
     // sparkle. Normals that point out of the crown are no leaf's at all.
     surface.gloss_isotropy = max(saturate(2.0 * max(across.x, across.y)), part.realigned);

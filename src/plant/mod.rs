@@ -14,7 +14,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 use image::RgbaImage;
 
-pub use gloss::Gloss;
+pub use gloss::{Gloss, lobe_gain, lobe_peak};
 pub use optics::LeafColors;
 
 /// One individual plant in its own frame: metres, Y up, the trunk's foot at the origin.

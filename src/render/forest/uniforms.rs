@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use super::transfer::scattered_tint;
 use crate::{
     bake::{BakedPlant, billboard::SPREAD_LEVELS, lighting::BakedLighting},
-    plant::PlantMaterial,
+    plant::{PlantMaterial, lobe_gain, lobe_peak},
     render::cull::VariantSize,
 };
 
@@ -78,8 +78,12 @@ pub struct VariantUniform {
     pub indirect_sun_mean: f32,
     /// 1 where its ambient visibility is the ambient term of a density field, else 0.
     pub ambient_term: u32,
+    /// Strength of the lobe of its gloss that carries a share of 1 ([`lobe_gain`]).
+    pub lobe_gain: f32,
+    /// Greatest strength of the lobe where nothing else reflects or transmits (one over [`lobe_peak`]).
+    pub lobe_limit: f32,
     /// WGSL rounds the size up to 16 bytes.
-    pub padding: [u32; 3],
+    pub padding: u32,
 }
 
 /// `Part` of `shaders/forest/model.wgsl`.
@@ -98,8 +102,10 @@ pub struct PartUniform {
     pub roughness: f32,
     /// 1 where its ambient visibility is the ambient term of a density field, else 0.
     pub ambient_term: u32,
-    /// WGSL rounds the size up to 16 bytes.
-    pub padding: [f32; 2],
+    /// Strength of the lobe of its gloss that carries a share of 1 ([`lobe_gain`]).
+    pub lobe_gain: f32,
+    /// Greatest strength of the lobe where nothing else reflects or transmits (one over [`lobe_peak`]).
+    pub lobe_limit: f32,
 }
 
 /// What the shaders know of each plant.
@@ -146,7 +152,9 @@ fn variant(index: usize, plant: &BakedPlant, size: &VariantSize, light_layer: us
         indirect_sun_color: scattered_tint(&plant.plant.leaf_colors()).to_array(),
         indirect_sun_mean: mean,
         ambient_term: u32::from(plant.lighting.has_ambient_term()),
-        padding: [0; 3],
+        lobe_gain: lobe_gain(gloss.roughness),
+        lobe_limit: lobe_peak(gloss.roughness).recip(),
+        padding: 0,
     }
 }
 
@@ -165,7 +173,8 @@ pub fn part_uniform(material: &PlantMaterial, lighting: &BakedLighting) -> PartU
         specular_reflectance: gloss.reflectance,
         roughness: gloss.roughness,
         ambient_term: u32::from(lighting.has_ambient_term()),
-        padding: [0.0; 2],
+        lobe_gain: lobe_gain(gloss.roughness),
+        lobe_limit: lobe_peak(gloss.roughness).recip(),
     }
 }
 
