@@ -155,7 +155,7 @@ fn detail_normal(normal: vec3<f32>, relative: vec3<f32>, uv: vec2<f32>) -> vec3<
 #endif
 
 @fragment
-fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
+fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let look = unpack_look(in.look);
     let texel = textureSample(color_texture, part_sampler, in.uv);
     let smooth_normal = normalize(in.normal);
@@ -166,8 +166,6 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
     var coverage = 1.0;
 #ifdef FOLIAGE
     let across = fwidth(in.uv);
-#endif
-#ifdef FOLIAGE
     let alpha = texel.a;
 #ifdef ALPHA_TO_COVERAGE
     coverage = clamp((alpha - in.threshold) / max(fwidth(alpha), 1e-4) + 0.5, 0.0, 1.0);
@@ -181,9 +179,9 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
 #endif
     // A leaf has two sides, and its own normal is that of the side that is seen. A normal that points out of the crown is none
     // that a map of the leaf could lean.
-    let is_leafs = part.realigned < 0.5;
-    let behind = is_leafs & (dot(smooth_normal, in.relative) > 0.0);
-    normal = select(smooth_normal, select(normal, -normal, behind), is_leafs);
+    let own_normal = part.realigned < 0.5;
+    let behind = own_normal & (dot(smooth_normal, in.relative) > 0.0);
+    normal = select(smooth_normal, select(normal, -normal, behind), own_normal);
 #else
     let keep = hash(vec3(in.uv * 97.0, look.height * 31.0));
     if WHOLE + (1.0 - WHOLE) * keep < in.threshold - 1e-4 {
