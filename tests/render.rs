@@ -2,6 +2,8 @@
 
 mod foliage;
 mod pictures;
+mod plate;
+mod plugins;
 mod shadows;
 mod world;
 
