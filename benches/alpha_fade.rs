@@ -10,7 +10,7 @@
 //! A second table asks what the order costs where nothing fades: the whole crown in each mip of its crosses, against the mean
 //! of what the finest level shows there.
 //!
-//! Results: `docs/measurements/alpha_fade.md`.
+//! Results: `docs/measurements/alpha-fade.md`.
 
 use std::sync::Arc;
 

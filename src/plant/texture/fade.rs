@@ -24,7 +24,7 @@ pub enum AlphaFade {
     /// As published [Franzke 2005, 4.3.3, fig. 4.15]: alpha falls with the distance from the centre of the picture, so a crown
     /// grows from the inside outwards, and its outermost leaves are the last to appear. Pops less: the largest step of a
     /// change of level is 14 to 27 % smaller. Costs 3 to 8 % of error in the mips of whole crosses, at all distances beyond the
-    /// change (`docs/measurements/alpha_fade.md`).
+    /// change (`docs/measurements/alpha-fade.md`).
     CenterOut,
 }
 

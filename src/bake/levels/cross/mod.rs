@@ -122,7 +122,7 @@ pub struct CrossSettings {
     /// itself; larger: the crown is lit as a rounded body. Either way [`Cross::spread`] keeps what a mean loses.
     pub normal_smoothing: f32,
     /// Which texels appear first while a cross fades in. The default is truer where nothing fades, the published order pops
-    /// less (`docs/measurements/alpha_fade.md`).
+    /// less (`docs/measurements/alpha-fade.md`).
     pub fade: AlphaFade,
 }
 
