@@ -4,6 +4,7 @@ use std::{fmt::Write, path::Path, sync::Arc};
 
 use canopy::{
     bake::BakedPlant,
+    components::Sun,
     cull::cascades::{CascadeBox, cascade_radii},
     light::sun::SunPosition,
     math::srgb_to_linear,

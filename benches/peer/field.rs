@@ -4,6 +4,7 @@ use std::{path::Path, sync::Arc};
 
 use canopy::{
     bake::{BakeSettings, BakedPlant, bake_plant, cache::Cache},
+    components::Sun,
     light::{
         LightState,
         atmosphere::{Atmosphere, AtmosphereParams},
@@ -12,7 +13,6 @@ use canopy::{
         gltf::{GltfOptions, load_plant},
         grow::{GrowParameters, grow},
     },
-    render::daylight::Sun,
     scatter::{
         Area, CoverMap, PackedStand, PlacementRules, PlantSize, Sequence, SizeRule, SpeciesRule, cover_map,
         packed::DEFAULT_CELL_SIZE, place,

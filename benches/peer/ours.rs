@@ -6,6 +6,7 @@ use anyhow::Context;
 use canopy::{
     app::Renderer,
     bake::BakedPlant,
+    components::Sun,
     lod::{FadeBand, Levels},
     render::components::{Forest, Ground, SunShadowSettings},
     scene::Viewpoint,
@@ -70,10 +71,7 @@ impl Ours {
 
     /// Sets the time; the light follows within the frame.
     pub fn light(&mut self, sky: &Sun) {
-        let world = self.0.app().world_mut();
-        if world.get_resource() != Some(sky) {
-            world.insert_resource(sky.clone());
-        }
+        self.0.set_sun(sky.clone());
     }
 
     /// Draws a frame and waits for the device.
