@@ -1,6 +1,6 @@
 //! Question: how far is the light of `expressive` from the truth, and with which constants of the shader is it nearest?
 //!
-//! The shader (`scattered` and `leaf_visibility` in `shaders/forest/instance.wgsl`, `even_sky` and `shade` in
+//! The shader (`with_indirect_ambient` and `leaf_visibility` in `shaders/forest/instance.wgsl`, `even_sky` and `shade` in
 //! `shaders/common/lighting.wgsl`) turns k_a and a crown's normal into light; here is its twin. Points lie evenly over the
 //! leaves, each with its two sides, and count by how much of them is seen from all around. The truth is their exitant
 //! radiance by the path tracer under the sky alone and under the sun alone, all bounces included.
@@ -72,13 +72,13 @@ impl Constants {
             let (line, _) = line.split_once(';')?;
             Some(line.split(|c: char| c != '.' && !c.is_ascii_digit()).filter_map(|word| word.parse().ok()).collect())
         };
-        let others = numbers("fn scattered(")?;
+        let others = numbers("fn with_indirect_ambient(")?;
         let sun = numbers("fn leaf_visibility(")?;
         Some(Self { others: *others.last()?, sun: sun.try_into().ok()? })
     }
 
-    /// Twin of `scattered`.
-    fn scattered(&self, k: f64) -> f64 {
+    /// Twin of `with_indirect_ambient`.
+    fn with_indirect_ambient(&self, k: f64) -> f64 {
         k + (1.0 - k) * self.others
     }
 
@@ -267,7 +267,7 @@ fn best(
 }
 
 fn sky(constants: &Constants, side: &Side) -> (f64, f64) {
-    (side.open_sky * constants.scattered(side.k), side.sky)
+    (side.open_sky * constants.with_indirect_ambient(side.k), side.sky)
 }
 
 fn sun(constants: &Constants, side: &Side, visibility: f64) -> (f64, f64) {

@@ -3,12 +3,12 @@
 use std::collections::HashMap;
 
 use canopy::bake::lighting::implicit::{
-    AmbientField, ImplicitBake, ImplicitSettings, NoSurface, NormalSource, StandPlant, SurfaceMesh, Weighting,
-    bake_implicit, bake_implicit_stand,
+    AmbientField, COARSE_SHARE, FINE_SHARE, ImplicitBake, ImplicitSettings, NoSurface, NormalSource, StandPlant,
+    SurfaceMesh, Weighting, bake_implicit, bake_implicit_stand,
 };
 use canopy::plant::grow::{GrowParameters, grow};
 use canopy::plant::{PartKind, Plant, PlantMaterial, PlantMesh, PlantPart};
-use glam::{DVec3, Quat, Vec2, Vec3};
+use glam::{DVec3, IVec3, Quat, Vec2, Vec3};
 
 const BOTH: [NormalSource; 2] = [NormalSource::NearestVertex, NormalSource::Gradient];
 
@@ -271,7 +271,7 @@ fn any_parameters_give_a_result_that_says_what_it_is() {
         let zero = bake(&tree, &ImplicitSettings { radius: Some(0.0), ..with(normals) });
         assert_eq!(zero.report.no_surface, Some(NoSurface::NoField));
         let own = bake(&tree, &ImplicitSettings { own_normal: 1.0, ..with(normals) });
-        assert!(own.normals[1].iter().all(|n| n.dot(Vec3::Z) > 0.9999));
+        assert!(own.normals[1].iter().all(|n| *n == Vec3::Z), "its own normals");
     }
 }
 
@@ -288,14 +288,86 @@ fn the_number_of_threads_does_not_matter() {
     }
 }
 
+/// A grown tree with about as much foliage as the trees of [Luft 2006, table 1] (56,952 and 56,250 triangles).
+fn tree_of_table_1(species: GrowParameters) -> Plant {
+    let species = GrowParameters { wood_share: 0.3, ..species };
+    let tree = grow(&species, 1, 81_400).expect("a tree");
+    let leaves = tree.triangle_count(PartKind::Foliage);
+    assert!((56_000..58_000).contains(&leaves), "{leaves}");
+    tree
+}
+
+/// The farthest that a vertex or the middle of a triangle of `from` lies from the mesh `to`, at most `limit`.
+fn farthest(from: &SurfaceMesh, to: &SurfaceMesh, limit: f32) -> f32 {
+    // Triangles by the cells of a lattice that their boxes touch, one `limit` larger.
+    let cell = |p: Vec3| (p / limit).floor().as_ivec3();
+    let mut lattice: HashMap<IVec3, Vec<[Vec3; 3]>> = HashMap::new();
+    for triangle in &to.triangles {
+        let corners = triangle.map(|corner| to.positions[corner as usize]);
+        let low = cell(corners.into_iter().reduce(Vec3::min).expect("three corners") - limit);
+        let high = cell(corners.into_iter().reduce(Vec3::max).expect("three corners") + limit);
+        for (x, y, z) in
+            (low.x..=high.x).flat_map(|x| (low.y..=high.y).flat_map(move |y| (low.z..=high.z).map(move |z| (x, y, z))))
+        {
+            lattice.entry(IVec3::new(x, y, z)).or_default().push(corners);
+        }
+    }
+    let middles =
+        from.triangles.iter().map(|t| t.iter().map(|&corner| from.positions[corner as usize]).sum::<Vec3>() / 3.0);
+    let places: Vec<Vec3> = from.positions.iter().copied().chain(middles).collect();
+    let distance = |place: Vec3| {
+        let near = lattice.get(&cell(place)).map_or(&[][..], Vec::as_slice);
+        near.iter().map(|corners| nearest_on(place, *corners).distance(place)).fold(limit, f32::min)
+    };
+    places.into_iter().map(distance).fold(0.0, f32::max)
+}
+
+/// The point of a triangle that is nearest to `p` [Ericson 2005, "Real-Time Collision Detection", 5.1.5].
+fn nearest_on(p: Vec3, [a, b, c]: [Vec3; 3]) -> Vec3 {
+    let on_edge = |from: Vec3, to: Vec3| {
+        let edge = to - from;
+        from + edge * ((p - from).dot(edge) / edge.length_squared().max(1e-30)).clamp(0.0, 1.0)
+    };
+    let normal = (b - a).cross(c - a);
+    let foot = p - normal * ((p - a).dot(normal) / normal.length_squared().max(1e-30));
+    let inside = [(a, b), (b, c), (c, a)].iter().all(|&(from, to)| (to - from).cross(foot - from).dot(normal) >= 0.0);
+    if inside {
+        return foot;
+    }
+    let edges = [on_edge(a, b), on_edge(b, c), on_edge(c, a)];
+    edges.into_iter().min_by(|a, b| a.distance(p).total_cmp(&b.distance(p))).expect("three edges")
+}
+
 #[test]
-fn a_share_of_the_surface_is_closed_and_small_enough() {
-    let tree = grow(&GrowParameters::broadleaf(), 1, 20_000).expect("a tree");
-    let leaves = tree.triangle_count(PartKind::Foliage) as f32;
-    for share in [canopy::bake::lighting::implicit::COARSE_SHARE, canopy::bake::lighting::implicit::FINE_SHARE] {
-        let settings = ImplicitSettings { surface_share: Some(share), ..ImplicitSettings::default() };
-        let surface = bake(&tree, &settings).surface.expect("a surface");
-        assert!(surface.triangles.len() as f32 <= share * leaves + 1.0, "{}", surface.triangles.len());
+fn the_shares_of_table_1_are_reached_and_stay_close_to_the_surface() {
+    for species in [GrowParameters::broadleaf(), GrowParameters::conifer()] {
+        let tree = tree_of_table_1(species);
+        let leaves = tree.triangle_count(PartKind::Foliage) as f32;
+        for (share, room) in [(COARSE_SHARE, 0.003), (FINE_SHARE, 0.005)] {
+            let settings = ImplicitSettings { surface_share: Some(share), ..ImplicitSettings::default() };
+            let baked = bake(&tree, &settings);
+            let surface = baked.surface.expect("a surface");
+            let reached = surface.triangles.len() as f32 / leaves;
+            assert!((reached - share).abs() <= room, "{}: {reached} for {share}", tree.name);
+
+            // The surface that was simplified, or one with cells of the same size.
+            let radius = baked.report.parameters.radius;
+            let settings = ImplicitSettings { resolution: radius / baked.report.cell, ..ImplicitSettings::default() };
+            let extracted = bake(&tree, &settings);
+            assert!((extracted.report.cell / baked.report.cell - 1.0).abs() < 1e-3);
+            let extracted = extracted.surface.expect("a surface");
+            assert!(extracted.triangles.len() >= surface.triangles.len());
+            let limit = 0.5 * radius;
+            let apart = farthest(&surface, &extracted, limit).max(farthest(&extracted, &surface, limit));
+            println!(
+                "{}: {share}: {} -> {} triangles, {:.3} radii apart",
+                tree.name,
+                extracted.triangles.len(),
+                surface.triangles.len(),
+                apart / radius
+            );
+            assert!(apart <= 0.2 * radius, "{}: {share}: {} radii", tree.name, apart / radius);
+        }
     }
 }
 

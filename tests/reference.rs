@@ -364,6 +364,29 @@ fn slabs_transmit_reflect_and_pass_light_to_each_other() {
 }
 
 #[test]
+fn a_leaf_is_dark_under_a_lid_that_nearly_touches_it() {
+    let light = Light {
+        key: Some(Disc { direction: Vec3::Y, illuminance: Vec3::splat(1000.0), angular_radius: 0.0 }),
+        ..Light::even(Vec3::ZERO)
+    };
+    for height in [10.0f32, 25.0, 50.0] {
+        let shot = shot(DVec3::new(0.0, f64::from(height) - 5.0, 0.0), 0.0, 1.57, (2, 2));
+        let below = |parts: &[Arc<Plant>]| {
+            let parts = parts.iter().flat_map(|plant| plant.parts.clone()).collect();
+            let scene = scene(&plant(parts));
+            mean(&film(&PathTracer::new(&scene, &light, FLAT).unwrap(), &shot, 16))
+        };
+        let leaf = leaves(&[height], 40.0, 0.5, 1.0);
+        assert!(close(below(std::slice::from_ref(&leaf)), 0.5 * 1000.0 / std::f32::consts::PI, 0.01));
+        for gap in [1e-3, 1e-4] {
+            let lid = leaves(&[height + gap], 40.0, 0.0, 0.0);
+            let lit = below(&[leaf.clone(), lid]);
+            assert_eq!(lit, Vec3::ZERO, "under a lid {gap} m above a leaf {height} m up");
+        }
+    }
+}
+
+#[test]
 fn sun_and_sky_add_up_to_the_whole() {
     let ball = scene(&sphere(PartKind::Wood, 0.6));
     let shot = shot(DVec3::new(0.0, 1.0, 5.0), 0.0, 0.0, (16, 16));

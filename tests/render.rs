@@ -3,6 +3,8 @@
 mod foliage;
 mod levels;
 mod pictures;
+mod plate;
+mod plugins;
 mod shadows;
 mod world;
 

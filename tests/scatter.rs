@@ -9,6 +9,8 @@ use canopy::scatter::*;
 use glam::{DVec2, DVec3, IVec2};
 use proptest::prelude::*;
 
+use crate::support::data::data;
+
 // ---------------------------------------------------------------- stands
 
 /// A plane: `height + east * x + south * z`, unknown beyond `reach` metres from the origin.
@@ -468,19 +470,10 @@ fn warnings_read_as_sentences_and_bad_tables_are_refused() {
     }
 }
 
-/// A file of the development data, or `None` with a note where it is absent.
-fn data(file: &str) -> Option<PathBuf> {
-    let path = std::env::var_os("CANOPY_DATA").map(|folder| PathBuf::from(folder).join(file)).filter(|p| p.exists());
-    if path.is_none() {
-        println!("skipped: no {file}");
-    }
-    path
-}
-
 #[test]
+#[ignore = "needs the data folder CANOPY_DATA"]
 fn barro_colorado_island_is_read_whole() {
-    let Some(path) = data("stands/bci_50ha_trees.csv") else { return };
-    let inventory = read_inventory(&path, InventoryOptions::default()).unwrap();
+    let inventory = read_inventory(&data("stands/bci_50ha_trees.csv"), InventoryOptions::default()).unwrap();
     assert_eq!((inventory.rows.len(), inventory.coordinates), (3604, Coordinates::Planar));
     assert!(inventory.rows.iter().all(|t| (0.0..=1000.0).contains(&t.x) && (0.0..=500.0).contains(&t.y)));
     let local = |x: f64, y: f64| DVec3::new(x - 500.0, 0.0, 250.0 - y);
@@ -492,9 +485,9 @@ fn barro_colorado_island_is_read_whole() {
 }
 
 #[test]
+#[ignore = "needs the data folder CANOPY_DATA"]
 fn longleaf_pines_get_heights_from_their_diameters() {
-    let Some(path) = data("stands/longleaf_pine.csv") else { return };
-    let rows = read_inventory(&path, InventoryOptions::default()).unwrap().rows;
+    let rows = read_inventory(&data("stands/longleaf_pine.csv"), InventoryOptions::default()).unwrap().rows;
     assert_eq!(rows.len(), 584);
     assert_eq!(rows[0], row(200.0, 8.8, Some(0.329), None, None, 2));
     assert!(rows.iter().all(|t| t.dbh_m.is_some_and(|dbh| (0.02..0.8).contains(&dbh))));

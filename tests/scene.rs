@@ -5,7 +5,7 @@ use std::path::Path as FilePath;
 use canopy::app::parse_lighting;
 use canopy::bake::lighting::SunLight;
 use canopy::light::MoonSetting;
-use canopy::plant::Gloss;
+use canopy::plant::{Gloss, LeafKind};
 use canopy::scatter::{LengthUnit, Sequence};
 use canopy::scene::{
     Anchor, GltfPlants, Ground, GroundFile, GrownForm, GrownPlants, InventoryTrees, Lighting, Overrides, Path,
@@ -149,6 +149,14 @@ fn everything_is_read() -> Outcome {
 }
 
 #[test]
+fn the_kind_of_leaf_is_read() -> Outcome {
+    assert_eq!(parse(FULL)?.species[1].leaf, None);
+    let scene = parse(&FULL.replace("name: \"pine\",", "name: \"pine\", leaf: Needle,"))?;
+    assert_eq!(scene.species[1].leaf, Some(LeafKind::Needle));
+    Ok(())
+}
+
+#[test]
 fn gloss_and_the_way_of_the_sun_are_read() -> Outcome {
     let plain = parse(FULL)?;
     assert_eq!(plain.species[0].gloss, Gloss { reflectance: 0.045, roughness: 0.4 });
@@ -266,6 +274,7 @@ fn unknown_choices_are_listed() {
     faulty("sequence: Hammersley", "sequence: Halten", 10, &["did you mean `Halton`", "`Random`"]);
     faulty("form: Broadleaf", "form: Palm", 6, &["unknown choice `Palm`", "`Conifer`"]);
     faulty("moon: Astronomical", "moon: New", 6, &["unknown choice `New`", "`None`"]);
+    faulty("weight: 3,", "leaf: Rubber,", 6, &["unknown choice `Rubber`", "`Leathery`", "`Needle`"]);
 }
 
 #[test]

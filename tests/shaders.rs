@@ -30,7 +30,8 @@ use naga::{
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 
 /// All that the pipelines switch on or off.
-const DEFINES: [&str; 6] = ["FOLIAGE", "ALPHA_TO_COVERAGE", "TRANSFER", "TRANSFER_COLOR", "SUN_HARMONICS", "PLAIN_TOO"];
+const DEFINES: [&str; 7] =
+    ["FOLIAGE", "ALPHA_TO_COVERAGE", "NORMAL_MAP", "TRANSFER", "TRANSFER_COLOR", "SUN_HARMONICS", "PLAIN_TOO"];
 
 /// All combinations of [`DEFINES`]; the last three mean something with transfer only.
 fn variants() -> impl Iterator<Item = Vec<&'static str>> {
@@ -237,6 +238,9 @@ fn gpu_structs_are_what_the_shaders_think() {
             realigned,
             indirect_sun_zenith,
             indirect_sun_mean,
+            ambient_term,
+            lobe_gain,
+            lobe_limit,
             indirect_sun_color,
         }
     );
@@ -245,7 +249,20 @@ fn gpu_structs_are_what_the_shaders_think() {
         "CrossVariant",
         CrossVariantUniform { planes, transmission, first_layer, isotropic_fraction, first_light_layer }
     );
-    twin!(layouts, "Part", PartUniform { base_color, realigned, transmission, specular_reflectance, roughness });
+    twin!(
+        layouts,
+        "Part",
+        PartUniform {
+            base_color,
+            realigned,
+            transmission,
+            specular_reflectance,
+            roughness,
+            ambient_term,
+            lobe_gain,
+            lobe_limit
+        }
+    );
     twin!(
         layouts,
         "Transfer",

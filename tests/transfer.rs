@@ -190,11 +190,26 @@ fn in_a_white_furnace_everything_is_white() {
 
 #[test]
 fn wood_has_one_side_and_its_inside_is_dark() {
-    let mut floor = foliage(sheet(Vec3::ZERO, 1.0, 2), Vec3::ONE, Vec3::ZERO);
-    floor.kind = PartKind::Wood;
-    let bake = bake_transfer(&plant(vec![floor]), &PROJECTION);
-    assert!(bake.parts[0].back.is_empty() && bake.parts[0].back_of(0, &PROJECTION).is_empty());
-    assert_eq!(bake.parts[0].front.len(), 81);
+    // A white board, its front up, and a small leaf under its middle, whose front looks at the back of the board.
+    let mut board = foliage(sheet(Vec3::ZERO, 50.0, 20), Vec3::ONE, Vec3::ZERO);
+    board.kind = PartKind::Wood;
+    let leaf = foliage(sheet(Vec3::NEG_Y, 0.01, 1), Vec3::ONE, Vec3::ZERO);
+    let middle = 10 * 21 + 10;
+    for interior in [Interior::Diffuse(1), Interior::Diffuse(8), Interior::Straight(4)] {
+        let settings = TransferSettings { interior, ..PROJECTION };
+        let bake = bake_transfer(&plant(vec![board.clone(), leaf.clone()]), &settings);
+        let [wood, leaf] = &bake.parts[..] else { panic!("two parts") };
+        assert!(wood.back.is_empty() && wood.back_of(middle, &settings).is_empty());
+        assert_eq!(wood.front.len(), 21 * 21 * 9);
+        let seen = |side: &[f32]| share(&even(3), side).x;
+        assert!((seen(wood.front_of(middle, &settings)) - 1.0).abs() < 0.02, "the front has the whole sky");
+        // The board's back reflects nothing, though the light from below falls on it, and lets nothing through.
+        for vertex in 0..4 {
+            let (up, down) = (seen(leaf.front_of(vertex, &settings)), seen(leaf.back_of(vertex, &settings)));
+            assert!(up.abs() < 0.02, "{interior:?}: {up} from the inside of wood");
+            assert!((down - 1.0).abs() < 0.02, "{interior:?}: {down} from below");
+        }
+    }
 }
 
 #[test]

@@ -18,6 +18,10 @@ struct Surface {
     specular_reflectance: f32,
     // Root mean square slope of its facets.
     roughness: f32,
+    // Strength with which the lobe carries a share of 1, and its greatest strength where nothing else reflects or transmits:
+    // lobe_gain and one over lobe_peak of src/plant/gloss.rs.
+    lobe_gain: f32,
+    lobe_limit: f32,
     // How far the gloss is that of many leaves with isotropic normals, 0..1.
     gloss_isotropy: f32,
     // Visibility of the surroundings, 0..1: what ambient occlusion leaves of them.
@@ -59,7 +63,10 @@ fn leaf_transmission(base_color: vec3<f32>, factor: vec3<f32>, reflectance: f32)
 // `specular_albedo` of the surface, its mean over all directions: microfacets [Walter et al. 2007, GGX; the masking of Hammon 2017], of whose
 // Fresnel factor half is constant and half rises as Schlick's [1994]: a mean of (1 - cosine)^5 is 1/21. Leaves with
 // isotropic normals reflect like a ball, alike in all directions but for that factor.
-fn leaf_gloss(surface: Surface, specular_albedo: vec3<f32>) -> vec3<f32> {
+//
+// A single reflection loses what facets shade; the lobe's strength makes up for it, as far as `room`, what the diffuse light
+// leaves, allows in the grazing direction that gets most.
+fn leaf_gloss(surface: Surface, specular_albedo: vec3<f32>, room: vec3<f32>) -> vec3<f32> {
     let to_light = light.key_direction;
     // Between two opposite directions lies every direction: any will do.
     let between = surface.viewer + to_light;
@@ -75,7 +82,8 @@ fn leaf_gloss(surface: Surface, specular_albedo: vec3<f32>) -> vec3<f32> {
     // Distribution times pi; masking over four times the cosines.
     let distribution = width * width / (falloff * falloff);
     let masking = 0.5 / max(mix(2.0 * nl * nv, nl + nv, width), 1e-4);
-    return specular_albedo * fresnel * mix(distribution * masking * nl, 0.25, surface.gloss_isotropy);
+    let strength = min(specular_albedo * surface.lobe_gain, max(room, vec3(0.0)) * surface.lobe_limit);
+    return fresnel * mix(strength * (distribution * masking * nl), specular_albedo * 0.25, surface.gloss_isotropy);
 }
 
 // Exitant radiance towards the viewer. `near` and `far`: what the key light brings to the viewer's side and to the other
@@ -89,7 +97,9 @@ fn exitant(surface: Surface, near: vec3<f32>, far: vec3<f32>, visibility: f32, s
     if surface.specular_reflectance > 0.0 {
         let subsurface = subsurface_share(surface.albedo, surface.specular_reflectance);
         reflected *= subsurface;
-        gloss = leaf_gloss(surface, surface.albedo * (1.0 - subsurface)) * light.key_illuminance * INVERSE_PI;
+        let room = 1.0 - surface.albedo * (subsurface + surface.transmission);
+        let specular_albedo = surface.albedo * (1.0 - subsurface);
+        gloss = leaf_gloss(surface, specular_albedo, room) * light.key_illuminance * INVERSE_PI;
     }
     return surface.albedo * ((reflected + far * surface.transmission) * visibility + sky) + gloss * visibility;
 }

@@ -130,6 +130,8 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.isotropic_fraction = isotropic_fraction(variant, level) * foliage;
     surface.specular_reflectance = reflectance * foliage;
     surface.roughness = variants[variant].roughness;
+    surface.lobe_gain = variants[variant].lobe_gain;
+    surface.lobe_limit = variants[variant].lobe_limit;
     surface.gloss_isotropy = max(surface.isotropic_fraction, variants[variant].realigned);
     let ground = sample_ground(in.relative);
     let by_transfer = variants[variant].radiance_transfer == 1u;
@@ -169,7 +171,8 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         );
     }
     let sunlit = mix(1.0, hot_spot(surface.viewer), smoothstep(0.25, 0.85, ground.surrounding_cover));
-    let among = select(leaf_visibility(properties.b), sunlit, by_transfer);
+    let dimmed = select(1.0, leaf_visibility(properties.b), variants[variant].ambient_term == 1u);
+    let among = select(dimmed, sunlit, by_transfer);
     visibility *= mix(1.0, among, foliage);
     var color = shade(surface, visibility, sky);
     color = tint_level(color);

@@ -46,6 +46,11 @@ struct Variant {
     indirect_sun_zenith: f32,
     indirect_sun_mean: f32,
     indirect_sun_color: vec3<f32>,
+    // 1 where its ambient visibility is the ambient term of a density field, else 0.
+    ambient_term: u32,
+    // As in `Surface`.
+    lobe_gain: f32,
+    lobe_limit: f32,
 }
 
 struct Instance {
@@ -139,7 +144,7 @@ fn with_indirect_ambient(k: f32) -> f32 {
     return k + (1.0 - k) * 0.13;
 }
 
-// Share of the key light that reaches a leaf of ambient visibility `k` past the leaves around it, for which the shadow
+// Share of the key light that reaches a leaf of which the ambient term of a density field is `k` past the leaves around it, for which the shadow
 // maps are too coarse: what sees little of the sky mostly lies in shade. Where the map is fine, `k` adds nothing to it, and 0.8 + 0.75 k, at most 1.3, would be a little nearer (benches/expressive.rs).
 fn leaf_visibility(k: f32) -> f32 {
     return min(0.35 + 2.0 * k, 1.1);

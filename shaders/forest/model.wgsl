@@ -22,6 +22,11 @@ struct Part {
     transmission: vec3<f32>,
     specular_reflectance: f32,
     roughness: f32,
+    // 1 where the ambient visibility is the ambient term of a density field, else 0.
+    ambient_term: u32,
+    // As in `Surface`.
+    lobe_gain: f32,
+    lobe_limit: f32,
 }
 
 @group(2) @binding(0) var color_texture: texture_2d<f32>;
@@ -129,6 +134,7 @@ fn hash(p: vec3<f32>) -> f32 {
     return f32((h ^ (h >> 15u)) >> 8u) / 16777216.0;
 }
 
+#ifdef NORMAL_MAP
 // Tangent-space detail without stored tangents [Schüler 2013, "Normal Mapping Without Precomputed Tangents"].
 fn detail_normal(normal: vec3<f32>, relative: vec3<f32>, uv: vec2<f32>) -> vec3<f32> {
     let texel = textureSample(normal_texture, part_sampler, uv).xyz * 2.0 - 1.0;
@@ -141,20 +147,25 @@ fn detail_normal(normal: vec3<f32>, relative: vec3<f32>, uv: vec2<f32>) -> vec3<
     let t = p2 * duv1.x + p1 * duv2.x;
     // The image's v runs down, the map's green runs up.
     let b = -(p2 * duv1.y + p1 * duv2.y);
-    let scale = inverseSqrt(max(max(dot(t, t), dot(b, b)), 1e-30));
+    // Both are gradients times this volume, whose sign is that of the seen side: pixels count downwards.
+    let volume = dot(normal, cross(dp1, dp2));
+    let scale = sign(volume) * inverseSqrt(max(max(dot(t, t), dot(b, b)), 1e-30));
     return normalize(normal * texel.z + (t * texel.x + b * texel.y) * scale);
 }
+#endif
 
 @fragment
-fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
+fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let look = unpack_look(in.look);
     let texel = textureSample(color_texture, part_sampler, in.uv);
-    var normal = normalize(in.normal);
+    let smooth_normal = normalize(in.normal);
+    var normal = smooth_normal;
+#ifdef NORMAL_MAP
+    normal = detail_normal(smooth_normal, in.relative, in.uv);
+#endif
     var coverage = 1.0;
 #ifdef FOLIAGE
     let across = fwidth(in.uv);
-#endif
-#ifdef FOLIAGE
     let alpha = texel.a;
 #ifdef ALPHA_TO_COVERAGE
     coverage = clamp((alpha - in.threshold) / max(fwidth(alpha), 1e-4) + 0.5, 0.0, 1.0);
@@ -166,11 +177,12 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
         discard;
     }
 #endif
-    // A leaf has two sides, and its own normal is that of the side that is seen.
-    let behind = (part.realigned < 0.5) & (dot(normal, in.relative) > 0.0);
-    normal = select(normal, -normal, behind);
+    // A leaf has two sides, and its own normal is that of the side that is seen. A normal that points out of the crown is none
+    // that a map of the leaf could lean.
+    let own_normal = part.realigned < 0.5;
+    let behind = own_normal & (dot(smooth_normal, in.relative) > 0.0);
+    normal = select(smooth_normal, select(normal, -normal, behind), own_normal);
 #else
-    normal = detail_normal(normal, in.relative, in.uv);
     let keep = hash(vec3(in.uv * 97.0, look.height * 31.0));
     if WHOLE + (1.0 - WHOLE) * keep < in.threshold - 1e-4 {
         discard;
@@ -184,6 +196,8 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
     surface.viewer = -normalize(in.relative);
     surface.specular_reflectance = part.specular_reflectance;
     surface.roughness = part.roughness;
+    surface.lobe_gain = part.lobe_gain;
+    surface.lobe_limit = part.lobe_limit;
     // A pixel that covers half a texture of leaves covers several of them, and each faces elsewhere: highlights of one would
     // sparkle. Normals that point out of the crown are no leaf's at all.
     surface.gloss_isotropy = max(saturate(2.0 * max(across.x, across.y)), part.realigned);
@@ -209,7 +223,7 @@ fn fragment(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
     }
 #ifdef FOLIAGE
 #ifndef TRANSFER
-    visibility *= leaf_visibility(look.ambient_visibility);
+    visibility *= select(1.0, leaf_visibility(look.ambient_visibility), part.ambient_term == 1u);
 #endif
 #endif
 #ifdef SUN_HARMONICS

@@ -100,7 +100,7 @@ pub fn plan(scene: &Scene) -> Result<PlantPlan, StageError> {
         let first = plan.individuals.len();
         let lighting = species.lighting.as_ref().map_or_else(LightingSettings::default, Lighting::settings);
         let gloss = species.gloss.in_range();
-        let individuals = sources(species)?.into_iter().map(|source| Individual { source, gloss, lighting });
+        let individuals = sources(species, gloss)?.into_iter().map(|source| Individual { source, gloss, lighting });
         plan.individuals.extend(individuals);
         plan.variants.push(first as u16..plan.individuals.len() as u16);
     }
@@ -110,10 +110,10 @@ pub fn plan(scene: &Scene) -> Result<PlantPlan, StageError> {
     Ok(plan)
 }
 
-fn sources(species: &Species) -> Result<Vec<IndividualSource>, StageError> {
+fn sources(species: &Species, gloss: Gloss) -> Result<Vec<IndividualSource>, StageError> {
     Ok(match &species.plant {
         PlantSource::Grown(grown) => {
-            let (parameters, from) = match &grown.form {
+            let (mut parameters, from) = match &grown.form {
                 GrownForm::Broadleaf => (GrowParameters::broadleaf(), "broadleaf".into()),
                 GrownForm::Conifer => (GrowParameters::conifer(), "conifer".into()),
                 GrownForm::File(path) => {
@@ -124,6 +124,9 @@ fn sources(species: &Species) -> Result<Vec<IndividualSource>, StageError> {
                     (parameters, path.clone())
                 }
             };
+            if let Some(leaf) = species.leaf {
+                parameters.leaves.transmission = leaf.transmission().to_array();
+            }
             (0..grown.individuals)
                 .map(|individual| IndividualSource::Grown {
                     parameters: Box::new(parameters.clone()),
@@ -138,6 +141,8 @@ fn sources(species: &Species) -> Result<Vec<IndividualSource>, StageError> {
                 height: Some(species.mean_height() as f32),
                 foliage_materials: files.foliage.clone(),
                 wood_materials: files.wood.clone(),
+                leaf: species.leaf.unwrap_or_default(),
+                gloss: Some(gloss),
                 ..GltfOptions::default()
             };
             files

@@ -79,11 +79,12 @@ pub fn light_together(
         .zip(bake.plants)
         .map(|(&tree, shading)| {
             let instance = &plants[usize::from(stand.trees[tree].variant)];
-            let lighting = BakedLighting::Expressive(ExpressiveLighting {
-                normals: shading.normals,
-                ambient: shading.ambient,
-                no_surface: bake.report.no_surface,
-            });
+            let lighting = BakedLighting::Expressive(ExpressiveLighting::new(
+                shading.normals,
+                shading.ambient,
+                bake.report.no_surface,
+                settings.own_normal,
+            ));
             let cross = BakedLevel::Cross(Arc::new(bake_cross(&instance.plant, &lighting, &cross)));
             BakedPlant { lighting: Arc::new(lighting), ..instance.clone() }.with_level(cross)
         })

@@ -8,6 +8,7 @@ pub(crate) mod geometry;
 mod gloss;
 pub mod gltf;
 pub mod grow;
+mod leaf_kind;
 mod optics;
 pub(crate) mod surface;
 pub mod texture;
@@ -18,7 +19,8 @@ use glam::{Vec2, Vec3};
 use image::RgbaImage;
 use serde::{Deserialize, Serialize};
 
-pub use gloss::Gloss;
+pub use gloss::{Gloss, lobe_gain, lobe_peak};
+pub use leaf_kind::LeafKind;
 pub use optics::LeafColors;
 
 /// One individual plant in its own frame: metres, Y up, the trunk's foot at the origin.
@@ -96,10 +98,16 @@ pub struct PlantMaterial {
     /// Threshold of the alpha test, 0..1; foliage only.
     pub alpha_cutoff: f32,
     /// Linear colour of the light that passes diffusely through a leaf, as a factor on what its inside reflects (its base
-    /// colour without its [`Gloss`]), 0..2 each; zero for wood. [`PlantMaterial::transmitted`] gives the light itself.
+    /// colour without its [`Gloss`]), 0..=[`PlantMaterial::MOST_TRANSMISSION`] each; zero for wood. [`LeafKind`] has what is
+    /// usual, [`PlantMaterial::transmitted`] gives the light itself.
     pub transmission: Vec3,
     /// What the surface of a leaf reflects; wood is matt.
     pub gloss: Gloss,
+}
+
+impl PlantMaterial {
+    /// The greatest factor of [`PlantMaterial::transmission`]: dark channels of a file's colours need it.
+    pub const MOST_TRANSMISSION: f32 = 8.0;
 }
 
 impl Default for PlantMaterial {

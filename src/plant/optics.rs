@@ -1,6 +1,7 @@
 //! What the leaves of a plant do to light in the mean.
 
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4};
+use image::RgbaImage;
 
 use super::{PartKind, Plant, PlantMaterial};
 use crate::math::srgb_to_linear;
@@ -68,28 +69,63 @@ impl Plant {
 
 /// Mean reflected and transmitted light over the texels that pass the alpha test.
 fn mean(material: &PlantMaterial) -> (Vec3, Vec3) {
-    let both = |color: Vec3| {
-        let color = color.clamp(Vec3::ZERO, Vec3::ONE);
-        (color, material.transmitted(color))
-    };
-    let Some(image) = &material.base_color_texture else { return both(material.base_color) };
-    let (mut reflected, mut transmitted, mut count) = (Vec3::ZERO, Vec3::ZERO, 0.0);
-    let size = Vec2::new(image.width() as f32, image.height() as f32);
-    let (columns, rows) = (image.width().min(SAMPLES), image.height().min(SAMPLES));
-    for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
-        let place = Vec2::new((column as f32 + 0.5) / columns as f32, (row as f32 + 0.5) / rows as f32) * size;
-        let Some(texel) = image.get_pixel_checked(place.x as u32, place.y as u32) else { continue };
-        let [r, g, b, a] = texel.0.map(|code| f32::from(code) / 255.0);
-        if a < material.alpha_cutoff {
+    let [reflected, transmitted] = mean_over_leaf(material, |color| [color, material.transmitted(color)]);
+    (reflected, transmitted)
+}
+
+/// Means of `values` of the base colour (0..1) over the texels that pass the alpha test; those of the plain base colour where
+/// there is no texture or nothing passes.
+pub(super) fn mean_over_leaf<const N: usize>(
+    material: &PlantMaterial,
+    values: impl Fn(Vec3) -> [Vec3; N],
+) -> [Vec3; N] {
+    let of = |color: Vec3| values(color.clamp(Vec3::ZERO, Vec3::ONE));
+    let Some(image) = &material.base_color_texture else { return of(material.base_color) };
+    let (mut sums, mut count) = ([Vec3::ZERO; N], 0.0);
+    for place in grid(image) {
+        let Some(texel) = texel(image, place) else { continue };
+        if texel.w < material.alpha_cutoff {
             continue;
         }
-        let color = Vec3::new(srgb_to_linear(r), srgb_to_linear(g), srgb_to_linear(b)) * material.base_color;
-        let (near, far) = both(color);
-        reflected += near;
-        transmitted += far;
+        for (sum, value) in sums.iter_mut().zip(of(texel.truncate() * material.base_color)) {
+            *sum += value;
+        }
         count += 1.0;
     }
-    if count > 0.0 { (reflected / count, transmitted / count) } else { both(material.base_color) }
+    if count > 0.0 { sums.map(|sum| sum / count) } else { of(material.base_color) }
+}
+
+/// Linear colour and alpha of `image`, in the mean over the places at which the base colour of `material` passes the alpha
+/// test; over the whole image where it has no texture or nothing passes. `image` has the texture coordinates of the base
+/// colour. White where it has no texels.
+pub(super) fn mean_texel(image: &RgbaImage, material: &PlantMaterial) -> Vec4 {
+    let mean = |passes: &dyn Fn(Vec2) -> bool, over: &RgbaImage| {
+        let texels = grid(over).filter(|&place| passes(place)).filter_map(|place| texel(image, place));
+        let (sum, count) = texels.fold((Vec4::ZERO, 0.0), |(sum, count), texel| (sum + texel, count + 1.0));
+        (count > 0.0).then(|| sum / count)
+    };
+    let of_leaf = material
+        .base_color_texture
+        .as_deref()
+        .and_then(|mask| mean(&|place| texel(mask, place).is_some_and(|texel| texel.w >= material.alpha_cutoff), mask));
+    of_leaf.or_else(|| mean(&|_| true, image)).unwrap_or(Vec4::ONE)
+}
+
+/// Places in the unit square that sample `image` evenly, each in the middle of a texel of it or of a coarser lattice.
+fn grid(image: &RgbaImage) -> impl Iterator<Item = Vec2> + use<> {
+    let (columns, rows) = (image.width().min(SAMPLES), image.height().min(SAMPLES));
+    (0..rows).flat_map(move |row| {
+        (0..columns)
+            .map(move |column| Vec2::new((column as f32 + 0.5) / columns as f32, (row as f32 + 0.5) / rows as f32))
+    })
+}
+
+/// Linear colour and alpha of the texel at `place` in the unit square.
+fn texel(image: &RgbaImage, place: Vec2) -> Option<Vec4> {
+    let at = place * Vec2::new(image.width() as f32, image.height() as f32);
+    let texel = image.get_pixel_checked(at.x as u32, at.y as u32)?;
+    let [r, g, b, a] = texel.0.map(|code| f32::from(code) / 255.0);
+    Some(Vec4::new(srgb_to_linear(r), srgb_to_linear(g), srgb_to_linear(b), a))
 }
 
 #[cfg(test)]

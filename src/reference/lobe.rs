@@ -13,15 +13,17 @@
 //! Light that one facet sends against another is lost (single scattering), and facets of a rough leaf are seldom met at the
 //! grazing angles where F is large: with the strength `sheen` the lobe carries, in the mean over all directions, 0.76 of it
 //! at a width of 0.1, 0.46 at 0.4 and 0.23 at 1. That share of a leaf's light has been measured whole, so the strength is
-//! raised to carry it ([`spent`]). The shader's is not.
+//! raised to carry it ([`lobe_gain`]), here and in the shader.
 //!
-//! A viewer in the surface's plane gets most: 4.7 to 1 times the strength ([`peak`]). Where that is more than a bright leaf's
+//! A viewer in the surface's plane gets most: 4.7 to 1 times the strength ([`lobe_peak`]). Where that is more than a bright leaf's
 //! diffuse light leaves, the lobe is scaled down, channel by channel; for a viewer anywhere else it is then less than there
 //! is. A green leaf, which absorbs most, is far from it.
 
 use std::f32::consts::{FRAC_1_PI, TAU};
 
 use glam::{Vec2, Vec3};
+
+use crate::plant::{lobe_gain, lobe_peak};
 
 /// The lobe of a surface, seen from anywhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,24 +37,13 @@ pub(crate) struct Lobe {
     peak: f32,
 }
 
-/// The strength that carries a share of 1 in the mean over all directions, by the width, 0.1..=1; within 0.4 %.
-fn spent(width: f32) -> f32 {
-    ((0.747_35 * width - 0.464_45) * width + 2.971_15) * width + 1.031_46
-}
-
-/// What a strength of 1 returns of even light to a viewer in the plane of the surface, by the width, 0.1..=1; up to 1 % more
-/// than it is.
-fn peak(width: f32) -> f32 {
-    1.004 / ((((0.614_61 * width - 1.468_04) * width + 0.639_87) * width + 1.116_31) * width + 0.097_622)
-}
-
 impl Lobe {
     /// The lobe that carries the share `sheen` of the light, or what the diffuse light leaves of it in `room`; both 0..1.
     /// `width`: 0.1..=1. `None` where there is nothing to carry.
     pub fn new(sheen: Vec3, room: Vec3, width: f32) -> Option<Self> {
-        let (spent, peak) = (spent(width), peak(width));
-        let strength = (sheen * spent).min(room.max(Vec3::ZERO) / peak);
-        (strength.max_element() > 0.0).then_some(Self { strength, width, before: 0.75 / spent, peak })
+        let (gain, peak) = (lobe_gain(width), lobe_peak(width));
+        let strength = (sheen * gain).min(room.max(Vec3::ZERO) / peak);
+        (strength.max_element() > 0.0).then_some(Self { strength, width, before: 0.75 / gain, peak })
     }
 
     /// About what the lobe returns to a viewer at the cosine `to_viewer` to the normal, summed over the channels.
@@ -142,7 +133,8 @@ mod tests {
         (0..count).map(one).sum::<f32>() / count as f32
     }
 
-    /// `leaf_gloss` of `shaders/common/lighting.wgsl` in f64, over pi: what it sends back of one lux.
+    /// `leaf_gloss` of `shaders/common/lighting.wgsl` in f64, over pi: what it sends back of one lux where nothing else
+    /// reflects.
     fn shader(normal: Vec3, to_viewer: Vec3, to_light: Vec3, sheen: f64, width: f64) -> f64 {
         let (normal, viewer, light) = (normal.as_dvec3(), to_viewer.as_dvec3(), to_light.as_dvec3());
         let middle = (viewer + light).normalize();
@@ -153,7 +145,8 @@ mod tests {
         let spread = nm * nm * (width * width - 1.0) + 1.0;
         let distribution = width * width / (spread * spread);
         let masking = 0.5 / ((1.0 - width) * 2.0 * nl * nv + width * (nl + nv)).max(1e-4);
-        sheen * fresnel * distribution * masking * nl / std::f64::consts::PI
+        let strength = sheen * f64::from(lobe_gain(width as f32));
+        strength * fresnel * distribution * masking * nl / std::f64::consts::PI
     }
 
     /// What [`shader`] carries in the mean over all directions, by quadrature over facets and viewers.
@@ -182,10 +175,10 @@ mod tests {
     }
 
     #[test]
-    fn the_lobe_is_the_shaders_with_nothing_lost() {
+    fn the_lobe_is_the_shaders() {
         for width in WIDTHS {
             let (lobe, carried) = (lobe(0.04, width), carried(width.into()));
-            assert!((carried * f64::from(spent(width)) - 1.0).abs() < 0.01, "{width}: {carried}");
+            assert!((carried - 1.0).abs() < 0.01, "{width}: {carried}");
             for index in 0..4096 {
                 let mut sampler = PathSampler::new(5, 2, index);
                 let [normal, viewer, light] = [0, 1, 2].map(|_| cone(Vec3::Y, 3.1, sampler.pair()));
@@ -194,9 +187,17 @@ mod tests {
                     continue;
                 }
                 let found = f64::from(lobe.cosine_weighted(normal, viewer, light).y);
-                let expected = shader(normal, viewer, light, 0.04 * f64::from(spent(width)), width.into());
+                let expected = shader(normal, viewer, light, 0.04, width.into());
                 assert!((found - expected).abs() <= 1e-4 * expected + 1e-9, "{width}: {found} {expected}");
             }
+        }
+    }
+
+    #[test]
+    fn the_shaders_lobe_carries_its_whole_share() {
+        for width in [0.05, 0.1, 0.15, 0.25, 0.4, 0.6, 0.8, 1.0] {
+            let carried = carried(width);
+            assert!((carried - 1.0).abs() < 0.05, "{width}: {carried}");
         }
     }
 

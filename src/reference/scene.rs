@@ -13,7 +13,7 @@ use super::ground::{Crossing, GroundShape};
 use super::soil::Soil;
 use crate::plant::{Gloss, PartKind, Plant};
 use crate::scatter::PackedStand;
-use crate::trace::{Hit, PlantTracer, Ray, SurfacePoint, offset_origin};
+use crate::trace::{Hit, PlantTracer, Ray, SurfacePoint, leave, offset_origin};
 
 /// Share of a plant's size by which its rays start before its box.
 const MARGIN: f64 = 0.01;
@@ -172,11 +172,12 @@ pub(crate) struct Surface {
 
 #[derive(Clone, Copy, Debug)]
 enum Anchor {
-    /// Point and flat normal in the plant's frame, where the point is exact.
+    /// Point and flat normal in the plant's frame, where the point is exact but for `error` metres, if that is known.
     Plant {
         instance: usize,
         position: Vec3,
         normal: Vec3,
+        error: Option<f32>,
     },
     Ground,
 }
@@ -335,7 +336,12 @@ impl ReferenceScene {
         Surface {
             position: placed.position + placed.into_scene(point.position.as_dvec3()) * placed.scale,
             bsdf: bsdf(placed, geometric, shading),
-            anchor: Anchor::Plant { instance, position: point.position, normal: point.geometric_normal },
+            anchor: Anchor::Plant {
+                instance,
+                position: point.position,
+                normal: point.geometric_normal,
+                error: Some(point.error),
+            },
         }
     }
 
@@ -346,7 +352,7 @@ impl ReferenceScene {
         Some(Surface {
             position: placed.position + placed.into_scene(position.as_dvec3()) * placed.scale,
             bsdf: Bsdf::new(turned, turned, shares, turned),
-            anchor: Anchor::Plant { instance, position, normal },
+            anchor: Anchor::Plant { instance, position, normal, error: None },
         })
     }
 
@@ -355,10 +361,13 @@ impl ReferenceScene {
         let direction = direction.as_dvec3().normalize_or(DVec3::Y);
         let origin = match surface.anchor {
             Anchor::Ground => self.ground.as_ref().map_or(surface.position, |g| g.shape.lifted(surface.position)),
-            Anchor::Plant { instance, position, normal } => {
+            Anchor::Plant { instance, position, normal, error } => {
                 let placed = &self.instances[instance];
                 let local = placed.into_plant(direction).as_vec3();
-                let origin = offset_origin(position, normal, local);
+                let origin = match error {
+                    Some(error) => leave(position, normal, error, local),
+                    None => offset_origin(position, normal, local),
+                };
                 placed.position + placed.into_scene(origin.as_dvec3()) * placed.scale
             }
         };

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::check::Check;
 use super::lighting::Lighting;
-use crate::plant::Gloss;
+use crate::plant::{Gloss, LeafKind};
 
 /// One species.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -26,6 +26,10 @@ pub struct Species {
     /// The gloss of its leaves. Default `(share: 0.045, roughness: 0.4)`, a leaf's as measured.
     #[serde(default)]
     pub gloss: Gloss,
+    /// What its leaves are made of, which says how much light passes: `Thin`, `Young`, `Leathery`, `Needle` or `Dead`. A glTF
+    /// material's own value goes before it. Default: what the rules of a grown plant say, `Thin` for a plant from a file.
+    #[serde(default)]
+    pub leaf: Option<LeafKind>,
     /// Range of heights in metres, `(lowest, highest)`, each 0.1 to 150. Default (16, 26).
     #[serde(default = "default_height")]
     pub height: (f64, f64),
@@ -138,6 +142,7 @@ impl Species {
             plant: plant.into(),
             lighting: None,
             gloss: Gloss::default(),
+            leaf: None,
             height: default_height(),
             elevation: None,
             slope_limit: ninety(),

@@ -28,6 +28,7 @@ mod tracer;
 
 use glam::{Vec2, Vec3};
 
+pub(crate) use offset::leave;
 pub use offset::offset_origin;
 pub use parallel::{LineCrossing, ParallelTracer};
 pub use tracer::PlantTracer;
@@ -88,7 +89,6 @@ impl SurfacePoint {
     /// outside the position's error bound (as [Pharr, Jakob & Humphreys 2023, 6.8.6]), which follows from the
     /// triangle's own corners and so suits plants of any size.
     pub fn leave(&self, direction: Vec3) -> Vec3 {
-        let away = if self.geometric_normal.dot(direction) < 0.0 { -self.error } else { self.error };
-        self.position + self.geometric_normal * away
+        leave(self.position, self.geometric_normal, self.error, direction)
     }
 }

@@ -3,13 +3,15 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use canopy::plant::gltf::{GltfOptions, LEAF_TRANSMISSION, PlantError, PlantReport, Warning, WarningKind, load_plant};
-use canopy::plant::texture::{alpha_tested_mips, fade_alpha};
-use canopy::plant::{PartKind, Plant};
+use canopy::plant::gltf::{GltfOptions, PlantError, PlantReport, Warning, WarningKind, load_plant};
+use canopy::plant::texture::{AlphaFade, alpha_tested_mips, fade_alpha};
+use canopy::plant::{Gloss, LeafColors, LeafKind, PartKind, Plant};
 use glam::{Vec2, Vec3};
 use proptest::prelude::*;
 
 use super::texture::leaves;
+use crate::support::data::data;
+use crate::support::glb::TreeFile;
 
 /// Builds a small GLB file piece by piece.
 #[derive(Default)]
@@ -139,7 +141,7 @@ fn wood_and_foliage_come_from_the_alpha_mode() {
     assert_eq!(plant.parts[0].material.base_color, Vec3::new(0.5, 0.4, 0.3));
     assert_eq!(plant.parts[0].material.transmission, Vec3::ZERO);
     assert_eq!(plant.parts[1].material.alpha_cutoff, 0.4);
-    assert_eq!(plant.parts[1].material.transmission, LEAF_TRANSMISSION);
+    assert_eq!(plant.parts[1].material.transmission, LeafKind::Thin.transmission());
     assert!(warnings.iter().any(|w| w.kind == WarningKind::Repaired && w.message.contains("normal")));
     for normal in &plant.parts[0].mesh.normals {
         assert!((*normal - Vec3::Z).length() < 1e-6);
@@ -158,6 +160,7 @@ fn options_name_materials_and_scale() {
         wood_materials: vec!["leaves".into(), "twigs".into()],
         transmission: Some(Vec3::splat(0.3)),
         name: Some("inverted".into()),
+        ..GltfOptions::default()
     };
     let (plant, warnings) = tree().load_with(&options).expect("a plant");
     assert!((plant.height() - 10.0).abs() < 1e-4);
@@ -168,6 +171,82 @@ fn options_name_materials_and_scale() {
     for height in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         let failed = tree().load_with(&GltfOptions { height: Some(height), ..options.clone() });
         assert!(matches!(failed, Err(PlantError::Option { .. })));
+    }
+}
+
+/// A tree whose leaves have these members in their material, and what they do to light.
+fn leafy(leaf_members: &'static str, options: &GltfOptions) -> (LeafColors, Vec<Warning>) {
+    let file = TreeFile { leaf_members, ..TreeFile::default() };
+    let (plant, warnings) = load_bytes(&file.bytes(), "tree.glb", options).expect("a plant");
+    (plant.leaf_colors(), warnings)
+}
+
+#[test]
+fn leaves_pass_as_much_light_as_their_kind_does() {
+    let of = |leaf: LeafKind| leafy("", &GltfOptions { leaf, ..GltfOptions::default() }).0;
+    let thin = of(LeafKind::default());
+    for kind in LeafKind::ALL {
+        let leaf = of(kind);
+        assert_eq!(leaf.reflected, thin.reflected);
+        let ratio = leaf.transmitted / thin.transmitted;
+        assert!((ratio - kind.factor() / 1.3).abs().max_element() < 1e-4, "{kind:?}: {ratio}");
+    }
+}
+
+#[test]
+fn a_file_that_states_its_diffuse_transmission_is_believed() {
+    let plain = leafy("", &GltfOptions::default()).0;
+    let stated = r#","extensions":{"KHR_materials_diffuse_transmission":{"diffuseTransmissionFactor":0.3,
+        "diffuseTransmissionColorFactor":[0.02,0.15,0.002]}}"#;
+    // Whatever kind of leaf the scene has it for, and whatever gloss.
+    for (leaf, gloss) in [(LeafKind::Thin, None), (LeafKind::Needle, Some(Gloss::MATT))] {
+        let (leaf, warnings) = leafy(stated, &GltfOptions { leaf, gloss, ..GltfOptions::default() });
+        assert!((leaf.reflected / plain.reflected - 0.7).abs().max_element() < 1e-3, "{leaf:?}");
+        let wanted = 0.3 * Vec3::new(0.02, 0.15, 0.002);
+        assert!((leaf.transmitted / wanted - 1.0).abs().max_element() < 0.01, "{leaf:?}");
+        assert_eq!(warnings, []);
+    }
+    // The caller's own number goes before the file's.
+    let (leaf, _) = leafy(stated, &GltfOptions { transmission: Some(Vec3::ZERO), ..GltfOptions::default() });
+    assert_eq!((leaf.transmitted, leaf.reflected), (Vec3::ZERO, plain.reflected));
+    // By its defaults the extension lets nothing pass.
+    let (leaf, _) = leafy(r#","extensions":{"KHR_materials_diffuse_transmission":{}}"#, &GltfOptions::default());
+    assert_eq!((leaf.transmitted, leaf.reflected), (Vec3::ZERO, plain.reflected));
+}
+
+#[test]
+fn textures_of_transmitted_light_count_by_their_mean_over_the_leaf() {
+    // The leaves' own picture: its alpha is 1 wherever there is leaf, which is less than half of it.
+    let stated = r#","extensions":{"KHR_materials_diffuse_transmission":{"diffuseTransmissionFactor":0.2,
+        "diffuseTransmissionTexture":{"index":0},"diffuseTransmissionColorFactor":[0.5,0.5,0.5],
+        "diffuseTransmissionColorTexture":{"index":0}}}"#;
+    let plain = leafy("", &GltfOptions::default()).0;
+    let (leaf, warnings) = leafy(stated, &GltfOptions::default());
+    assert!((leaf.reflected / plain.reflected - 0.8).abs().max_element() < 1e-3, "{leaf:?}");
+    assert!((leaf.transmitted / (0.2 * 0.5 * plain.reflected) - 1.0).abs().max_element() < 0.01, "{leaf:?}");
+    assert!(
+        warnings.iter().any(|w| w.kind == WarningKind::Ignored && w.message.contains("means over the leaf: 0.200"))
+    );
+}
+
+#[test]
+fn what_no_leaf_can_transmit_is_repaired_with_a_word() {
+    for (members, word) in [
+        (
+            r#","extensions":{"KHR_materials_diffuse_transmission":{"diffuseTransmissionFactor":"much"}}"#,
+            "cannot be read",
+        ),
+        (r#","extensions":{"KHR_materials_diffuse_transmission":[]}"#, "cannot be read"),
+        (r#","extensions":{"KHR_materials_diffuse_transmission":{"diffuseTransmissionFactor":1e9}}"#, "no room"),
+        (
+            r#","extensions":{"KHR_materials_diffuse_transmission":{"diffuseTransmissionFactor":0.1,
+            "diffuseTransmissionTexture":{"index":99}}}"#,
+            "transmission texture 99 does not exist",
+        ),
+    ] {
+        let (leaf, warnings) = leafy(members, &GltfOptions::default());
+        assert!(warnings.iter().any(|warning| warning.message.contains(word)), "{word}: {warnings:?}");
+        assert!(leaf.transmitted.min_element() >= 0.0 && (leaf.transmitted + leaf.reflected).max_element() <= 1.0);
     }
 }
 
@@ -438,16 +517,6 @@ proptest! {
     }
 }
 
-/// The folder of real data, or `None` with a word about what is skipped.
-fn data(relative: &str) -> Option<PathBuf> {
-    let path = std::env::var_os("CANOPY_DATA").map(|folder| PathBuf::from(folder).join(relative));
-    let found = path.filter(|path| path.exists());
-    if found.is_none() {
-        println!("skipped: no {relative}");
-    }
-    found
-}
-
 fn files_below(folder: &Path) -> Vec<PathBuf> {
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).expect("a readable folder") {
@@ -485,10 +554,9 @@ const FATAL: [&str; 17] = [
 ];
 
 #[test]
+#[ignore = "needs the data folder CANOPY_DATA"]
 fn broken_files_never_panic_and_unusable_ones_are_refused() {
-    let Some(folder) = data("gltf-broken") else {
-        return;
-    };
+    let folder = data("gltf-broken");
     let mut read = 0;
     for path in files_below(&folder) {
         if !path.extension().is_some_and(|extension| extension == "gltf" || extension == "glb") {
@@ -512,12 +580,11 @@ fn broken_files_never_panic_and_unusable_ones_are_refused() {
 }
 
 #[test]
+#[ignore = "needs the data folder CANOPY_DATA"]
 fn real_trees_have_their_triangles() {
     // Of the pine's 19,872 triangles 8 have no area.
     for (name, triangles, height) in [("oak", 13_806, 19.73), ("aspen", 7_200, 21.61), ("pine", 19_864, 15.59)] {
-        let Some(path) = data(&format!("trees/{name}-medium.glb")) else {
-            return;
-        };
+        let path = data(&format!("trees/{name}-medium.glb"));
         let (plant, warnings) = load_plant(&path, &GltfOptions::default()).expect("a sound file");
         assert!(is_sound(&plant));
         let (wood, foliage) = (plant.triangle_count(PartKind::Wood), plant.triangle_count(PartKind::Foliage));
@@ -528,7 +595,7 @@ fn real_trees_have_their_triangles() {
         let leaf = plant.parts[1].material.base_color_texture.clone().expect("a leaf texture");
         assert!(warnings.iter().all(|w| w.kind == WarningKind::Repaired), "{warnings:?}");
 
-        let chain = alpha_tested_mips(&fade_alpha(&leaf, 0.5));
+        let chain = alpha_tested_mips(&fade_alpha(&leaf, 0.5, AlphaFade::PerLeaf));
         for level in 1..=7 {
             for threshold in [0.5, 0.6, 0.7, 0.8, 0.9, 0.95] {
                 let (drawn, wanted) = (chain.drawn_coverage(level, threshold), chain.drawn_coverage(0, threshold));

@@ -1,7 +1,9 @@
 //! Plant textures: coverage, fading, halos.
 
 use canopy::math::{MipChain, linear_to_srgb, resample::resize_to, srgb_to_linear};
-use canopy::plant::texture::{alpha_tested_mips, color_mips, dilate_colors, fade_alpha, leaf_mips, normal_mips};
+use canopy::plant::texture::{
+    AlphaFade, alpha_tested_mips, color_mips, dilate_colors, fade_alpha, leaf_mips, normal_mips,
+};
 use glam::{Vec2, Vec3};
 use image::{Rgba, RgbaImage};
 use proptest::prelude::*;
@@ -45,15 +47,15 @@ fn has_all_levels(chain: &MipChain) -> bool {
 
 #[test]
 fn mips_of_a_fading_texture_draw_the_same_area_at_every_threshold() {
-    for seed in 0..4 {
-        let chain = alpha_tested_mips(&fade_alpha(&leaves(256, seed), 0.5));
+    for (seed, fade) in (0..4).flat_map(|seed| [AlphaFade::PerLeaf, AlphaFade::CenterOut].map(|fade| (seed, fade))) {
+        let chain = alpha_tested_mips(&fade_alpha(&leaves(256, seed), 0.5, fade));
         assert!(has_all_levels(&chain));
         for level in (1..chain.levels.len()).filter(|&level| chain.level_size(level).0 >= 8) {
             for threshold in [0.5, 0.6, 0.7, 0.8, 0.9, 0.95] {
                 let (drawn, wanted) = (chain.drawn_coverage(level, threshold), chain.drawn_coverage(0, threshold));
                 assert!(
                     (drawn - wanted).abs() < 0.02,
-                    "seed {seed} level {level} at {threshold}: {drawn}, not {wanted}"
+                    "seed {seed} {fade:?} level {level} at {threshold}: {drawn}, not {wanted}"
                 );
             }
         }
@@ -118,7 +120,7 @@ fn a_fading_leaf_shrinks_evenly_from_its_outline() {
     let disc =
         |x: f32, y: f32| ((80.5 - Vec2::new(x + 0.5 - 100.0, y + 0.5 - 100.0).length()).clamp(0.0, 1.0) * 255.0) as u8;
     let image = RgbaImage::from_fn(size, size, |x, y| Rgba([9, 9, 9, disc(x as f32, y as f32)]));
-    let faded = fade_alpha(&image, 0.5);
+    let faded = fade_alpha(&image, 0.5, AlphaFade::PerLeaf);
     let chain = color_mips(&faded);
     let whole = std::f32::consts::PI * 80.0 * 80.0 / (200.0 * 200.0);
     for threshold in [0.5f32, 0.55, 0.6, 0.7, 0.8, 0.9, 0.95] {
@@ -144,7 +146,7 @@ fn every_leaf_fades_at_its_own_size() {
     let square = |x: u32, y: u32, at: u32, size: u32| (at..at + size).contains(&x) && (at..at + size).contains(&y);
     let inside = |x, y| square(x, y, 4, 40) || square(x, y, 60, 9);
     let image = RgbaImage::from_fn(80, 80, |x, y| Rgba([0, 0, 0, if inside(x, y) { 255 } else { 0 }]));
-    let faded = fade_alpha(&image, 0.5);
+    let faded = fade_alpha(&image, 0.5, AlphaFade::PerLeaf);
     let shown = |at: u32, size: u32, threshold: f32| {
         let texels = faded.enumerate_pixels().filter(|(x, y, _)| square(*x, *y, at, size));
         texels.filter(|(_, _, texel)| f32::from(texel[3]) / 255.0 >= threshold).count() as f32 / (size * size) as f32
@@ -157,12 +159,35 @@ fn every_leaf_fades_at_its_own_size() {
 }
 
 #[test]
+fn the_published_fade_goes_from_the_outside_of_the_picture_to_its_centre() {
+    // Squares in a chessboard: their distance from the centre decides, not their own outlines.
+    let inside = |x: u32, y: u32| x % 10 < 8 && y % 10 < 8;
+    let image = RgbaImage::from_fn(160, 100, |x, y| Rgba([7, 7, 7, if inside(x, y) { 255 } else { 0 }]));
+    let faded = fade_alpha(&image, 0.5, AlphaFade::CenterOut);
+    let (chain, whole) = (color_mips(&faded), f32::from(8u8 * 8) / 100.0);
+    let distance = |x: u32, y: u32| Vec2::new(x as f32 + 0.5 - 80.0, y as f32 + 0.5 - 50.0).length();
+    for threshold in [0.5f32, 0.6, 0.7, 0.8, 0.9, 0.95] {
+        let shown = |texel: &Rgba<u8>| f32::from(texel[3]) / 255.0 >= threshold;
+        let farthest_shown = faded.enumerate_pixels().filter(|(_, _, texel)| shown(texel));
+        let farthest_shown = farthest_shown.map(|(x, y, _)| distance(x, y)).fold(0.0, f32::max);
+        let hidden = faded.enumerate_pixels().filter(|(x, y, texel)| inside(*x, *y) && !shown(texel));
+        let nearest_hidden = hidden.map(|(x, y, _)| distance(x, y)).fold(f32::MAX, f32::min);
+        assert!(farthest_shown <= nearest_hidden + 1.0, "at {threshold}: {farthest_shown} {nearest_hidden}");
+        // As many texels go at each step as by the other fade.
+        let wanted = whole * (1.0 - 2.0 * (threshold - 0.5));
+        let covered = chain.coverage(0, threshold);
+        assert!((covered - wanted).abs() < 0.01, "at {threshold}: {covered}, not {wanted}");
+    }
+    assert!(faded.get_pixel(80, 50)[3] >= 253);
+}
+
+#[test]
 fn a_pinhole_stays_a_hole_and_does_not_grow() {
     let image = RgbaImage::from_fn(100, 100, |x, y| {
         let leaf = (10..90).contains(&x) && (10..90).contains(&y) && (x, y) != (50, 50);
         Rgba([0, 0, 0, if leaf { 255 } else { 0 }])
     });
-    let faded = fade_alpha(&image, 0.5);
+    let faded = fade_alpha(&image, 0.5, AlphaFade::PerLeaf);
     assert!(faded.get_pixel(50, 50)[3] < 128);
     assert!(faded.get_pixel(51, 50)[3] > 240);
 }
@@ -185,7 +210,7 @@ fn textures_without_texels_are_no_trouble() {
     for chain in [color_mips(&none), alpha_tested_mips(&none), normal_mips(&none)] {
         assert_eq!(chain.levels, [Vec::<u8>::new()]);
     }
-    assert_eq!(fade_alpha(&none, 0.5).dimensions(), (0, 5));
+    assert_eq!(fade_alpha(&none, 0.5, AlphaFade::PerLeaf).dimensions(), (0, 5));
     dilate_colors(&mut none.clone());
     assert_eq!(resize_to(&none, 2, 2), RgbaImage::new(2, 2));
 }
@@ -211,13 +236,16 @@ proptest! {
 
     #[test]
     fn any_image_has_whole_mip_chains(image in any_image(), cutoff in 0.0f32..1.0) {
-        let faded = fade_alpha(&image, cutoff);
-        for chain in [color_mips(&image), alpha_tested_mips(&image), alpha_tested_mips(&faded), normal_mips(&image)] {
+        for chain in [color_mips(&image), alpha_tested_mips(&image), normal_mips(&image)] {
             prop_assert!(has_all_levels(&chain));
         }
-        for (old, new) in image.pixels().zip(faded.pixels()) {
-            prop_assert_eq!(&old.0[..3], &new.0[..3]);
-            prop_assert_eq!(f32::from(old[3]) / 255.0 >= cutoff, new[3] >= 128);
+        for fade in [AlphaFade::PerLeaf, AlphaFade::CenterOut] {
+            let faded = fade_alpha(&image, cutoff, fade);
+            prop_assert!(has_all_levels(&alpha_tested_mips(&faded)));
+            for (old, new) in image.pixels().zip(faded.pixels()) {
+                prop_assert_eq!(&old.0[..3], &new.0[..3]);
+                prop_assert_eq!(f32::from(old[3]) / 255.0 >= cutoff, new[3] >= 128);
+            }
         }
     }
 

@@ -17,11 +17,20 @@ pub struct TreeFile {
     pub first_coordinate: f32,
     /// Added to every index of the trunk.
     pub index_offset: u16,
+    /// Members of the leaves' material in JSON, each with a comma before it.
+    pub leaf_members: &'static str,
 }
 
 impl Default for TreeFile {
     fn default() -> Self {
-        Self { wood: true, leaves: true, absent_texture: false, first_coordinate: 0.3, index_offset: 0 }
+        Self {
+            wood: true,
+            leaves: true,
+            absent_texture: false,
+            first_coordinate: 0.3,
+            index_offset: 0,
+            leaf_members: "",
+        }
     }
 }
 
@@ -141,11 +150,12 @@ impl TreeFile {
             "images":[{image}],"textures":[{{"source":0}}],"materials":[
             {{"name":"bark","pbrMetallicRoughness":{{"baseColorFactor":[0.24,0.17,0.11,1]}}}},
             {{"name":"leaves","alphaMode":"MASK","alphaCutoff":0.5,"doubleSided":true,
-            "pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}}}]}}"#,
+            "pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}{}}}]}}"#,
             bin.len(),
             views.join(","),
             accessors.join(","),
-            primitives.join(",")
+            primitives.join(","),
+            self.leaf_members
         );
         let mut json = json.into_bytes();
         json.resize(json.len().next_multiple_of(4), b' ');

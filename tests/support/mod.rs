@@ -1,5 +1,6 @@
-//! What the tests of pictures and of the program share.
+//! What several tests share.
 
+pub mod data;
 pub mod glb;
 pub mod gpu;
 pub mod image;

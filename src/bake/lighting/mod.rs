@@ -75,12 +75,26 @@ pub enum BakedLighting {
 /// What is kept of an implicit surface's bake.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ExpressiveLighting {
-    /// Unit normals. Those of foliage point out of the crown, whichever side of a leaf is seen, unless `no_surface`.
+    /// Unit normals. Those of foliage point out of the crown, whichever side of a leaf is seen, unless `no_surface`. Empty
+    /// where the foliage keeps its own.
     pub normals: Vec<Vec<Vec3>>,
     /// k_a, 0..=1.
     pub ambient: Vec<Vec<f32>>,
     /// Why the foliage has its own normals after all.
     pub no_surface: Option<NoSurface>,
+}
+
+impl ExpressiveLighting {
+    /// What is kept of a bake with the normals and the k_a of every part and a share of the leaves' own normals,
+    /// [`ImplicitSettings::own_normal`]. With all of them a leaf is lit as itself, on both of its sides.
+    pub fn new(
+        normals: Vec<Vec<Vec3>>,
+        ambient: Vec<Vec<f32>>,
+        no_surface: Option<NoSurface>,
+        own_normal: f32,
+    ) -> Self {
+        Self { normals: if own_normal < 1.0 { normals } else { Vec::new() }, ambient, no_surface }
+    }
 }
 
 /// What is kept of a transfer bake.
@@ -139,7 +153,8 @@ impl BakedLighting {
             LightingSettings::Expressive(settings) => {
                 let baked = bake_implicit(plant, settings);
                 let no_surface = baked.report.no_surface;
-                Self::Expressive(ExpressiveLighting { normals: baked.normals, ambient: baked.ambient, no_surface })
+                let own_normal = settings.in_range().own_normal;
+                Self::Expressive(ExpressiveLighting::new(baked.normals, baked.ambient, no_surface, own_normal))
             }
             LightingSettings::Transfer(settings) => {
                 let packed = bake_transfer(plant, settings).pack(TransferFormat::Snorm8);
@@ -197,7 +212,8 @@ impl BakedLighting {
         match self {
             Self::Local => true,
             Self::Expressive(lighting) => {
-                lighting.normals.iter().map(Vec::len).eq(counts())
+                let own = lighting.normals.is_empty();
+                (own || lighting.normals.iter().map(Vec::len).eq(counts()))
                     && lighting.ambient.iter().map(Vec::len).eq(counts())
                     && lighting.normals.iter().flatten().all(|normal| normal.is_finite())
                     && lighting.ambient.iter().flatten().all(|ambient| (0.0..=1.0).contains(ambient))
@@ -209,7 +225,16 @@ impl BakedLighting {
 
     /// Whether the foliage's normals point out of the crown rather than out of each leaf.
     pub fn is_realigned(&self) -> bool {
-        matches!(self, Self::Expressive(lighting) if lighting.no_surface.is_none())
+        matches!(self, Self::Expressive(lighting) if lighting.no_surface.is_none() && !lighting.normals.is_empty())
+    }
+
+    /// Whether k_a is known of the leaves: an ambient term that is not 1 throughout. By it the shaders take light from the sun
+    /// too, for the leaves around a leaf that the shadow maps are too coarse for.
+    pub fn has_ambient_term(&self) -> bool {
+        match self {
+            Self::Expressive(lighting) => lighting.ambient.iter().flatten().any(|ambient| *ambient < 1.0),
+            Self::Local | Self::Transfer(_) => false,
+        }
     }
 
     /// What the user ought to know of the bake.

@@ -114,21 +114,23 @@ impl Progress for Speaker {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
     use super::*;
     use crate::scene::{GroundFlat, GrownPlants, Lighting, Quality, ScatteredTrees, Scene, Species};
 
-    #[test]
-    fn a_scene_is_given_up_when_nobody_listens() -> Result<(), Box<dyn std::error::Error>> {
+    /// A scene of many plants.
+    fn many() -> CanopyScene {
         let plant = GrownPlants { individuals: 16, triangles: 5000, ..GrownPlants::default() };
-        let scene = Scene {
+        CanopyScene::new(Scene {
             species: vec![Species { lighting: Some(Lighting::Local), ..Species::new("a", plant) }],
             trees: ScatteredTrees { stems_per_hectare: 100.0, ..ScatteredTrees::default() }.into(),
             quality: Quality { cross_resolution: 64, ..Quality::default() },
             ..Scene::new(GroundFlat { size: 100.0 })
-        };
-        let Job { line, thread: Some(thread) } = Job::start(&CanopyScene::new(scene))? else {
+        })
+    }
+
+    #[test]
+    fn a_scene_is_given_up_when_nobody_listens() -> Result<(), Box<dyn std::error::Error>> {
+        let Job { line, thread: Some(thread) } = Job::start(&many())? else {
             return Err("no thread".into());
         };
         let at_plants = |line: &Line| {
@@ -136,11 +138,23 @@ mod tests {
             said.iter().any(|said| matches!(said, Said::Begin(step, _) if step == "Plants"))
         };
         while !at_plants(&line) && !thread.is_finished() {
-            thread::sleep(Duration::from_millis(1));
+            thread::yield_now();
         }
         drop(line);
         let outcome = thread.join().map_err(|_| "a panic")?;
         assert!(matches!(outcome, Err(StageError::Cancelled)), "{:?}", outcome.err());
+        Ok(())
+    }
+
+    #[test]
+    fn a_job_that_is_dropped_waits_for_nobody() -> Result<(), Box<dyn std::error::Error>> {
+        let job = Job::start(&many())?;
+        // While the line is held its thread cannot end, for it has something to say first.
+        let line = job.line.clone();
+        let held = line.lock().unwrap_or_else(PoisonError::into_inner);
+        drop(job);
+        assert_eq!(Arc::strong_count(&line), 2, "the thread is still at it");
+        drop(held);
         Ok(())
     }
 

@@ -8,9 +8,10 @@ use gltf::json::texture::Info;
 use gltf::json::validation::Checked;
 use image::{ImageReader, Limits, RgbaImage};
 
+use super::GltfOptions;
 use super::container::Document;
+use super::diffuse_transmission::DiffuseTransmission;
 use super::error::{WarningKind, Warnings};
-use super::{GltfOptions, LEAF_TRANSMISSION};
 use crate::plant::{Gloss, PartKind, PlantMaterial};
 
 /// Longest side of an image in texels that is decoded.
@@ -101,9 +102,7 @@ pub(super) fn read(
         gloss: Gloss::MATT,
     };
     if kind == PartKind::Foliage {
-        material.transmission =
-            options.transmission.map_or(LEAF_TRANSMISSION, |t| t.map(|factor| 2.0 * unit(0.5 * factor)));
-        material.gloss = Gloss::LEAF;
+        material.gloss = options.gloss.unwrap_or(Gloss::LEAF).in_range();
         let cutoff = unit(source.alpha_cutoff.as_ref().map_or(0.5, |cutoff| cutoff.0));
         // The factor's alpha scales the texture's; the threshold is scaled instead, to the same effect.
         let masked = source.alpha_mode == Checked::Valid(AlphaMode::Mask);
@@ -115,6 +114,7 @@ pub(super) fn read(
         } else {
             material.alpha_cutoff = if masked && opacity > 0.0 { unit(cutoff / opacity) } else { cutoff };
         }
+        transmit(&mut material, source, document, options, &place, images, warnings);
     }
 
     let mut surface = Surface {
@@ -134,6 +134,31 @@ pub(super) fn read(
         }
     }
     surface
+}
+
+/// Gives foliage its transmission: the caller's, else the file's, else what is usual for the kind of leaf.
+fn transmit(
+    material: &mut PlantMaterial,
+    source: &Material,
+    document: &mut Document,
+    options: &GltfOptions,
+    place: &str,
+    images: &mut Images,
+    warnings: &mut Warnings,
+) {
+    let usual = options.leaf.transmission();
+    material.transmission = options.transmission.map_or(usual, |t| t.map(|factor| 2.0 * unit(0.5 * factor)));
+    if options.transmission.is_some() {
+        return;
+    }
+    if let Some(stated) = DiffuseTransmission::of(source, place, warnings) {
+        let mut image = |info: &Option<Info>, role: &str| {
+            info.as_ref().and_then(|info| load(document, info.index.value(), place, role, images, warnings))
+        };
+        let factor = image(&stated.factor_texture, "transmission");
+        let color = image(&stated.color_texture, "transmission colour");
+        stated.apply(material, [factor.as_deref(), color.as_deref()], place, warnings);
+    }
 }
 
 /// Wood or foliage: by the caller's lists, else by the alpha mode.

@@ -3,8 +3,8 @@
 //! Reads glTF 2.0 [Khronos 2021] as JSON or GLB, with buffers and images in the file, in data URIs or in files beside
 //! it. What is used of it: the default scene's triangles with position, normal and one set of texture coordinates;
 //! base colour (factor, texture), normal texture, alpha mode and cutoff; KHR_texture_transform,
-//! KHR_materials_pbrSpecularGlossiness (its diffuse part) and KHR_mesh_quantization. Everything else is named in a
-//! [`Warning`].
+//! KHR_materials_pbrSpecularGlossiness (its diffuse part), KHR_materials_diffuse_transmission (its textures by their means
+//! over the leaf) and KHR_mesh_quantization. Everything else is named in a [`Warning`].
 //!
 //! Files come from anywhere, so nothing in them is believed: every index, length and count is checked before it is
 //! used, and no file makes this module panic or allocate beyond its own size and fixed limits. Damage that touches
@@ -13,6 +13,7 @@
 
 mod accessor;
 mod container;
+mod diffuse_transmission;
 mod error;
 mod material;
 mod nodes;
@@ -27,17 +28,9 @@ use glam::Vec3;
 pub use error::{PlantError, Warning, WarningKind};
 pub use report::{PartReport, PlantReport};
 
-use super::{PartKind, Plant, PlantMesh, PlantPart};
+use super::{Gloss, LeafKind, PartKind, Plant, PlantMesh, PlantPart};
 use error::{EXPORT_AGAIN, Fault, Warnings};
 use material::{Images, Surface};
-
-/// The default of [`super::PlantMaterial::transmission`] for foliage, as glTF has no field for it that is in wide use.
-///
-/// A leaf's transmittance over what its inside reflects. In the plate model of a leaf [Jacquemoud & Baret 1990, "PROSPECT"]
-/// both come from the same scattering, so they have the same colour, and what tells the light through a leaf from the light
-/// of its face is the colourless share that the surface reflects ([`super::Gloss`]). A typical green leaf reflects 12 % and
-/// transmits 10 % of green light; without the surface's 4.5 % that is a ratio of 1.3.
-pub const LEAF_TRANSMISSION: Vec3 = Vec3::splat(1.3);
 
 /// A plant that stands farther off than this share of its height is moved to the origin.
 const FAR_OFF: f32 = 0.1;
@@ -55,9 +48,13 @@ pub struct GltfOptions {
     pub foliage_materials: Vec<String>,
     /// Names of materials that are wood whatever their alpha mode.
     pub wood_materials: Vec<String>,
-    /// Light through leaves, as [`super::PlantMaterial::transmission`] has it, 0..2 each; `None` takes
-    /// [`LEAF_TRANSMISSION`].
+    /// What the leaves are made of: how much light passes, where the file does not say it.
+    pub leaf: LeafKind,
+    /// Light through leaves, as [`super::PlantMaterial::transmission`] has it, 0..2 each. `None` takes what the file's
+    /// materials say (KHR_materials_diffuse_transmission), else what is usual for `leaf`.
     pub transmission: Option<Vec3>,
+    /// The gloss of leaves; `None` is [`Gloss::LEAF`]. glTF's roughness and specular terms are those of exporters' defaults.
+    pub gloss: Option<Gloss>,
     /// Name of the plant; `None` takes the file's name without its ending.
     pub name: Option<String>,
 }
@@ -111,7 +108,8 @@ fn is_harmless(extension: &str) -> bool {
 
 /// Extensions that are understood.
 fn is_understood(extension: &str) -> bool {
-    ["KHR_texture_transform", "KHR_materials_pbrSpecularGlossiness", "KHR_mesh_quantization"].contains(&extension)
+    let others = ["KHR_texture_transform", "KHR_materials_pbrSpecularGlossiness", "KHR_mesh_quantization"];
+    extension == diffuse_transmission::NAME || others.contains(&extension)
 }
 
 fn check_extensions(root: &gltf::json::Root, path: &Path, warnings: &mut Warnings) -> Result<(), PlantError> {

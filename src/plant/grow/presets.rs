@@ -9,6 +9,7 @@ use super::parameters::{
     BarkKind, BarkParameters, BranchParameters, CrownShape, GrowParameters, LeafParameters, LeafShape, Pruning,
     StemParameters,
 };
+use crate::plant::LeafKind;
 
 /// The species file of the conifer.
 const CONIFER: &str = include_str!("../../../assets/species/conifer.ron");
@@ -174,7 +175,7 @@ impl Default for LeafParameters {
             shell: 0.65,
             tint: [0.62, 0.66, 0.72],
             tint_variation: 0.12,
-            transmission: [1.3, 1.3, 1.3],
+            transmission: LeafKind::Thin.transmission().to_array(),
         }
     }
 }

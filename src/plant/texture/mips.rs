@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::coverage::{Distribution, match_coverage};
 use super::dilate::dilate_colors;
-use super::fade::fade_alpha;
+use super::fade::{AlphaFade, fade_alpha};
 use crate::math::{MipChain, color::unorm8, resample::Layer};
 
 /// A mean normal this short is the rounding of 8 bits.
@@ -47,11 +47,12 @@ pub fn alpha_tested_mips(image: &RgbaImage) -> MipChain {
 }
 
 /// Mips of a leaf texture that was made to be drawn with an alpha test at `cutoff` (0..1), to be drawn with one at 0.5 or
-/// above: colours without halos, alpha that fades, coverage that is kept.
+/// above: colours without halos, alpha that fades leaf by leaf ([`AlphaFade::PerLeaf`]: a picture of leaves is no crown),
+/// coverage that is kept.
 pub fn leaf_mips(image: &RgbaImage, cutoff: f32) -> MipChain {
     let mut dilated = image.clone();
     dilate_colors(&mut dilated);
-    alpha_tested_mips(&fade_alpha(&dilated, cutoff))
+    alpha_tested_mips(&fade_alpha(&dilated, cutoff, AlphaFade::PerLeaf))
 }
 
 /// Mips of a tangent-space normal map (RGB8, 127.5 is zero): averaged as vectors, renormalised, alpha averaged.

@@ -1,5 +1,5 @@
-//! Plant textures: mip chains that keep the coverage of the alpha test, colours without halos, and alpha in
-//! which a leaf shrinks from its outline to its middle.
+//! Plant textures: mip chains that keep the coverage of the alpha test, colours without halos, and alpha that fades with
+//! the threshold.
 //!
 //! A leaf texture is drawn with an alpha test. Three things go wrong when such a texture is treated as an
 //! ordinary one, and each has its function here:
@@ -10,8 +10,8 @@
 //! - The colour of texels that nobody sees bleeds into those that are seen. [`color_mips`] weighs colours by
 //!   coverage, [`dilate_colors`] replaces the invisible colours by those of the nearest leaf.
 //! - A threshold that rises through a cut-out does nothing at all, then everything at once. [`fade_alpha`]
-//!   restructures alpha so that leaves shrink steadily, centre last [Franzke 2005, section 4.3.3, "blending
-//!   texture"].
+//!   restructures alpha so that leaves shrink steadily ([`AlphaFade::PerLeaf`], ours), or the crown does, its centre last
+//!   ([`AlphaFade::CenterOut`], the "blending texture" of [Franzke 2005, section 4.3.3]).
 //!
 //! The order for a leaf: `dilate_colors`, then `fade_alpha`, then `alpha_tested_mips`; [`leaf_mips`] does all three.
 //!
@@ -26,5 +26,5 @@ mod mips;
 
 pub use dilate::dilate_colors;
 pub use distance::{NearestSites, nearest_sites};
-pub use fade::fade_alpha;
+pub use fade::{AlphaFade, fade_alpha};
 pub use mips::{alpha_tested_mips, color_mips, leaf_mips, normal_mips};

@@ -32,6 +32,8 @@ enum TextureUse {
 #[derive(Default)]
 pub struct TextureCache {
     views: HashMap<(usize, TextureUse), TextureView>,
+    /// Bound where a material has no normal map, and never sampled.
+    no_normals: Option<TextureView>,
 }
 
 impl TextureCache {
@@ -59,11 +61,12 @@ impl TextureCache {
             .clone()
     }
 
-    /// The normal map; flat without a texture.
+    /// The normal map. Without one a texel that no pipeline samples, the same for all materials.
     pub fn normal(&mut self, material: &PlantMaterial, device: &RenderDevice, queue: &RenderQueue) -> TextureView {
         let format = TextureFormat::Rgba8Unorm;
         let Some(image) = &material.normal_texture else {
-            return gpu::texture(device, queue, "canopy_flat", format, &plain([128, 128, 255, 255]), 1);
+            let flat = || gpu::texture(device, queue, "canopy_flat", format, &plain([128, 128, 255, 255]), 1);
+            return self.no_normals.get_or_insert_with(flat).clone();
         };
         self.views
             .entry((Arc::as_ptr(image) as usize, TextureUse::Normal))

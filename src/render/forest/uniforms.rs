@@ -15,7 +15,7 @@ use crate::{
     },
     light::sh::MAX_BANDS,
     math::luminance,
-    plant::{LeafColors, PlantMaterial},
+    plant::{LeafColors, PlantMaterial, lobe_gain, lobe_peak},
     scatter::PlantSize,
 };
 
@@ -84,8 +84,14 @@ pub struct VariantUniform {
     pub indirect_sun_mean: f32,
     /// Its colour.
     pub indirect_sun_color: [f32; 3],
+    /// 1 where its ambient visibility is the ambient term of a density field, else 0.
+    pub ambient_term: u32,
+    /// Strength of the lobe of its gloss that carries a share of 1 ([`lobe_gain`]).
+    pub lobe_gain: f32,
+    /// Greatest strength of the lobe where nothing else reflects or transmits (one over [`lobe_peak`]).
+    pub lobe_limit: f32,
     /// WGSL rounds the size up to 16 bytes.
-    pub padding: f32,
+    pub padding: [u32; 2],
 }
 
 /// `CrossVariant` of `shaders/forest/cross_variant.wgsl`.
@@ -120,8 +126,12 @@ pub struct PartUniform {
     pub specular_reflectance: f32,
     /// Root mean square slope of its facets.
     pub roughness: f32,
-    /// WGSL rounds the size up to 16 bytes.
-    pub padding: [f32; 3],
+    /// 1 where its ambient visibility is the ambient term of a density field, else 0.
+    pub ambient_term: u32,
+    /// Strength of the lobe of its gloss that carries a share of 1 ([`lobe_gain`]).
+    pub lobe_gain: f32,
+    /// Greatest strength of the lobe where nothing else reflects or transmits (one over [`lobe_peak`]).
+    pub lobe_limit: f32,
 }
 
 /// Words of four coefficients after the first, of all bands.
@@ -194,7 +204,10 @@ fn variant(plant: &BakedPlant, size: &PlantSize) -> VariantUniform {
         indirect_sun_zenith: zenith,
         indirect_sun_color: scattered_tint(&plant.plant.leaf_colors()).to_array(),
         indirect_sun_mean: mean,
-        padding: 0.0,
+        ambient_term: u32::from(plant.lighting.has_ambient_term()),
+        lobe_gain: lobe_gain(gloss.roughness),
+        lobe_limit: lobe_peak(gloss.roughness).recip(),
+        padding: [0; 2],
     }
 }
 
@@ -240,6 +253,40 @@ pub fn part_uniform(material: &PlantMaterial, lighting: &BakedLighting) -> PartU
         transmission: material.transmission.to_array(),
         specular_reflectance: gloss.reflectance,
         roughness: gloss.roughness,
-        padding: [0.0; 3],
+        ambient_term: u32::from(lighting.has_ambient_term()),
+        lobe_gain: lobe_gain(gloss.roughness),
+        lobe_limit: lobe_peak(gloss.roughness).recip(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::{
+        bake::{BakeSettings, bake_plant, lighting::LightingSettings, lighting::implicit::ImplicitSettings},
+        plant::grow::{GrowParameters, grow},
+    };
+
+    #[test]
+    fn a_share_of_1_of_their_own_normals_lights_leaves_as_leaves() -> Result<(), Box<dyn std::error::Error>> {
+        let plant = Arc::new(grow(&GrowParameters::broadleaf(), 1, 5000)?);
+        let baked = |lighting| bake_plant(plant.clone(), &BakeSettings { lighting, ..BakeSettings::default() }, None).0;
+        let expressive =
+            |own_normal| baked(LightingSettings::Expressive(ImplicitSettings { own_normal, ..Default::default() }));
+        let (local, own, half) = (baked(LightingSettings::Local), expressive(1.0), expressive(0.5));
+        for (part, source) in plant.parts.iter().enumerate() {
+            let realigned = |plant: &BakedPlant| part_uniform(&source.material, &plant.lighting).realigned;
+            assert_eq!([realigned(&local), realigned(&own), realigned(&half)], [0.0, 0.0, 1.0]);
+            assert_eq!(own.lighting.normals(part), None, "the leaves keep their own");
+        }
+        // Crosses too: their texels' normals are those of leaves, of which the seen side counts.
+        let normals = |plant: &BakedPlant| -> Vec<[u8; 2]> {
+            let textures = plant.cross().into_iter().flat_map(|cross| &cross.textures.properties);
+            textures.flat_map(|chain| chain.levels[0].chunks_exact(4).map(|texel| [texel[0], texel[1]])).collect()
+        };
+        assert!(normals(&own) == normals(&local) && normals(&half) != normals(&local));
+        Ok(())
     }
 }

@@ -134,7 +134,8 @@ impl Piece {
                 }
                 let baked = bake_implicit(&self.plant, &settings);
                 let (values, no_surface) = (baked.report.parameters, baked.report.no_surface);
-                let lighting = ExpressiveLighting { normals: baked.normals, ambient: baked.ambient, no_surface };
+                let own_normal = settings.in_range().own_normal;
+                let lighting = ExpressiveLighting::new(baked.normals, baked.ambient, no_surface, own_normal);
                 let lighting = Arc::new(BakedLighting::Expressive(lighting));
                 Content::Light { preview: *preview, lighting, values, no_surface }
             }
@@ -268,6 +269,7 @@ impl Shared {
             Ok(pool) => pool,
             Err(error) => {
                 self.state().failure = Some(format!("no threads for bakes: {error}"));
+                self.changed.notify_all();
                 return;
             }
         };
@@ -335,6 +337,13 @@ impl Baker {
         self.shared.state().jobs.get(&species).map(Job::progress)
     }
 
+    /// Waits until there is news, or nothing left to do.
+    #[cfg(test)]
+    pub(super) fn wait(&self) {
+        let idle = |state: &mut State| state.news.is_empty() && !state.jobs.is_empty() && state.failure.is_none();
+        drop(self.shared.changed.wait_while(self.shared.state(), idle));
+    }
+
     /// Why nothing can be baked, if so.
     pub fn failure(&self) -> Option<String> {
         self.shared.state().failure.clone()
@@ -369,9 +378,9 @@ mod tests {
 
     /// All news until the order of species 0 is carried out.
     fn all_news(baker: &mut Baker) -> Vec<News> {
-        let (started, mut news) = (Instant::now(), Vec::new());
-        while baker.progress(0).is_some() && started.elapsed() < Duration::from_secs(120) {
-            thread::sleep(Duration::from_millis(2));
+        let mut news = Vec::new();
+        while baker.progress(0).is_some() && baker.failure().is_none() {
+            baker.wait();
             news.extend(baker.news());
         }
         news.extend(baker.news());
@@ -420,7 +429,6 @@ mod tests {
         let radius = |turn: u16| 1.0 + 0.1 * f32::from(turn);
         for turn in 0..20 {
             baker.order(order(&plants, ImplicitSettings { radius: Some(radius(turn)), ..ImplicitSettings::default() }));
-            thread::sleep(Duration::from_millis(3));
         }
         let full: Vec<f32> = all_news(&mut baker)
             .iter()

@@ -8,12 +8,12 @@ use crate::math::{
     MipChain,
     color::{srgb8, unorm8},
 };
-use crate::plant::texture::{alpha_tested_mips, dilate_colors, fade_alpha};
+use crate::plant::texture::{AlphaFade, alpha_tested_mips, dilate_colors, fade_alpha};
 
 /// Colour mips of a picture of `resolution`² texels. Alpha is the coverage, restructured by [`fade_alpha`] with the
 /// cutoff for which the area inside the outline is the sum of the coverages: a thin crown is full of texels that are
 /// covered in part, and a cutoff of one half would drop or fill them all.
-pub(super) fn mips(texels: &[Texel], resolution: usize) -> MipChain {
+pub(super) fn mips(texels: &[Texel], resolution: usize, fade: AlphaFade) -> MipChain {
     let mut image = RgbaImage::new(resolution as u32, resolution as u32);
     for (out, texel) in image.pixels_mut().zip(texels) {
         if texel.coverage > 0.0 {
@@ -23,7 +23,7 @@ pub(super) fn mips(texels: &[Texel], resolution: usize) -> MipChain {
     }
     let coverage: f64 = texels.iter().map(|texel| f64::from(texel.coverage)).sum::<f64>() / texels.len().max(1) as f64;
     if coverage > 0.0 {
-        image = restructured(&image, coverage);
+        image = restructured(&image, coverage, fade);
         dilate_colors(&mut image);
     }
     alpha_tested_mips(&image)
@@ -33,7 +33,7 @@ pub(super) fn mips(texels: &[Texel], resolution: usize) -> MipChain {
 ///
 /// The cutoff is found by bisection on the given alpha, whose outline [`fade_alpha`] keeps to a fraction of a texel.
 /// What it does not keep, in thin twigs above all, is made good by aiming that much beside the mark.
-fn restructured(image: &RgbaImage, coverage: f64) -> RgbaImage {
+fn restructured(image: &RgbaImage, coverage: f64, fade: AlphaFade) -> RgbaImage {
     const BISECTIONS: usize = 9;
     const CORRECTIONS: usize = 4;
     const GOOD_ENOUGH: f64 = 0.005;
@@ -50,7 +50,7 @@ fn restructured(image: &RgbaImage, coverage: f64) -> RgbaImage {
     let mut best = (f64::INFINITY, image.clone());
     let mut aim = coverage;
     for _ in 0..CORRECTIONS {
-        let candidate = fade_alpha(image, cutoff_of(aim));
+        let candidate = fade_alpha(image, cutoff_of(aim), fade);
         let faded: Vec<u8> = candidate.pixels().map(|pixel| pixel.0[3]).collect();
         let ratio = area_above(&faded, width, 0.5) / coverage;
         if (ratio - 1.0).abs() < best.0 {
@@ -130,18 +130,20 @@ mod tests {
             })
             .collect();
         let wanted = texels.iter().map(|t| f64::from(t.coverage)).sum::<f64>() / texels.len() as f64;
-        let chain = mips(&texels, 128);
-        let top = RgbaImage::from_raw(128, 128, chain.levels[0].clone()).unwrap();
-        let alphas: Vec<u8> = top.pixels().map(|pixel| pixel.0[3]).collect();
-        let got = area_above(&alphas, 128, 0.5);
-        assert!((got / wanted - 1.0).abs() < 0.03, "{got} for {wanted}");
-        // One colour went in, one comes out, outside the outline too.
-        assert!(top.pixels().all(|p| p.0[..3] == top.get_pixel(0, 0).0[..3]));
+        for fade in [AlphaFade::PerLeaf, AlphaFade::CenterOut] {
+            let chain = mips(&texels, 128, fade);
+            let top = RgbaImage::from_raw(128, 128, chain.levels[0].clone()).unwrap();
+            let alphas: Vec<u8> = top.pixels().map(|pixel| pixel.0[3]).collect();
+            let got = area_above(&alphas, 128, 0.5);
+            assert!((got / wanted - 1.0).abs() < 0.03, "{fade:?}: {got} for {wanted}");
+            // One colour went in, one comes out, outside the outline too.
+            assert!(top.pixels().all(|p| p.0[..3] == top.get_pixel(0, 0).0[..3]));
+        }
     }
 
     #[test]
     fn nothing_stays_transparent() {
-        let chain = mips(&vec![Texel::default(); 64 * 64], 64);
+        let chain = mips(&vec![Texel::default(); 64 * 64], 64, AlphaFade::default());
         assert!(chain.levels.iter().flatten().all(|&byte| byte == 0));
         assert_eq!(chain.levels.len(), 7);
     }

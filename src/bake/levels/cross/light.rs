@@ -120,7 +120,7 @@ mod tests {
         let lighting = BakedLighting::bake(&plant, &LightingSettings::Transfer(bake));
         let BakedLighting::Transfer(transfer) = &lighting else { panic!("no transfer") };
         let baked = transfer.packed.unpack();
-        let settings = CrossSettings { resolution: 64, supersampling: 2, normal_smoothing: 0.0 };
+        let settings = CrossSettings { resolution: 64, supersampling: 2, ..CrossSettings::default() };
         let plane = &planes(&plant)[0];
         let frame = plane.frame();
         let sides = vertex_sides(&lighting).unwrap();

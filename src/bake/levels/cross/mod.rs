@@ -27,7 +27,7 @@ use self::properties::SpreadSum;
 use super::rasterize::{Hit, Raster, View};
 use crate::bake::lighting::BakedLighting;
 use crate::math::{MipChain, luminance};
-use crate::plant::{Bounds, PartKind, Plant, geometry};
+use crate::plant::{Bounds, PartKind, Plant, PlantMaterial, geometry, texture::AlphaFade};
 
 /// Crossed billboards of one plant.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,8 +36,7 @@ pub struct Cross {
     pub planes: Vec<CrossPlane>,
     /// Their pictures, in the order of the planes.
     pub textures: CrossTextures,
-    /// Transmission of the foliage (mean over its area), a factor as in [`crate::plant::PlantMaterial::transmission`], 0..2
-    /// each; applies to texels in the measure of their foliage.
+    /// Transmission of the foliage (mean over its area), a factor as in [`PlantMaterial::transmission`]; applies to texels in the measure of their foliage.
     pub transmission: Vec3,
     /// Share of the leaves in a texel that face everywhere alike, 0..1, for each of the pictures' first mips (the last one
     /// stands for all that follow): what their mean normal no longer tells. 0: one leaf with the texel's normal.
@@ -93,8 +92,8 @@ impl CrossPlane {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CrossTextures {
     /// Base colour: sRGB-encoded RGB, to be drawn with an alpha test at 0.5 or above. At 0.5 the outline covers what
-    /// the full model covers (in every mip); towards 1 the crown shrinks to its inside
-    /// ([`crate::plant::texture::fade_alpha`]), which fades a cross out without popping. Colours are dilated.
+    /// the full model covers (in every mip); towards 1 the crown vanishes in the order of [`CrossSettings::fade`]
+    /// ([`crate::plant::texture::fade_alpha`]), without popping. Colours are dilated.
     pub color: Vec<MipChain>,
     /// RG: the normal, octahedral [Cigolle et al. 2014, "A Survey of Efficient Representations for Independent Unit
     /// Vectors"; Bevy's `octahedral_decode`], **in the plane's frame** (x right, y up, z to the front): decode, flip
@@ -122,11 +121,14 @@ pub struct CrossSettings {
     /// Standard deviation of the normals' smoothing as a share of the picture's width, 0..=0.1. 0: every leaf is lit for
     /// itself; larger: the crown is lit as a rounded body. Either way [`Cross::spread`] keeps what a mean loses.
     pub normal_smoothing: f32,
+    /// Which texels appear first while a cross fades in. The default is truer where nothing fades, the published order pops
+    /// less (`docs/measurements/alpha-fade.md`).
+    pub fade: AlphaFade,
 }
 
 impl Default for CrossSettings {
     fn default() -> Self {
-        Self { resolution: 256, supersampling: 4, normal_smoothing: 0.0 }
+        Self { resolution: 256, supersampling: 4, normal_smoothing: 0.0, fade: AlphaFade::default() }
     }
 }
 
@@ -139,6 +141,7 @@ impl CrossSettings {
             resolution: self.resolution.clamp(64, 1024).next_power_of_two(),
             supersampling: self.supersampling.clamp(1, 8),
             normal_smoothing: smoothing.clamp(0.0, 0.1),
+            fade: self.fade,
         }
     }
 }
@@ -157,7 +160,7 @@ pub fn bake_cross(plant: &Plant, lighting: &BakedLighting, settings: &CrossSetti
             let texels = picture(plant, lighting, sides.as_deref(), plane, &settings);
             let properties = properties::mips(&texels, resolution, settings.normal_smoothing);
             let light = sides.is_some().then(|| light::mips(&texels, resolution));
-            (color::mips(&texels, resolution), (properties, light))
+            (color::mips(&texels, resolution, settings.fade), (properties, light))
         })
         .collect();
     let (color, properties): (Vec<_>, Vec<_>) = pictures.into_iter().unzip();
@@ -221,7 +224,8 @@ fn mean_transmission(plant: &Plant) -> Vec3 {
         total += area as f32;
     }
     let mean = sum / total;
-    if mean.is_finite() { mean.clamp(Vec3::ZERO, Vec3::splat(2.0)) } else { Vec3::ZERO }
+    let most = Vec3::splat(PlantMaterial::MOST_TRANSMISSION);
+    if mean.is_finite() { mean.clamp(Vec3::ZERO, most) } else { Vec3::ZERO }
 }
 
 /// The mean of a texel's samples. All but `coverage` are weighted with it: sums over the samples that see the plant,

@@ -115,11 +115,14 @@ fn outward(sample: &FieldSample, radius: f32) -> Vec3 {
     if slope.is_finite() { slope } else { Vec3::ZERO }
 }
 
-/// A linear blend between the realigned normal and a share (0..=1) of the leaf's own; both are unit vectors, and so
-/// is the result. Where they cancel, or there is no realigned normal, one of them is left.
+/// A linear blend between the realigned normal and a share (0..=1) of the leaf's own [Luft 2007, 3.3]; both are unit
+/// vectors, and so is the result. A leaf has two sides and its normal may be stored for either, so it is first turned to the
+/// side of the realigned one. A share of 1 is the leaf's own normal as it is stored. Where there is no realigned normal, or
+/// the blend has no length, one of the two is left.
 pub fn blend(own: Vec3, realigned: Option<Vec3>, own_share: f32) -> Vec3 {
-    let Some(realigned) = realigned else { return own };
-    let sum = own_share * own + (1.0 - own_share) * realigned;
+    let Some(realigned) = realigned.filter(|_| own_share < 1.0) else { return own };
+    let facing = if own.dot(realigned) < 0.0 { -own } else { own };
+    let sum = own_share * facing + (1.0 - own_share) * realigned;
     if sum.length_squared() > 1.0e-8 { sum.try_normalize().unwrap_or(realigned) } else { realigned }
 }
 
@@ -182,5 +185,23 @@ mod tests {
         assert!((blend(x, Some(y), 0.5) - Vec3::new(0.5, 0.5, 0.0).normalize()).length() < 1e-6);
         assert_eq!(blend(x, Some(-x), 0.5), -x);
         assert_eq!(blend(x, None, 0.5), x);
+    }
+
+    #[test]
+    fn a_leaf_is_blended_by_the_side_that_faces_outward() {
+        let outward = Vec3::new(0.36, 0.48, 0.8);
+        for own in scattered(200, 2).into_iter().filter_map(|p| (2.0 * p - 1.0).try_normalize()) {
+            for share in [0.0, 0.25, 0.5, 0.9, 0.999] {
+                let blended = blend(own, Some(outward), share);
+                assert!(
+                    (blended - blend(-own, Some(outward), share)).length() < 1e-6,
+                    "the stored side does not count"
+                );
+                // Between the two, so never farther from the crown's normal than the leaf's own is.
+                assert!(blended.dot(outward) >= own.dot(outward).abs() - 1e-6);
+            }
+            assert_eq!(blend(own, Some(outward), 1.0), own);
+            assert_eq!(blend(-own, Some(outward), 1.0), -own);
+        }
     }
 }

@@ -104,7 +104,7 @@ pub struct ImplicitReport {
     pub parameters: ImplicitParameters,
     /// Number of generators.
     pub generators: usize,
-    /// Edge of the surface's cells in metres; 0 where no surface was asked for.
+    /// Edge of the cells from which the returned surface was extracted, metres; 0 where no surface was asked for.
     pub cell: f32,
     /// Why normals were kept; `None` where they were realigned.
     pub no_surface: Option<NoSurface>,
@@ -170,7 +170,7 @@ fn basis(parts: &[Part], settings: &ImplicitSettings) -> Basis {
 }
 
 /// The surface with at most `target` triangles, or as near to it as its separate lobes allow, and with normals of
-/// `field` again. It stays closed.
+/// `field` again. It stays closed. A surface that has fewer triangles keeps them.
 pub fn simplify_surface(surface: &SurfaceMesh, field: &DensityField, target: usize) -> SurfaceMesh {
     let (positions, triangles) = simplify::simplify(&surface.positions, &surface.triangles, target);
     with_normals(positions, triangles, field)
@@ -304,12 +304,51 @@ fn bake_parts(
 
     let leaves: usize =
         parts.iter().filter(|part| part.source.kind == PartKind::Foliage).map(|part| part.mesh.triangles.len()).sum();
-    let surface = (!surface.triangles.is_empty()).then_some(surface).map(|surface| match settings.surface_share {
-        Some(share) => simplify_surface(&surface, field, (f64::from(share) * leaves as f64).round() as usize),
-        None => surface,
-    });
+    let (surface, cell) = match settings.surface_share {
+        Some(share) if !surface.triangles.is_empty() => {
+            let target = (f64::from(share) * leaves as f64).round() as usize;
+            let (surface, cell) = with_triangles(surface, cell, target, field, parameters.threshold);
+            (simplify_surface(&surface, field, target), cell)
+        }
+        _ => (surface, cell),
+    };
+    let surface = (!surface.triangles.is_empty()).then_some(surface);
     let report = ImplicitReport { parameters, generators, cell, no_surface };
     ImplicitBake { normals, ambient, surface, report }
+}
+
+/// The surface F = `threshold` with `target` triangles or more, for [`simplify_surface`] to reach the target from above:
+/// `surface`, extracted with cells of `cell` metres, or one with finer cells. As near to it as [`isosurface::MOST_CELLS`]
+/// allows. With the edge of its cells; a finer surface has no normals yet.
+fn with_triangles(
+    surface: SurfaceMesh,
+    cell: f32,
+    target: usize,
+    field: &DensityField,
+    threshold: f32,
+) -> (SurfaceMesh, f32) {
+    /// Triangles that a finer surface aims at, as a multiple of the target: the simplification is to choose where they go,
+    /// not the lattice.
+    const SURPLUS: f32 = 2.0;
+    /// Triangles grow with the square of the resolution, and somewhat faster where finer cells find more lobes: the first
+    /// attempt is enough as a rule.
+    const ATTEMPTS: usize = 4;
+    let (mut surface, mut cell) = (surface, cell);
+    for _ in 0..ATTEMPTS {
+        let count = surface.triangles.len();
+        if count >= target {
+            break;
+        }
+        let finer = cell * (count as f32 / (SURPLUS * target as f32)).sqrt();
+        let found = isosurface::extract(field, &field.extent(), threshold, finer);
+        // Where there would be too many cells the extraction takes larger ones.
+        if found.cell >= cell || found.triangles.len() <= count {
+            break;
+        }
+        cell = found.cell;
+        surface = SurfaceMesh { positions: found.positions, normals: Vec::new(), triangles: found.triangles };
+    }
+    (surface, cell)
 }
 
 /// Why there is no surface; `values` gives the density at all vertices, which is only asked for where it matters.

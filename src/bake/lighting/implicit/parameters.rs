@@ -100,15 +100,17 @@ pub struct ImplicitSettings {
     pub weighting: Weighting,
     /// Where the normals come from.
     pub normals: NormalSource,
-    /// Share of a leaf's own normal in the result, 0..=1; the publication shows 0.
+    /// Share of a leaf's own normal in the result, 0..=1; the publication shows 0. 1: the leaves' own normals, unchanged.
     pub own_normal: f32,
     /// Whether the surface is extracted where the normals do not need it.
     pub surface: bool,
     /// Cells of the surface a radius ρ, 1..=16. More: a finer surface, with the square in triangles.
     pub resolution: f32,
     /// Triangles of the surface that is returned as a share of the foliage's, 0..=1 (the presets
-    /// [`COARSE_SHARE`](super::COARSE_SHARE) and [`FINE_SHARE`](super::FINE_SHARE)); `None` leaves it as extracted.
-    /// Normals always come from the surface as extracted.
+    /// [`COARSE_SHARE`](super::COARSE_SHARE) and [`FINE_SHARE`](super::FINE_SHARE)); `None` leaves it as extracted. The share
+    /// is reached: a surface with fewer triangles is extracted again with finer cells. Exceptions: more separate lobes than
+    /// the share has tetrahedra for, and more cells than [`MOST_CELLS`](super::isosurface::MOST_CELLS). Normals always come
+    /// from the surface as `resolution` gives it.
     pub surface_share: Option<f32>,
     /// Whether all trees of such species are lit together, so that a small tree is darkened by its tall neighbour [Luft
     /// 2007, 5]. Each tree then is a model of its own, of which a scene has at most 64. The first such species' values

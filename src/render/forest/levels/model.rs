@@ -88,22 +88,37 @@ impl PartLight {
     }
 }
 
+/// What a part's pipeline depends on beside its light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct PartSurface {
+    /// Wood or foliage.
+    kind: PartKind,
+    /// Whether its material has a normal map. Without one no pipeline samples any.
+    normal_map: bool,
+}
+
+impl PartSurface {
+    /// All of them, wood first.
+    const ALL: [Self; 4] = [
+        Self { kind: PartKind::Wood, normal_map: false },
+        Self { kind: PartKind::Wood, normal_map: true },
+        Self { kind: PartKind::Foliage, normal_map: false },
+        Self { kind: PartKind::Foliage, normal_map: true },
+    ];
+}
+
 /// Which pipeline draws a part, as the bits that [`LevelRenderer::pipeline`] takes. Wood has the lower numbers, as it is
 /// drawn first: what it hides of the leaves is not shaded.
-fn features(kind: PartKind, light: PartLight) -> u32 {
-    let kind = match kind {
-        PartKind::Wood => 0,
-        PartKind::Foliage => PartLight::ALL.len(),
-    };
+fn features(surface: PartSurface, light: PartLight) -> u32 {
+    let surface = PartSurface::ALL.iter().position(|known| *known == surface).unwrap_or(0);
     let light = PartLight::ALL.iter().position(|known| *known == light).unwrap_or(0);
-    (kind + light) as u32
+    (surface * PartLight::ALL.len() + light) as u32
 }
 
 /// The inverse of [`features`].
-fn part_of(features: u32) -> (PartKind, PartLight) {
+fn part_of(features: u32) -> (PartSurface, PartLight) {
     let (features, lights) = (features as usize, PartLight::ALL.len());
-    let kind = if features < lights { PartKind::Wood } else { PartKind::Foliage };
-    (kind, PartLight::ALL[features % lights])
+    (PartSurface::ALL[features / lights % PartSurface::ALL.len()], PartLight::ALL[features % lights])
 }
 
 /// Group 2: colour, normals, sampler, material.
@@ -176,7 +191,7 @@ impl LevelRenderer for ModelRenderer {
     }
 
     fn pipeline(&self, features: u32, target: LevelTarget) -> RenderPipelineDescriptor {
-        let (kind, light) = part_of(features);
+        let (PartSurface { kind, normal_map }, light) = part_of(features);
         let foliage = kind == PartKind::Foliage;
         let mut defs: Vec<ShaderDefVal> = Vec::new();
         if foliage {
@@ -202,6 +217,9 @@ impl LevelRenderer for ModelRenderer {
                 ..Default::default()
             };
         };
+        if normal_map {
+            defs.push("NORMAL_MAP".into());
+        }
         let mut groups = vec![part_layout()];
         if let PartLight::Transfer { color, sun } = light {
             defs.push("TRANSFER".into());
@@ -239,7 +257,7 @@ struct GpuMesh {
 
 /// One part of a plant.
 struct GpuPart {
-    kind: PartKind,
+    surface: PartSurface,
     /// [`PartUniform`] of group 2.
     uniform: Buffer,
     /// The full model.
@@ -263,8 +281,9 @@ struct GpuModels {
 impl GpuLevel for GpuModels {
     fn features(&self, target: LevelTarget) -> Vec<u32> {
         let features_of = |part: &GpuPart| match target {
-            LevelTarget::View(_) => features(part.kind, part.light),
-            LevelTarget::ShadowMap => features(part.kind, PartLight::Plain),
+            LevelTarget::View(_) => features(part.surface, part.light),
+            // A shadow is as deep with a normal map as without.
+            LevelTarget::ShadowMap => features(PartSurface { normal_map: false, ..part.surface }, PartLight::Plain),
         };
         let mut all: Vec<u32> = self.parts.iter().flatten().map(features_of).collect();
         all.sort_unstable();
@@ -277,11 +296,11 @@ impl GpuLevel for GpuModels {
     }
 
     fn draw<'a>(&'a self, pass: &mut TrackedRenderPass<'a>, features: u32, target: LevelTarget, ranges: &[Range<u32>]) {
-        let (kind, light) = part_of(features);
+        let (surface, light) = part_of(features);
         for (range, parts) in ranges.iter().zip(&self.parts).filter(|(range, _)| !range.is_empty()) {
-            for part in parts.iter().filter(|part| part.kind == kind) {
+            for part in parts.iter().filter(|part| part.surface.kind == surface.kind) {
                 let mesh = match target {
-                    LevelTarget::View(_) if part.light != light => continue,
+                    LevelTarget::View(_) if (part.surface, part.light) != (surface, light) => continue,
                     LevelTarget::View(_) => &part.model,
                     LevelTarget::ShadowMap => &part.proxy,
                 };
@@ -355,7 +374,7 @@ fn upload_parts(
             &BindGroupEntries::sequential((&color, &normal, sampler, uniform.as_entire_binding())),
         );
         parts.push(GpuPart {
-            kind: part.kind,
+            surface: PartSurface { kind: part.kind, normal_map: material.normal_texture.is_some() },
             uniform,
             model: upload_mesh(&part.mesh, &vertices(&part.mesh, &plant.lighting, index), gpu),
             proxy: upload_mesh(proxy, &vertices(proxy, &BakedLighting::Local, index), gpu),
@@ -395,10 +414,12 @@ mod tests {
 
     #[test]
     fn every_part_has_a_pipeline_of_its_own_and_wood_comes_first() {
-        let all = [PartKind::Wood, PartKind::Foliage].map(|kind| PartLight::ALL.map(|light| (kind, light)));
-        for (index, (kind, light)) in all.into_iter().flatten().enumerate() {
-            assert_eq!(features(kind, light), index as u32);
-            assert_eq!(part_of(index as u32), (kind, light));
+        let all = PartSurface::ALL.map(|surface| PartLight::ALL.map(|light| (surface, light)));
+        for (index, (surface, light)) in all.into_iter().flatten().enumerate() {
+            assert_eq!(features(surface, light), index as u32);
+            assert_eq!(part_of(index as u32), (surface, light));
         }
+        let is_wood = |surface: &PartSurface| surface.kind == PartKind::Wood;
+        assert!(PartSurface::ALL.is_sorted_by_key(|surface| !is_wood(surface)), "wood first");
     }
 }

@@ -1,0 +1,119 @@
+//! Kinds of leaves: how much of the light passes through them.
+//!
+//! In the plate model of a leaf [Jacquemoud & Baret 1990, "PROSPECT"] reflected and transmitted light come from the same
+//! scattering, so they have the same colour, and what tells the light through a leaf from the light of its face is the
+//! colourless share that the surface reflects ([`Gloss`](super::Gloss)). How much comes through depends on what the leaf is
+//! made of: many scattering layers send light back, few let it pass. So a kind of leaf has one number: its transmittance
+//! over what its inside reflects, as [`PlantMaterial::transmission`](super::PlantMaterial::transmission) has it, here by the
+//! luminances of a typical leaf.
+//!
+//! | kind | reflectance | transmittance | factor | from |
+//! |---|---|---|--:|---|
+//! | thin | 0.065 0.127 0.033 | 0.057 0.123 0.000 | 1.3 | PROSPECT-D, green leaf; autumn leaves, yellow and red: 1.27, 1.28 |
+//! | young | 0.153 0.203 0.032 | 0.211 0.259 0.003 | 1.6 | PROSPECT-D, leaf in spring |
+//! | leathery | 0.104 0.121 0.088 | 0.043 0.062 0.015 | 0.7 | measured, median of 11 woody species |
+//! | needle | 0.070 0.128 0.033 | 0.017 0.046 0.000 | 0.5 | PROSPECT-D, thick needle |
+//! | dead | 0.181 0.116 0.065 | 0.107 0.052 0.013 | 0.7 | PROSPECT-D, brown leaf |
+//!
+//! Colours are linear, Rec. 709 primaries, under light of 6504 K. PROSPECT-D: [Féret et al. 2017]; the green leaf has structure
+//! 1.5, chlorophyll 40 and carotenoid 8 µg/cm², water 0.01 and dry matter 0.008 g/cm². Measured: the spectral library of
+//! Helios [Bailey 2019]. A species differs from its kind by a fifth or more; a file's own value
+//! ([`KHR_materials_diffuse_transmission`](super::gltf)) goes before it.
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+/// What a leaf is made of, as far as light through it is concerned.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum LeafKind {
+    /// Green leaves of most broadleaved trees and herbs, in autumn colours too: about as much light passes as is reflected.
+    #[default]
+    Thin,
+    /// Leaves that have just unfolded: thin and pale, more light passes.
+    Young,
+    /// Thick and tough leaves, such as of evergreen oak, holly, ivy, rhododendron: half of a thin leaf's.
+    Leathery,
+    /// Needles and scales of conifers: a little more than a third of a thin leaf's.
+    Needle,
+    /// Dry brown leaves: half of a thin leaf's.
+    Dead,
+}
+
+impl LeafKind {
+    /// All kinds.
+    pub const ALL: [Self; 5] = [Self::Thin, Self::Young, Self::Leathery, Self::Needle, Self::Dead];
+
+    /// Transmittance over what the inside reflects, 0..=2: each channel of
+    /// [`PlantMaterial::transmission`](super::PlantMaterial::transmission).
+    pub const fn factor(self) -> f32 {
+        match self {
+            Self::Thin => 1.3,
+            Self::Young => 1.6,
+            Self::Leathery | Self::Dead => 0.7,
+            Self::Needle => 0.5,
+        }
+    }
+
+    /// [`LeafKind::factor`] for each channel.
+    pub const fn transmission(self) -> Vec3 {
+        Vec3::splat(self.factor())
+    }
+
+    /// Share of the light that a typical leaf reflects, its surface's included: linear colour, 0..1.
+    pub const fn reflectance(self) -> Vec3 {
+        match self {
+            Self::Thin => Vec3::new(0.065, 0.127, 0.033),
+            Self::Young => Vec3::new(0.153, 0.203, 0.032),
+            Self::Leathery => Vec3::new(0.104, 0.121, 0.088),
+            Self::Needle => Vec3::new(0.070, 0.128, 0.033),
+            Self::Dead => Vec3::new(0.181, 0.116, 0.065),
+        }
+    }
+
+    /// Share of the light that a typical leaf transmits: linear colour, 0..1.
+    pub const fn transmittance(self) -> Vec3 {
+        match self {
+            Self::Thin => Vec3::new(0.057, 0.123, 0.0),
+            Self::Young => Vec3::new(0.211, 0.259, 0.003),
+            Self::Leathery => Vec3::new(0.043, 0.062, 0.015),
+            Self::Needle => Vec3::new(0.017, 0.046, 0.0),
+            Self::Dead => Vec3::new(0.107, 0.052, 0.013),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::{Gloss, PlantMaterial};
+
+    /// Relative luminance of a linear colour, Rec. 709.
+    fn luminance(color: Vec3) -> f32 {
+        color.dot(Vec3::new(0.2126, 0.7152, 0.0722))
+    }
+
+    #[test]
+    fn each_kind_transmits_what_was_measured() {
+        for kind in LeafKind::ALL {
+            let leaf =
+                PlantMaterial { transmission: kind.transmission(), gloss: Gloss::LEAF, ..PlantMaterial::default() };
+            let (got, want) = (leaf.transmitted(kind.reflectance()), kind.transmittance());
+            assert!((luminance(got) / luminance(want) - 1.0).abs() < 0.08, "{kind:?}: {got} {want}");
+            // The colour, which no factor was fitted to.
+            assert!((got - want).abs().max_element() < 0.035, "{kind:?}: {got} {want}");
+        }
+    }
+
+    #[test]
+    fn one_factor_for_all_would_be_two_to_three_times_too_much_for_needles_and_leather() {
+        for (kind, least) in [(LeafKind::Leathery, 1.8), (LeafKind::Needle, 2.5)] {
+            let thin = PlantMaterial {
+                transmission: LeafKind::Thin.transmission(),
+                gloss: Gloss::LEAF,
+                ..PlantMaterial::default()
+            };
+            let ratio = luminance(thin.transmitted(kind.reflectance())) / luminance(kind.transmittance());
+            assert!((least..3.0).contains(&ratio), "{kind:?}: {ratio}");
+        }
+    }
+}

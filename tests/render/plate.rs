@@ -1,0 +1,129 @@
+//! A plate of one material under the sun and the sky: what its surface alone makes of their light.
+
+use std::sync::Arc;
+
+use bevy::{core_pipeline::tonemapping::Tonemapping, prelude::*};
+use canopy::{
+    bake::{BakeSettings, bake_plant, lighting::LightingSettings},
+    components::Sun,
+    lod::{FadeBand, Levels},
+    plant::{Gloss, PartKind, Plant, PlantMaterial, PlantMesh, PlantPart},
+    render::components::{CanopyCamera, Forest, SunShadowSettings},
+    scatter::{PackedStand, PlantSize, Stand, Tree, packed::DEFAULT_CELL_SIZE},
+    scene::Pose,
+};
+use glam::{DVec3, Vec2, Vec3};
+use image::{Rgba, RgbaImage};
+
+use super::{SIZE, again, renderer};
+use crate::support::{
+    gpu::gpu,
+    image::{luminance, mean_color},
+    stage::instant,
+};
+
+/// The sun high in the south, and 35 degrees high in the east.
+const HOURS: [&str; 2] = ["2026-06-21T11:15+00:00", "2026-06-21T07:00+00:00"];
+
+/// Grey, matt, and half as bright from behind.
+fn material() -> PlantMaterial {
+    PlantMaterial {
+        base_color: Vec3::splat(0.12),
+        transmission: Vec3::splat(0.5),
+        gloss: Gloss::MATT,
+        ..PlantMaterial::default()
+    }
+}
+
+/// A level square of 4 m, 3 m over the origin, with these vertex normals. Its texture's right is the east, its up the north.
+fn plate(kind: PartKind, normal: Vec3, material: PlantMaterial) -> Plant {
+    let corners = [(-2.0, -2.0), (-2.0, 2.0), (2.0, 2.0), (2.0, -2.0)];
+    let mesh = PlantMesh {
+        positions: corners.map(|(x, z)| Vec3::new(x, 3.0, z)).to_vec(),
+        normals: vec![normal; 4],
+        uvs: corners.map(|(x, z)| Vec2::new(x, z) / 4.0 + 0.5).to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    };
+    let material = match kind {
+        PartKind::Wood => PlantMaterial { transmission: Vec3::ZERO, ..material },
+        PartKind::Foliage => material,
+    };
+    Plant { name: "plate".to_owned(), parts: vec![PlantPart { kind, mesh, material }] }
+}
+
+/// Luminance of the middle of `plant`, a model up to `fade` metres, seen from above or below at `hour`.
+#[track_caller]
+fn seen(plant: &Plant, fade: f32, above: bool, hour: &str) -> f64 {
+    let settings = BakeSettings { lighting: LightingSettings::Local, ..BakeSettings::default() };
+    let (baked, _) = bake_plant(Arc::new(plant.clone()), &settings, None);
+    let tree = Tree { position: DVec3::ZERO, yaw: 0.0, scale: 1.0, variant: 0, tint: 0.0, index: 0 };
+    let bounds = [PlantSize { radius: 3.0, height: 4.0 }];
+    let stand = PackedStand::new(&Stand { trees: vec![tree] }, DEFAULT_CELL_SIZE, &bounds).expect("one tree");
+    let mut renderer = renderer(1);
+    let (height, pitch) = if above { (13.0, -89.0) } else { (-7.0, 89.0) };
+    renderer.set_view(&Pose { position: (0.0, height, 0.0), yaw: 0.0, pitch }.viewpoint(0.0, 50.0));
+    let world = renderer.app().world_mut();
+    // Numbers as they are, without a curve.
+    let cameras: Vec<Entity> = world.query_filtered::<Entity, With<CanopyCamera>>().iter(world).collect();
+    for camera in cameras {
+        world.entity_mut(camera).insert(Tonemapping::None);
+    }
+    world.spawn(Forest {
+        stand: Arc::new(stand),
+        plants: Arc::new(vec![baked]),
+        suns: Arc::from([]),
+        origin: DVec3::ZERO,
+        levels: Levels::model_and_cross(FadeBand::new(fade, 0.1)),
+        view_distance: 1e4,
+    });
+    renderer.set_sun(Sun { instant: instant(hour), ..Sun::default() });
+    renderer.set_shadow(SunShadowSettings { cascades: 0, ..SunShadowSettings::default() });
+    again(&mut renderer);
+    let picture = again(&mut renderer);
+    let near = |value: u32, size: u32| value.abs_diff(size / 2) < 8;
+    let color = mean_color(&picture, |column, row| near(column, SIZE.0) && near(row, SIZE.1));
+    let light = luminance(color);
+    assert!((0.005..0.9).contains(&light), "{light} is no light that can be compared");
+    light
+}
+
+/// Leaves once had 1.1 times the sun where nothing is known of the leaves around them.
+#[test]
+fn a_leaf_without_an_ambient_term_has_the_light_of_a_board() {
+    let _gpu = gpu();
+    for hour in HOURS {
+        let leaf = plate(PartKind::Foliage, Vec3::Y, PlantMaterial { transmission: Vec3::ZERO, ..material() });
+        let board = seen(&plate(PartKind::Wood, Vec3::Y, material()), 1e4, true, hour);
+        for (what, fade) in [("model", 1e4), ("cross", 0.0)] {
+            let ratio = seen(&leaf, fade, true, hour) / board;
+            assert!((ratio - 1.0).abs() < 0.02, "{hour}, {what}: {ratio} of the board's light");
+        }
+    }
+}
+
+/// The texel of a normal map that leans to the east and the south, and the same normal in the world.
+fn leaning() -> (RgbaImage, Vec3) {
+    let normal = Vec3::new(0.35, -0.45, 0.82).normalize();
+    let texel = (normal * 127.5 + 127.5).to_array().map(|value| value.round() as u8);
+    let image = RgbaImage::from_pixel(8, 8, Rgba([texel[0], texel[1], texel[2], 255]));
+    (image, Vec3::new(normal.x, normal.z, -normal.y))
+}
+
+/// Maps of leaves were uploaded and never sampled, those of bark were taken for their negative.
+#[test]
+fn a_normal_map_leans_the_surface_as_its_normals_would() {
+    let _gpu = gpu();
+    let (map, normal) = leaning();
+    let mapped = PlantMaterial { normal_texture: Some(Arc::new(map)), ..material() };
+    for (kind, above) in [(PartKind::Wood, true), (PartKind::Foliage, true), (PartKind::Foliage, false)] {
+        for hour in HOURS {
+            let of =
+                |normal: Vec3, material: &PlantMaterial| seen(&plate(kind, normal, material.clone()), 1e4, above, hour);
+            let (flat, leaning, by_map) = (of(Vec3::Y, &material()), of(normal, &material()), of(Vec3::Y, &mapped));
+            // A control: it matters.
+            assert!((leaning / flat - 1.0).abs() > 0.03, "{kind:?} {hour}: {leaning} leaning, {flat} flat");
+            let ratio = by_map / leaning;
+            assert!((ratio - 1.0).abs() < 0.02, "{kind:?}, above {above}, {hour}: {ratio}; {by_map} of {flat} flat");
+        }
+    }
+}
