@@ -390,7 +390,7 @@ fn radiance_survives_what_is_not_a_direction() {
 
 #[test]
 fn light_is_continuous_as_the_sun_sinks() {
-    for moon in [MoonSetting::None, MoonSetting::FullOpposite] {
+    for moon in [MoonSetting::None, MoonSetting::Full] {
         let mut last: Option<LightState> = None;
         let mut elevation = 1.0;
         while elevation > -6.0 {
@@ -409,7 +409,7 @@ fn light_is_continuous_as_the_sun_sinks() {
     }
     // Where shadows change from the sun's to the moon's, neither is seen.
     for (elevation, key) in [(-0.2660, KeyLight::Sun), (-0.2672, KeyLight::Moon)] {
-        let s = state(elevation, MoonSetting::FullOpposite);
+        let s = state(elevation, MoonSetting::Full);
         let (lost, left) = (luminance(s.key_illuminance), luminance(s.sky_illuminance));
         assert!(s.key == key && lost < 1e-4 * left, "{:?} with {lost} lux beside {left}", s.key);
     }
@@ -419,13 +419,13 @@ fn light_is_continuous_as_the_sun_sinks() {
 fn exposure_is_monotone_and_night_stays_dark_and_readable() {
     let mut last = f32::INFINITY;
     for i in 0..30 {
-        let s = state(80.0 - 4.0 * f64::from(i), MoonSetting::FullOpposite);
+        let s = state(80.0 - 4.0 * f64::from(i), MoonSetting::Full);
         assert!(s.ev100 <= last + 1e-4, "sun at {}: {} after {last}", 80 - 4 * i, s.ev100);
         last = s.ev100;
     }
     let shown = |s: &LightState| luminance(s.horizontal_illuminance()) * s.exposure;
     let day = shown(&state(60.0, MoonSetting::None));
-    let moonlit = shown(&state(-45.0, MoonSetting::FullOpposite)) / day;
+    let moonlit = shown(&state(-45.0, MoonSetting::Full)) / day;
     let starlit = shown(&state(-45.0, MoonSetting::None)) / day;
     assert!((0.10..0.22).contains(&moonlit), "moonlit {moonlit}");
     assert!((0.03..0.08).contains(&starlit), "starlit {starlit}");
@@ -433,8 +433,8 @@ fn exposure_is_monotone_and_night_stays_dark_and_readable() {
 
 #[test]
 fn key_light_is_the_sun_until_its_disc_is_down() {
-    assert_eq!(state(-0.2, MoonSetting::FullOpposite).key, KeyLight::Sun);
-    let night = state(-30.0, MoonSetting::FullOpposite);
+    assert_eq!(state(-0.2, MoonSetting::Full).key, KeyLight::Sun);
+    let night = state(-30.0, MoonSetting::Full);
     assert_eq!(night.key, KeyLight::Moon);
     assert!(night.key_direction.y > 0.4 && luminance(night.key_illuminance) > 0.1);
     assert!(night.night.moon.is_some());
@@ -479,6 +479,6 @@ fn fog_at_the_horizon_is_the_sky() {
 fn same_light_from_any_number_of_threads() {
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let three = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
-    let make = || state(-3.0, MoonSetting::FullOpposite);
+    let make = || state(-3.0, MoonSetting::Full);
     assert_eq!(one.install(make), three.install(make));
 }

@@ -291,7 +291,7 @@ fn daylight(instant: &str) -> LightState {
     let observer = Observer::new(47.0, 9.0, 400.0).unwrap();
     let instant = instant.parse().unwrap();
     let sun = SunPosition::at(instant, &observer).unwrap();
-    let moon = MoonSetting::FullOpposite.moon(Some((instant, &observer)), &sun).unwrap();
+    let moon = MoonSetting::Full.moon(Some((instant, &observer)), &sun).unwrap();
     let atmosphere = Atmosphere::new(AtmosphereParams::with_visibility_km(40.0)).unwrap();
     LightState::new(&atmosphere, sun, moon, &LightSettings::default()).unwrap()
 }

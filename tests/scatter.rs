@@ -346,7 +346,7 @@ fn inventories_are_read_in_many_spellings() {
 
 #[test]
 fn units_come_from_the_name_or_the_option() {
-    let options = InventoryOptions { dbh_unit: LengthUnit::Millimetre, height_unit: LengthUnit::Centimetre };
+    let options = InventoryOptions { dbh_unit: LengthUnit::Millimetres, height_unit: LengthUnit::Centimetres };
     let read = |text: &str| parse_inventory(text.as_bytes(), "t", options).unwrap().rows.remove(0);
     let tree = read("x,y,dbh,h\n1,2,250,1250\n");
     assert!((tree.dbh_m.unwrap() - 0.25).abs() < 1e-12 && (tree.height_m.unwrap() - 12.5).abs() < 1e-12);
@@ -377,7 +377,7 @@ fn text_in_number_columns_is_listed_by_line_column_and_value() {
         "{message}"
     );
     assert!(parse("x;y\n1.000,5;2\n").unwrap_err().to_string().contains("1.000,5"), "thousands are not guessed");
-    assert!(parse("lon,lat\n8,95\n").unwrap_err().to_string().contains("no latitude"));
+    assert!(parse("lon,lat\n8,95\n").unwrap_err().to_string().contains("not a latitude"));
 }
 
 #[test]

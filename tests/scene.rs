@@ -3,11 +3,15 @@
 use std::path::Path as FilePath;
 
 use canopy::app::parse_lighting;
+use canopy::bake::lighting::SunLight;
+use canopy::light::MoonSetting;
+use canopy::plant::Gloss;
+use canopy::scatter::{LengthUnit, Sequence};
 use canopy::scene::{
-    GltfPlants, Ground, GroundFile, GrownForm, GrownPlants, InventoryTrees, LeafGloss, LengthUnit, Lighting, Moon,
-    Overrides, Path, PlantSource, Position, ScatteredTrees, Scene, SceneError, Sequence, Species, SunLight, Transfer,
-    Trees,
+    Anchor, GltfPlants, Ground, GroundFile, GrownForm, GrownPlants, InventoryTrees, Lighting, Overrides, Path,
+    PlantSource, Position, ScatteredTrees, Scene, SceneError, Species, Transfer, Trees,
 };
+use canopy::terrain::CoordinateSystem;
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
 
@@ -136,8 +140,8 @@ fn everything_is_read() -> Outcome {
     let PlantSource::Grown(grown) = &birch.plant else { return Err("not grown".into()) };
     assert_eq!(grown.form, GrownForm::File("folder/birch.ron".into()));
     let Trees::Scattered(rules) = &scene.trees else { return Err("not scattered".into()) };
-    assert_eq!((rules.sequence, rules.area.map(|area| area.east)), (Sequence::Hammersley, Some(80.0)));
-    assert_eq!((scene.place.latitude, scene.place.moon), (Some(47.5), Moon::Astronomical));
+    assert_eq!((rules.sequence, rules.area.map(|area| area.max.x)), (Sequence::Hammersley, Some(80.0)));
+    assert_eq!((scene.place.latitude, scene.place.moon), (Some(47.5), MoonSetting::Astronomical));
     let path = Path::new(&scene.camera.path).ok_or("no path")?;
     assert_eq!(path.at(5.0), scene.camera.path[1].pose());
     assert_eq!((scene.quality.cascades, scene.quality.near_distance), (3, 40.0));
@@ -147,11 +151,11 @@ fn everything_is_read() -> Outcome {
 #[test]
 fn gloss_and_the_way_of_the_sun_are_read() -> Outcome {
     let plain = parse(FULL)?;
-    assert_eq!(plain.species[0].gloss, LeafGloss { share: 0.045, roughness: 0.4 });
+    assert_eq!(plain.species[0].gloss, Gloss { reflectance: 0.045, roughness: 0.4 });
     let text =
         FULL.replace("weight: 3,", "weight: 3, gloss: (roughness: 0.2), lighting: Transfer(bands: 4, sun: Harmonics),");
     let oak = &parse(&text)?.species[0];
-    assert_eq!(oak.gloss, LeafGloss { share: 0.045, roughness: 0.2 });
+    assert_eq!(oak.gloss, Gloss { reflectance: 0.045, roughness: 0.2 });
     assert_eq!(
         oak.lighting,
         Some(Lighting::Transfer(Transfer { bands: 4, sun: SunLight::Harmonics, ..Transfer::default() }))
@@ -219,6 +223,19 @@ fn inventories_state_units_and_species() -> Outcome {
     assert_eq!(inventory.path, FilePath::new("folder/stand.csv"));
     assert_eq!(inventory.species.get("Pinus").map(String::as_str), Some("pine"));
 
+    // Older files say `Centre` and `Middle`, which do not tell whose centre they mean.
+    for (word, anchor) in [
+        ("TerrainCentre", Anchor::TerrainCentre),
+        ("Centre", Anchor::TerrainCentre),
+        ("StandCentre", Anchor::StandCentre),
+        ("Middle", Anchor::StandCentre),
+    ] {
+        let Trees::Inventory(inventory) = parse(&text.replace("SouthWest", word))?.trees else {
+            return Err("no inventory".into());
+        };
+        assert_eq!(inventory.anchor, anchor, "{word}");
+    }
+
     let wrong = text.replace("\"pine\"}", "\"pin\"}");
     let error = parse(&wrong).err().ok_or("accepted")?;
     let SceneError::Invalid { problems, .. } = &error else { return Err(error.into()) };
@@ -280,8 +297,8 @@ fn broken_texts_are_refused_with_a_place() {
 #[test]
 fn impossible_values_are_placed() {
     faulty("size: 400", "size: -400", 6, &["`terrain.size` is -400 m", "from 20 to 100000"]);
-    faulty("amplitude: 20", "amplitude: NaN", 11, &["`terrain.amplitude` is NaN, which is no finite number"]);
-    faulty("wavelength: 150", "wavelength: inf", 12, &["no finite number"]);
+    faulty("amplitude: 20", "amplitude: NaN", 11, &["`terrain.amplitude` is NaN, which is not a finite number"]);
+    faulty("wavelength: 150", "wavelength: inf", 12, &["not a finite number"]);
     faulty("octaves: 5", "octaves: 0", 9, &["whole number from 1 to 16"]);
     faulty("weight: 3", "weight: -1", 8, &["`species[0].weight`"]);
     faulty("individuals: 4", "individuals: 17", 13, &["`species[0].plant.individuals` is 17", "1 to 16"]);
@@ -374,6 +391,9 @@ fn terrain_files_have_their_own_rules() -> Outcome {
     }
     let zone = coordinates("Utm(zone: 61)").err().ok_or("accepted")?.to_string();
     assert!(zone.contains("1:54: `terrain.coordinates.zone` is 61; write a whole number from 1 to 60"), "{zone}");
+    let scene = parse("(terrain: File(path: \"a.asc\", coordinates: Epsg(32733)))")?;
+    let Ground::File(file) = scene.terrain else { return Err("no file".into()) };
+    assert_eq!(file.coordinates, Some(CoordinateSystem::Utm { zone: 33, south: true }));
     assert!(coordinates("Epsg(5)").is_err_and(|error| error.to_string().contains("1024 to 32767")));
     let place_less = coordinates("Projected(metres_per_unit: 0.3048)").err().ok_or("accepted")?.to_string();
     assert!(place_less.contains("`place.latitude` is missing"), "{place_less}");
@@ -398,7 +418,7 @@ fn files_that_are_no_scenes_are_refused() -> Outcome {
     let latin = folder.path().join("latin.ron");
     std::fs::write(&latin, b"(\n  name: \"B\xe4ume\",\n)")?;
     let error = Scene::read(&latin).err().ok_or("read")?.to_string();
-    assert!(error.contains("latin.ron:2:11: the text is no UTF-8"), "{error}");
+    assert!(error.contains("latin.ron:2:11: the text is not UTF-8"), "{error}");
 
     let large = folder.path().join("large.ron");
     std::fs::write(&large, vec![b' '; 5 << 20])?;

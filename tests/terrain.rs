@@ -679,7 +679,7 @@ fn broken_ascii_grids_are_refused_with_line_and_column() {
     for (from, to, says) in [
         ("4 -9999\n6\n", "4 -9999\n", "row 2 of 2, column 3 of 3"),
         ("4 -9999\n6\n", "4 -9999\n6 7\n", "line 10, column 3: there are more than"),
-        ("4 -9999\n6\n", "4 x9 6\n", "line 9, column 3: \"x9\" is no number"),
+        ("4 -9999\n6\n", "4 x9 6\n", "line 9, column 3: \"x9\" is not a number"),
         ("1 2 3", "1,5 2 3", "decimal point"),
         ("NCOLS 3", "NCOLS 0", "0 columns"),
         ("NCOLS 3", "NCOLS -3", "line 1, column 7: ncols is -3"),
@@ -688,7 +688,7 @@ fn broken_ascii_grids_are_refused_with_line_and_column() {
         ("dx 10", "dx NaN", "dx is NaN"),
         ("dx 10", "dx 0", "above 0"),
         ("dx 10\n", "", "cellsize (or dx) is missing"),
-        ("dx 10", "depth 10", "\"depth\" is no key"),
+        ("dx 10", "depth 10", "\"depth\" is not a key"),
     ] {
         let text = ASC.replace(from, to);
         assert_ne!(text, ASC);

@@ -95,7 +95,7 @@ pub enum AppError {
     Render(String),
     /// A file of unknown kind.
     #[error(
-        "{}: this is no plant (.glb, .gltf), terrain (.tif, .asc, .hgt, .png), inventory (.csv) or scene (.ron) file",
+        "{}: this is not a plant (.glb, .gltf), terrain (.tif, .asc, .hgt, .png), inventory (.csv) or scene (.ron) file",
         path.display()
     )]
     UnknownKind {

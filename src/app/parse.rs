@@ -1,32 +1,35 @@
 //! Texts of the command line to values.
 
-use crate::scene::{Expressive, Lighting, Pose, SunLight, Transfer};
+use crate::{
+    bake::lighting::{SunLight, implicit::ImplicitSettings},
+    scene::{Lighting, Pose, Transfer},
+};
 
 /// Why an argument is not what it should be.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ArgumentError {
     /// Not `WIDTHxHEIGHT`.
-    #[error("`{0}` is no size; write width and height in pixels, each at least 1, as in 1280x720")]
+    #[error("`{0}` is not a size (expected WIDTHxHEIGHT in pixels, each at least 1, as in 1280x720)")]
     Size(String),
     /// Not a kind of light.
-    #[error("`{0}` is no light; write local, expressive, transfer or harmonics")]
+    #[error("`{0}` is not a light (expected local, expressive, transfer or harmonics)")]
     Lighting(String),
     /// Not a number of samples.
-    #[error("`{0}` samples per pixel: write 1 (off) or 4")]
+    #[error("`{0}` is not a number of samples per pixel (expected 1, which is off, or 4)")]
     Samples(String),
     /// Not `x,y,z,yaw,pitch`.
     #[error(
-        "`{0}` is no camera; write x,y,z,yaw,pitch (metres east, above the ground, south; degrees), as in 0,20,0,90,-5"
+        "`{0}` is not a camera (expected x,y,z,yaw,pitch: metres east, above the ground and south, then degrees, as in 0,20,0,90,-5)"
     )]
     Pose(String),
     /// A coordinate of a camera that is out of range.
     #[error("`{0}`: {1}")]
     PoseRange(String, &'static str),
     /// Not a time in seconds.
-    #[error("`{0}` is no time in seconds; write a number that is not negative, as in 12.5s")]
+    #[error("`{0}` is not a time in seconds (expected a number from 0 up, as in 12.5s)")]
     Seconds(String),
     /// Not a positive number.
-    #[error("`{0}` is no positive number")]
+    #[error("`{0}` is not a positive number (expected a number above 0, as in 25)")]
     Positive(String),
 }
 
@@ -50,7 +53,7 @@ pub fn parse_lighting(text: &str) -> Result<Lighting, ArgumentError> {
         "local" => Ok(Lighting::Local),
         "transfer" => Ok(Lighting::Transfer(Transfer::default())),
         "harmonics" => Ok(Lighting::Transfer(Transfer { sun: SunLight::Harmonics, ..Transfer::default() })),
-        "expressive" => Ok(Lighting::Expressive(Expressive::default())),
+        "expressive" => Ok(Lighting::Expressive(ImplicitSettings::default())),
         _ => Err(ArgumentError::Lighting(text.to_owned())),
     }
 }

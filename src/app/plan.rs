@@ -54,7 +54,7 @@ pub enum PlanError {
     #[error("{0} frames are too many; ask for at most {MOST_FRAMES}")]
     TooMany(u32),
     /// Pictures per second that are none.
-    #[error("{0} pictures per second are impossible; choose a positive rate such as 25")]
+    #[error("{0} pictures per second is not a rate (expected a number above 0, such as 25)")]
     BadRate(f64),
     /// A picture's name does not say that it is a PNG.
     #[error("`{}` does not end in .png, the format of all pictures; call it {}", .0.display(), .0.with_extension("png").display())]
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn impossible_requests_say_what_to_do() -> Outcome {
+    fn requests_that_cannot_be_planned_say_what_to_do() -> Outcome {
         let bare = scene("")?;
         let still = |out: &str| Pictures::Stills(vec![Still { out: out.into(), at: None }]);
         let error = |view, pictures, scene: &Scene| RenderPlan::new(&options(view, pictures), scene, &hill).err();

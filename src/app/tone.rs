@@ -33,7 +33,7 @@ pub fn tone_table() -> Result<ToneTable, AppError> {
     let data = image.data.as_deref().ok_or_else(|| failed("it is on the device only"))?;
     let size = image.texture_descriptor.size;
     if size.width != size.height || size.height != size.depth_or_array_layers {
-        return Err(failed("it is no cube"));
+        return Err(failed("it is not a cube"));
     }
     let (texels, _) = data.as_chunks::<8>();
     let half = |texel: &[u8; 8], at: usize| f16::from_le_bytes([texel[2 * at], texel[2 * at + 1]]).to_f32();

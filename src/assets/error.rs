@@ -45,7 +45,7 @@ pub enum StageError {
     /// An inventory whose coordinates say nothing about where it lies on the terrain.
     #[error(
         "{}: the terrain has no coordinate system of the kind that these positions are in; use a terrain file of the \
-         same system, or metres and `anchor: Middle`",
+         same system, or metres and `anchor: StandCentre`",
         path.display()
     )]
     NoReference {

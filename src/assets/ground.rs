@@ -7,12 +7,8 @@ use glam::DVec2;
 use super::StageError;
 use crate::{
     progress::Progress,
-    scene::{self, Coordinates},
-    terrain::{
-        CoordinateSystem, HeightField, NoiseKind, NoiseTerrain, ReadOptions, Surroundings, Terrain,
-        read::{Crop, ImageScale},
-        read_terrain,
-    },
+    scene,
+    terrain::{HeightField, NoiseKind, NoiseTerrain, ReadOptions, Surroundings, Terrain, read_terrain},
 };
 
 /// Builds the ground that a scene asks for; what the readers decided on their own account becomes a warning.
@@ -30,22 +26,17 @@ pub fn build_terrain(ground: &scene::Ground, progress: &mut dyn Progress) -> Res
     };
     Ok(match ground {
         scene::Ground::File(file) => {
-            let crop = file.crop.map(|c| Crop { west: c.west, south: c.south, east: c.east, north: c.north });
             let options = ReadOptions {
-                crop,
-                coordinate_system: file.coordinates.map(coordinate_system),
-                surroundings: match file.surroundings {
-                    scene::Surroundings::Mirror => Surroundings::Mirror,
-                    scene::Surroundings::Border => Surroundings::Border,
-                },
+                crop: file.crop,
+                coordinate_system: file.coordinates,
+                surroundings: file.surroundings,
                 ..ReadOptions::default()
             };
             let terrain = read(&file.path, options, progress)?;
             exaggerated(terrain, file.exaggeration)?
         }
         scene::Ground::Image(image) => {
-            let scale = ImageScale { spacing: image.spacing, lowest: image.low, highest: image.high };
-            let options = ReadOptions { image_scale: Some(scale), surroundings, ..ReadOptions::default() };
+            let options = ReadOptions { image_scale: Some(image.scale()), surroundings, ..ReadOptions::default() };
             read(&image.path, options, progress)?
         }
         scene::Ground::Noise(noise) => {
@@ -81,15 +72,4 @@ fn exaggerated(terrain: Terrain, factor: f64) -> Result<Terrain, StageError> {
     let heights = field.heights().iter().map(|height| (f64::from(*height) * factor) as f32).collect();
     let field = HeightField::new(field.columns(), field.rows(), field.spacing(), heights)?;
     Ok(Terrain::new(field, terrain.reference().cloned(), terrain.surroundings()))
-}
-
-fn coordinate_system(coordinates: Coordinates) -> CoordinateSystem {
-    match coordinates {
-        Coordinates::Geographic => CoordinateSystem::Geographic,
-        Coordinates::Utm { zone, south } => CoordinateSystem::Utm { zone, south },
-        Coordinates::Epsg(code) => CoordinateSystem::from_epsg(code)
-            .unwrap_or(CoordinateSystem::Projected { epsg: Some(code), metres_per_unit: 1.0 }),
-        Coordinates::Projected { metres_per_unit } => CoordinateSystem::Projected { epsg: None, metres_per_unit },
-        Coordinates::Local => CoordinateSystem::Local,
-    }
 }

@@ -13,12 +13,11 @@ mod error;
 pub(crate) mod ground;
 mod load;
 pub(crate) mod plants;
-mod stage;
+pub(crate) mod stage;
 pub(crate) mod threads;
 mod together;
 pub(crate) mod trees;
 
 pub use error::StageError;
 pub use load::{CanopyScenePlugin, LoadScene, LoadedScene, SceneFailed, SceneProgress, SceneReady, SceneState};
-pub(crate) use stage::observer;
 pub use stage::{Shown, Stage};

@@ -4,23 +4,14 @@ use std::{ops::Range, path::PathBuf};
 
 use super::StageError;
 use crate::{
-    bake::{
-        BakeSettings,
-        levels::cross::CrossSettings,
-        lighting::{
-            LightingSettings,
-            implicit::{AmbientField, ImplicitSettings, NormalSource},
-            transfer::{Channels, Interior, TransferSettings},
-        },
-    },
+    bake::{BakeSettings, levels::cross::CrossSettings, lighting::LightingSettings},
     plant::{
         Gloss, Plant,
         gltf::{GltfOptions, load_plant},
         grow::{GrowParameters, grow},
     },
-    render::components::SunLight,
     scatter::packed::MAX_VARIANTS,
-    scene::{self, AmbientTerm, CrownNormals, GrownForm, Lighting, PlantSource, Quality, Scene, Species},
+    scene::{GrownForm, Lighting, PlantSource, Quality, Scene, Species},
 };
 
 /// How one individual is made.
@@ -107,9 +98,8 @@ pub fn plan(scene: &Scene) -> Result<PlantPlan, StageError> {
     let mut plan = PlantPlan::default();
     for species in &scene.species {
         let first = plan.individuals.len();
-        let lighting = lighting_settings(species.lighting.as_ref());
-        let gloss =
-            Gloss { reflectance: species.gloss.share as f32, roughness: species.gloss.roughness as f32 }.in_range();
+        let lighting = species.lighting.as_ref().map_or_else(LightingSettings::default, Lighting::settings);
+        let gloss = species.gloss.in_range();
         let individuals = sources(species)?.into_iter().map(|source| Individual { source, gloss, lighting });
         plan.individuals.extend(individuals);
         plan.variants.push(first as u16..plan.individuals.len() as u16);
@@ -157,55 +147,6 @@ fn sources(species: &Species) -> Result<Vec<IndividualSource>, StageError> {
                 .collect()
         }
     })
-}
-
-/// What a species' light asks of the pass.
-pub fn sun_light(lighting: Option<&Lighting>) -> SunLight {
-    match lighting {
-        Some(Lighting::Transfer(scene::Transfer { sun: scene::SunLight::Harmonics, .. })) => SunLight::Harmonics,
-        _ => SunLight::LeafShader,
-    }
-}
-
-/// What a species' light asks of the bake.
-pub fn lighting_settings(lighting: Option<&Lighting>) -> LightingSettings {
-    match lighting {
-        None => LightingSettings::default(),
-        Some(Lighting::Local) => LightingSettings::Local,
-        Some(Lighting::Transfer(transfer)) => LightingSettings::Transfer(TransferSettings {
-            bands: transfer.bands.min(u8::MAX.into()) as u8,
-            channels: if transfer.color { Channels::Rgb } else { Channels::One },
-            rays: transfer.rays,
-            projection: TransferSettings::default().projection,
-            interior: match transfer.bounces.min(u8::MAX.into()) as u8 {
-                0 => Interior::Straight(1),
-                bounces => Interior::Diffuse(bounces),
-            },
-        }),
-        Some(Lighting::Expressive(expressive)) => {
-            let default = ImplicitSettings::default();
-            let number = |value: Option<f64>| value.map(|value| value as f32);
-            LightingSettings::Expressive(ImplicitSettings {
-                radius: number(expressive.radius),
-                threshold: number(expressive.threshold),
-                ambient: match expressive.ambient {
-                    AmbientTerm::Depth => AmbientField::Depth,
-                    AmbientTerm::Published => AmbientField::Published,
-                },
-                ambient_radius: number(expressive.ambient_radius),
-                least: number(expressive.least),
-                core: number(expressive.core),
-                exponent: number(expressive.exponent),
-                generator_share: number(expressive.share).unwrap_or(default.generator_share),
-                normals: match expressive.normals {
-                    CrownNormals::Nearest => NormalSource::NearestVertex,
-                    CrownNormals::Smooth => NormalSource::Gradient,
-                },
-                own_normal: number(expressive.own_normal).unwrap_or(default.own_normal),
-                ..default
-            })
-        }
-    }
 }
 
 /// Bake settings of a scene's quality and a species' light.

@@ -11,16 +11,16 @@ use rayon::prelude::*;
 
 use super::{StageError, ground, plants, together, trees};
 use crate::{
-    bake::{BakeSource, BakedPlant, bake_plant, cache::Cache},
-    light::{MoonSetting, sun::Observer},
+    bake::{BakeSource, BakedPlant, bake_plant, cache::Cache, lighting::SunLight},
+    light::sun::Observer,
     lod::{FadeBand, Levels},
     progress::Progress,
     render::{
-        components::{Forest, Ground, SunLight, SunShadowSettings},
+        components::{Forest, Ground, SunShadowSettings},
         daylight::SkySettings,
     },
     scatter::{CoverMap, PackedStand, PackedTree, PlantSize, cover_map, packed::DEFAULT_CELL_SIZE},
-    scene::{self, Quality, Scene},
+    scene::{self, Lighting, Quality, Scene},
     terrain::Terrain,
 };
 
@@ -109,7 +109,7 @@ impl Stage {
             progress.warn("the scene's rules leave no place for any tree: only the ground is drawn");
         }
         let sun = |(species, variants): (&scene::Species, &Range<u16>)| {
-            std::iter::repeat_n(plants::sun_light(species.lighting.as_ref()), variants.len())
+            std::iter::repeat_n(species.lighting.as_ref().map_or(SunLight::default(), Lighting::sun), variants.len())
         };
         let suns = scene.species.iter().zip(&species.variants).flat_map(sun).collect();
         let (stand, plants, variants) = (Arc::new(packed), Arc::new(plants), species.variants);
@@ -162,15 +162,7 @@ impl Stage {
 
     /// Shadows as the scene's quality asks for them.
     pub fn shadow(&self) -> SunShadowSettings {
-        let quality = &self.scene.quality;
-        SunShadowSettings {
-            map_size: quality.shadow_map_size,
-            cascades: quality.cascades as usize,
-            distance: quality.shadow_distance,
-            // A billboard's level plane would draw a line across the crowns of full models.
-            proxy_distance: quality.near_distance + quality.fade_band,
-            ..SunShadowSettings::default()
-        }
+        shadow(&self.scene.quality)
     }
 
     /// Sun, moon and air at an instant.
@@ -178,14 +170,22 @@ impl Stage {
         SkySettings {
             observer: self.observer,
             instant,
-            moon: match self.scene.place.moon {
-                scene::Moon::Full => MoonSetting::FullOpposite,
-                scene::Moon::Astronomical => MoonSetting::Astronomical,
-                scene::Moon::None => MoonSetting::None,
-            },
+            moon: self.scene.place.moon,
             visibility_km: self.scene.place.visibility * 1e-3,
             ..SkySettings::default()
         }
+    }
+}
+
+/// Shadows as `quality` asks for them.
+fn shadow(quality: &Quality) -> SunShadowSettings {
+    SunShadowSettings {
+        map_size: quality.shadow_map_size,
+        cascades: quality.cascades as usize,
+        distance: quality.shadow_distance,
+        // A billboard's level plane would draw a line across the crowns of full models.
+        proxy_distance: quality.near_distance + quality.fade_band,
+        ..SunShadowSettings::default()
     }
 }
 
@@ -259,4 +259,14 @@ fn bake(
     let seconds = started.elapsed().as_secs_f64();
     progress.note(&format!("{} plants, {fresh} baked anew: {seconds:.2} s", baked.len()));
     Ok(baked)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shadows_and_the_quality_of_a_scene_have_the_same_defaults() {
+        assert_eq!(shadow(&Quality::default()), SunShadowSettings::default());
+    }
 }

@@ -6,10 +6,10 @@ use super::{StageError, plants::PlantPlan};
 use crate::{
     progress::Progress,
     scatter::{
-        Allometry, Area, ClearingNoise, Coordinates, Ground, Inventory, InventoryOptions, InventorySpecies, LengthUnit,
-        PlacementRules, PlantSize, Sequence, SizeRule, SpeciesRule, Stand, place, read_inventory, stand_from_inventory,
+        Allometry, Area, Coordinates, Ground, Inventory, InventoryOptions, InventorySpecies, PlacementRules, PlantSize,
+        SizeRule, SpeciesRule, Stand, place, read_inventory, stand_from_inventory,
     },
-    scene::{self, Anchor, InventoryTrees, ScatteredTrees, Scene, Species, Trees},
+    scene::{Anchor, InventoryTrees, ScatteredTrees, Scene, Species, Trees},
     terrain::{CoordinateSystem, GeoReference, Terrain},
 };
 
@@ -65,10 +65,7 @@ fn scatter(
     progress: &mut dyn Progress,
 ) -> Result<Stand, StageError> {
     let extent = terrain.extent();
-    let area = trees.area.map_or(Area::centered(DVec2::ZERO, extent), |area| Area {
-        min: DVec2::new(area.west, -area.north),
-        max: DVec2::new(area.east, -area.south),
-    });
+    let area = trees.area.unwrap_or(Area::centered(DVec2::ZERO, extent));
     let species = scene
         .species
         .iter()
@@ -93,21 +90,13 @@ fn scatter(
         .collect();
     let rules = PlacementRules {
         stems_per_hectare: trees.stems_per_hectare,
-        sequence: match trees.sequence {
-            scene::Sequence::Halton => Sequence::Halton,
-            scene::Sequence::Hammersley => Sequence::Hammersley,
-            scene::Sequence::Random => Sequence::Random,
-        },
+        sequence: trees.sequence,
         seed: scene.seed,
         min_distance_m: trees.min_distance,
         slope_limit: (trees.slope_limit as f32).to_radians(),
         height_range_m: trees.elevation,
         area,
-        clearings: trees.clearings.map(|clearings| ClearingNoise {
-            wavelength_m: clearings.wavelength,
-            cover: clearings.share,
-            edge: clearings.edge,
-        }),
+        clearings: trees.clearings,
         species,
     };
     let placement = place(&rules, terrain)?;
@@ -135,12 +124,7 @@ fn from_inventory(
     terrain: &Terrain,
     progress: &mut dyn Progress,
 ) -> Result<Stand, StageError> {
-    let unit = |unit: scene::LengthUnit| match unit {
-        scene::LengthUnit::Metres => LengthUnit::Metre,
-        scene::LengthUnit::Centimetres => LengthUnit::Centimetre,
-        scene::LengthUnit::Millimetres => LengthUnit::Millimetre,
-    };
-    let options = InventoryOptions { dbh_unit: unit(trees.dbh_unit), height_unit: unit(trees.height_unit) };
+    let options = InventoryOptions { dbh_unit: trees.dbh_unit, height_unit: trees.height_unit };
     let inventory = read_inventory(&trees.path, options)?;
     let table = species_table(scene, trees, plan, sizes);
     let to_local = placement(trees, &inventory, terrain)?;

@@ -29,7 +29,7 @@ pub enum MoonSetting {
     #[default]
     Astronomical,
     /// A full moon opposite the sun, as in lunar orbit without its inclination: every night is moonlit and readable.
-    FullOpposite,
+    Full,
     /// No moon.
     None,
 }
@@ -43,7 +43,7 @@ pub struct Moon {
     pub phase_angle: f32,
     /// Illuminance above the atmosphere on a surface that faces it, lux per channel.
     pub illuminance: Vec3,
-    /// Whether it follows the sun ([`MoonSetting::FullOpposite`]); exposure then does not depend on its height.
+    /// Whether it follows the sun ([`MoonSetting::Full`]); exposure then does not depend on its height.
     pub opposite_sun: bool,
 }
 
@@ -55,7 +55,7 @@ impl MoonSetting {
     pub fn moon(self, when: Option<(DateTime<Utc>, &Observer)>, sun: &SunPosition) -> Result<Option<Moon>, LightError> {
         match (self, when) {
             (Self::Astronomical, Some((instant, observer))) => Moon::at(instant, observer).map(Some),
-            (Self::FullOpposite, _) => Ok(Some(Moon::full_opposite(sun))),
+            (Self::Full, _) => Ok(Some(Moon::full_opposite(sun))),
             (Self::Astronomical, None) | (Self::None, _) => Ok(None),
         }
     }

@@ -63,7 +63,7 @@ impl Film {
         };
         let damaged = |what| ReferenceError::Checkpoint { path: path.to_owned(), what };
         if !bytes.starts_with(MAGIC) {
-            return Err(damaged("this is no checkpoint of a reference picture, or one of another version"));
+            return Err(damaged("this is not a checkpoint of a reference picture, or it is one of another version"));
         }
         let Some((content, hash)) = bytes.split_last_chunk::<HASH>() else { return Err(damaged("it is truncated")) };
         if blake3::hash(content).as_bytes() != hash {
@@ -84,7 +84,7 @@ impl Film {
         let (values, _) = values.as_chunks::<8>();
         let values: Vec<f64> = values.iter().map(|value| f64::from_le_bytes(*value)).collect();
         if values.iter().any(|value| !value.is_finite()) {
-            return Err(damaged("it holds values that are no numbers"));
+            return Err(damaged("it holds values that are not numbers"));
         }
         let (sums, squares) = values.split_at(3 * pixels as usize);
         let sums = sums.chunks_exact(3).map(DVec3::from_slice).collect();

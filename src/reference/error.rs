@@ -46,7 +46,7 @@ pub enum ReferenceError {
         vertex: usize,
     },
     /// A picture without pixels, or with too many.
-    #[error("a picture of {width} x {height} pixels is impossible; choose 1 to {limit} pixels altogether")]
+    #[error("{width}x{height} is not a size of a picture (expected WIDTHxHEIGHT with 1 to {limit} pixels in all)")]
     Size {
         /// Width in pixels.
         width: u32,

@@ -18,6 +18,8 @@ use crate::{
     terrain::Terrain,
 };
 
+pub use crate::bake::lighting::SunLight;
+
 /// A camera that sees Canopy's sky, ground and forests. One camera at a time; a second one is refused with a message.
 #[derive(Component, Clone, Copy, Debug, Default, ExtractComponent)]
 #[require(Camera3d, Hdr)]
@@ -45,17 +47,6 @@ pub struct Forest {
     pub levels: Levels,
     /// Metres beyond which trees are not drawn.
     pub view_distance: f32,
-}
-
-/// How the sun (or the moon, where it is the brighter) lights a plant's full models.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum SunLight {
-    /// Each leaf by the angle of its own normal to the sun, front and back [Franzke 2005, 4.2.2].
-    #[default]
-    LeafShader,
-    /// The sun projected onto spherical harmonics, through the plant's transfer, dimmed by the shadow map [Franzke 2005,
-    /// 4.3.3]. Only for plants that are lit by transfer; others, and crosses, take the leaf shader.
-    Harmonics,
 }
 
 /// The ground under everything.
@@ -91,8 +82,9 @@ pub struct SunShadowSettings {
 }
 
 impl Default for SunShadowSettings {
+    /// As a scene with the default quality has them.
     fn default() -> Self {
-        Self { map_size: 2048, cascades: 3, finest_radius: 30.0, distance: 500.0, proxy_distance: 30.0 }
+        Self { map_size: 2048, cascades: 4, finest_radius: 30.0, distance: 800.0, proxy_distance: 80.0 }
     }
 }
 

@@ -58,7 +58,7 @@ impl Default for SkySettings {
                 temperature_c: 12.0,
             },
             instant: DateTime::from_timestamp(1_782_040_500, 0).unwrap_or_default(),
-            moon: MoonSetting::FullOpposite,
+            moon: MoonSetting::Full,
             visibility_km: 40.0,
             compensation_ev: 0.9,
         }

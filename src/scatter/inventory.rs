@@ -27,23 +27,24 @@ const MAX_DBH_M: f64 = 15.0;
 const MAX_HEIGHT_M: f64 = 130.0;
 
 /// Unit of a length column.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Deserialize)]
 pub enum LengthUnit {
     /// Metres.
-    Metre,
+    #[default]
+    Metres,
     /// Centimetres.
-    Centimetre,
+    Centimetres,
     /// Millimetres.
-    Millimetre,
+    Millimetres,
 }
 
 impl LengthUnit {
     /// Length of the unit in metres.
     pub fn metres(self) -> f64 {
         match self {
-            Self::Metre => 1.0,
-            Self::Centimetre => 0.01,
-            Self::Millimetre => 0.001,
+            Self::Metres => 1.0,
+            Self::Centimetres => 0.01,
+            Self::Millimetres => 0.001,
         }
     }
 }
@@ -59,7 +60,7 @@ pub struct InventoryOptions {
 
 impl Default for InventoryOptions {
     fn default() -> Self {
-        Self { dbh_unit: LengthUnit::Centimetre, height_unit: LengthUnit::Metre }
+        Self { dbh_unit: LengthUnit::Centimetres, height_unit: LengthUnit::Metres }
     }
 }
 
@@ -309,9 +310,9 @@ impl Columns {
     fn meaning(&self, index: usize, name: &str) -> Option<String> {
         let length = |quantity: &str, column: LengthColumn| {
             let unit = match column.unit {
-                LengthUnit::Metre => "metres",
-                LengthUnit::Centimetre => "centimetres",
-                LengthUnit::Millimetre => "millimetres",
+                LengthUnit::Metres => "metres",
+                LengthUnit::Centimetres => "centimetres",
+                LengthUnit::Millimetres => "millimetres",
             };
             let stated = ["_m", "_cm", "_mm"].iter().any(|suffix| name.ends_with(suffix));
             let assumed = if stated { "" } else { " (assumed: the name states no unit)" };
@@ -344,8 +345,8 @@ impl Columns {
             }
             // Longitudes are counted from -180 to 180 or from 0 to 360.
             Coordinates::Geographic => (
-                Limit { largest: 360.0, reason: "is no longitude: give degrees within ±360" },
-                Limit { largest: 90.0, reason: "is no latitude: give degrees within ±90" },
+                Limit { largest: 360.0, reason: "is not a longitude (expected degrees within ±360)" },
+                Limit { largest: 90.0, reason: "is not a latitude (expected degrees within ±90)" },
             ),
         }
     }
@@ -355,9 +356,9 @@ impl Columns {
 fn length_unit(suffix: &str, fallback: LengthUnit) -> Option<LengthUnit> {
     match suffix {
         "" => Some(fallback),
-        "_m" => Some(LengthUnit::Metre),
-        "_cm" => Some(LengthUnit::Centimetre),
-        "_mm" => Some(LengthUnit::Millimetre),
+        "_m" => Some(LengthUnit::Metres),
+        "_cm" => Some(LengthUnit::Centimetres),
+        "_mm" => Some(LengthUnit::Millimetres),
         _ => None,
     }
 }

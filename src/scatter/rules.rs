@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use serde::Deserialize;
+
 use super::stand::{Area, MAX_COORDINATE_M, MAX_SCALE, MIN_SCALE};
 use super::{ScatterError, Stream};
 use crate::math::hash;
@@ -18,7 +20,7 @@ pub const MAX_TREES: u32 = 32_000_000;
 pub const MAX_DISC_COVER: f64 = 0.45;
 
 /// Which points trees are tried at.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize)]
 pub enum Sequence {
     /// Halton points in bases 2 and 3: even, and natural to look at. The default.
     #[default]
@@ -30,15 +32,25 @@ pub enum Sequence {
 }
 
 /// Meadows: ground that a smooth noise keeps free of trees.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct ClearingNoise {
-    /// Typical distance from one clearing to the next, metres, at least 1.
+    /// Typical distance from one clearing to the next, metres, 1 to 100000. In a scene file: `wavelength`. Default 400.
+    #[serde(rename = "wavelength")]
     pub wavelength_m: f64,
     /// Share of the area that the clearings cover, 0 (none) to 1 (no forest at all). Met over the area, as the noise is
-    /// cut at its own quantile there.
+    /// cut at its own quantile there. In a scene file: `share`. Default 0.1.
+    #[serde(rename = "share")]
     pub cover: f64,
     /// Width of a clearing's margin, where trees thin out, as a fraction of the wavelength, 0 (a sharp edge) to 1.
+    /// Default 0.15.
     pub edge: f64,
+}
+
+impl Default for ClearingNoise {
+    fn default() -> Self {
+        Self { wavelength_m: 400.0, cover: 0.1, edge: 0.15 }
+    }
 }
 
 /// How large a species' trees are.

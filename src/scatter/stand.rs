@@ -1,6 +1,7 @@
 //! The types of the room: a tree, a stand of them, the ground below and the area around.
 
 use glam::{DVec2, DVec3};
+use serde::Deserialize;
 
 /// Smallest scale of a tree, as a factor on its plant. Set by the logarithmic 12 bits of [`super::PackedTree`].
 pub const MIN_SCALE: f32 = 1.0 / 16.0;
@@ -43,7 +44,10 @@ impl<G: Ground + ?Sized> Ground for &G {
 }
 
 /// A rectangle on the ground, scene-local metres; `x` of the vectors is X (east), `y` is Z (south).
-#[derive(Clone, Copy, Debug, PartialEq)]
+///
+/// A scene file writes its sides, `(west: -100, south: -90, east: 80, north: 70)`: see [`from_sides`](Self::from_sides).
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(from = "Sides")]
 pub struct Area {
     /// Smallest X and Z.
     pub min: DVec2,
@@ -51,7 +55,33 @@ pub struct Area {
     pub max: DVec2,
 }
 
+/// An area as a scene file writes it.
+#[derive(Deserialize)]
+#[serde(rename = "Area", deny_unknown_fields)]
+struct Sides {
+    west: f64,
+    south: f64,
+    east: f64,
+    north: f64,
+}
+
+impl From<Sides> for Area {
+    fn from(sides: Sides) -> Self {
+        Self::from_sides(sides.west, sides.south, sides.east, sides.north)
+    }
+}
+
 impl Area {
+    /// The rectangle between these sides: metres from the terrain's centre, east and north positive.
+    pub fn from_sides(west: f64, south: f64, east: f64, north: f64) -> Self {
+        Self { min: DVec2::new(west, -north), max: DVec2::new(east, -south) }
+    }
+
+    /// West, south, east and north side: metres from the terrain's centre, east and north positive.
+    pub fn sides(&self) -> [f64; 4] {
+        [self.min.x, -self.max.y, self.max.x, -self.min.y]
+    }
+
     /// The rectangle of `size` metres around `center`.
     pub fn centered(center: DVec2, size: DVec2) -> Self {
         Self { min: center - 0.5 * size, max: center + 0.5 * size }

@@ -1,5 +1,6 @@
 //! Collecting values that are out of range, with their positions in the text of the scene file.
 
+use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
@@ -24,7 +25,7 @@ impl<'a> Check<'a> {
         Self { text: None, problems: Vec::new() }
     }
 
-    /// Notes that the value at `field` is impossible.
+    /// Notes what is wrong with the value at `field`.
     pub(super) fn problem(&mut self, field: &str, message: impl Into<String>, remedy: impl Into<String>) {
         let position = self
             .text
@@ -39,15 +40,18 @@ impl<'a> Check<'a> {
     }
 
     /// A number that must be finite and in `range`; whether it is.
-    pub(super) fn number(&mut self, field: &str, value: f64, range: RangeInclusive<f64>, unit: &str) -> bool {
+    pub(super) fn number<T>(&mut self, field: &str, value: T, range: RangeInclusive<T>, unit: &str) -> bool
+    where
+        T: Copy + PartialOrd + Display + Into<f64>,
+    {
         let fine = range.contains(&value);
         if !fine {
             let (low, high) = range.into_inner();
             let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
-            let message = if value.is_finite() {
-                format!("is {value}{unit}, which is impossible")
+            let message = if value.into().is_finite() {
+                format!("is {value}{unit}, which is out of range")
             } else {
-                format!("is {value}, which is no finite number")
+                format!("is {value}, which is not a finite number")
             };
             self.problem(field, message, format!("write a value from {low} to {high}{unit}"));
         }

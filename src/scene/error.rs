@@ -20,7 +20,7 @@ pub enum SceneError {
     },
     /// The file is larger than any scene file.
     #[error(
-        "{} holds {bytes} bytes and is no scene file (at most {limit}); name a RON scene such as assets/scenes/demo.ron",
+        "{} is not a scene file: it has {bytes} bytes, and a scene file has at most {limit}; name a RON scene such as assets/scenes/demo.ron",
         path.display()
     )]
     TooLarge {

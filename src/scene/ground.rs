@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::check::Check;
+use crate::terrain::{CoordinateSystem, Crop, ImageScale, Surroundings};
 
 /// Where the ground comes from. In a scene file: `terrain: File(path: "...")`, `Image(...)`, `Noise(...)`, `Flat(...)`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -25,70 +26,20 @@ pub enum Ground {
 pub struct GroundFile {
     /// The file, relative to the scene file. Required.
     pub path: PathBuf,
-    /// The part to use, in the file's own coordinates. Default: all of it.
+    /// The part to use, `(west: ..., south: ..., east: ..., north: ...)` in the file's own coordinates: degrees for
+    /// geographic files, metres (or feet) for projected ones. Default: all of it.
     #[serde(default)]
     pub crop: Option<Crop>,
     /// What the file's coordinates are, instead of what the file says or, as ESRI ASCII grids, does not say.
     /// Default: what the file says.
     #[serde(default)]
-    pub coordinates: Option<Coordinates>,
+    pub coordinates: Option<CoordinateSystem>,
     /// How the land goes on beyond the file. Default `Mirror`.
     #[serde(default)]
     pub surroundings: Surroundings,
     /// Factor on the heights, 0.01 to 100. Default 1: as measured.
     #[serde(default = "one")]
     pub exaggeration: f64,
-}
-
-/// What a terrain file's horizontal coordinates are.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub enum Coordinates {
-    /// Degrees of longitude and latitude (WGS84 or nearly so).
-    Geographic,
-    /// Universal Transverse Mercator, in metres: `Utm(zone: 17)`, `Utm(zone: 33, south: true)`.
-    Utm {
-        /// 1 to 60. Required.
-        zone: u8,
-        /// Southern hemisphere. Default false.
-        #[serde(default)]
-        south: bool,
-    },
-    /// A system by its EPSG code, 1024 to 32767: `Epsg(25832)`.
-    Epsg(u32),
-    /// A projection of which only the unit matters, and whose place on earth `place` states:
-    /// `Projected(metres_per_unit: 0.3048)`.
-    Projected {
-        /// 0.000001 to 1000000. Default 1.
-        #[serde(default = "one")]
-        metres_per_unit: f64,
-    },
-    /// Metres from any point, x east and y north; `place` states the place on earth.
-    Local,
-}
-
-/// How the land goes on beyond a terrain file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-pub enum Surroundings {
-    /// Mirrored at its borders: hills remain hills up to the horizon.
-    #[default]
-    Mirror,
-    /// The heights of the border are carried outwards: for an island, or a plot in a plain.
-    Border,
-}
-
-/// A rectangle in a terrain file's own coordinates: degrees for geographic files, metres (or feet) for projected ones.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Crop {
-    /// Western edge, below `east`. Required.
-    pub west: f64,
-    /// Southern edge, below `north`. Required.
-    pub south: f64,
-    /// Eastern edge. Required.
-    pub east: f64,
-    /// Northern edge. Required.
-    pub north: f64,
 }
 
 /// A greyscale picture of heights; the top of the picture is north. It has no place on earth: `place` must state one.
@@ -179,6 +130,11 @@ impl GroundImage {
     pub fn new(path: impl Into<PathBuf>, spacing: f64, high: f64) -> Self {
         Self { path: path.into(), spacing, low: 0.0, high }
     }
+
+    /// Its metres, as the reader of images takes them.
+    pub fn scale(&self) -> ImageScale {
+        ImageScale { spacing: self.spacing, lowest: self.low, highest: self.high }
+    }
 }
 
 impl From<GroundFile> for Ground {
@@ -226,7 +182,10 @@ impl Ground {
     /// a place.
     pub fn may_know_its_place(&self) -> bool {
         match self {
-            Self::File(file) => !matches!(file.coordinates, Some(Coordinates::Local | Coordinates::Projected { .. })),
+            Self::File(file) => !matches!(
+                file.coordinates,
+                Some(CoordinateSystem::Local | CoordinateSystem::Projected { epsg: None, .. })
+            ),
             Self::Image(_) | Self::Noise(_) | Self::Flat(_) => false,
         }
     }
@@ -278,12 +237,16 @@ impl GroundFile {
         check.path("terrain.path", &self.path);
         check.number("terrain.exaggeration", self.exaggeration, 0.01..=100.0, "");
         match self.coordinates {
-            Some(Coordinates::Utm { zone, .. }) => check.count("terrain.coordinates.zone", u32::from(zone), 1..=60),
-            Some(Coordinates::Epsg(code)) => check.count("terrain.coordinates", code, 1024..=32_767),
-            Some(Coordinates::Projected { metres_per_unit }) => {
-                check.number("terrain.coordinates.metres_per_unit", metres_per_unit, 1e-6..=1e6, "m");
+            Some(CoordinateSystem::Utm { zone, .. }) => {
+                check.count("terrain.coordinates.zone", u32::from(zone), 1..=60);
             }
-            Some(Coordinates::Geographic | Coordinates::Local) | None => {}
+            Some(CoordinateSystem::Projected { epsg, metres_per_unit }) => {
+                check.number("terrain.coordinates.metres_per_unit", metres_per_unit, 1e-6..=1e6, "m");
+                if let Some(code) = epsg {
+                    check.count("terrain.coordinates", code, 1024..=32_767);
+                }
+            }
+            Some(CoordinateSystem::Geographic | CoordinateSystem::WebMercator | CoordinateSystem::Local) | None => {}
         }
         let Some(crop) = self.crop else { return };
         // No wider limit than finite: projected coordinates may be anything, feet from a far origin included.

@@ -1,10 +1,13 @@
 //! How the foliage of a species is lit.
 
-use std::ops::RangeInclusive;
-
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::check::Check;
+use crate::bake::lighting::{
+    LightingSettings, SunLight,
+    implicit::ImplicitSettings,
+    transfer::{Channels, Interior, TransferSettings},
+};
 
 /// The light of a species' foliage. Each choice has its own fields, all of which may be left out: `Transfer()`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -12,12 +15,12 @@ pub enum Lighting {
     /// Each leaf by its own normal, the sky unhindered: nothing is baked. To compare with.
     Local,
     /// By the implicit surface of the crown [Luft 2007]: light follows the crown's shape, its inside is dark.
-    Expressive(Expressive),
+    Expressive(ImplicitSettings),
     /// The sky by radiance transfer, the sun by shadow maps [Franzke 2005]: nearest to the truth.
     Transfer(Transfer),
 }
 
-/// Radiance transfer.
+/// Radiance transfer, in a user's words: [`TransferSettings`] tells more apart than a scene needs to.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Transfer {
@@ -29,20 +32,8 @@ pub struct Transfer {
     pub rays: u32,
     /// How often light is followed from leaf to leaf, 0 to 8; 0: straight through leaves only. Default 3.
     pub bounces: u32,
-    /// How the sun lights full models; costs no bake of its own. Default `LeafShader`.
+    /// How the sun lights full models, `LeafShader` or `Harmonics`; costs no bake of its own. Default `LeafShader`.
     pub sun: SunLight,
-}
-
-/// How the sun lights foliage whose sky comes by radiance transfer.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-pub enum SunLight {
-    /// Each leaf by the angle of its own normal to the sun [Franzke 2005, 4.2.2]: sharp, and true.
-    #[default]
-    LeafShader,
-    /// As published for landscapes [Franzke 2005, 4.3.3]: through the transfer as the sky, and dimmed by the shadow map. A
-    /// few bands hold no disc, and the plant's own shadow counts twice: soft and dark, to compare with. Crosses keep
-    /// `LeafShader`.
-    Harmonics,
 }
 
 impl Default for Transfer {
@@ -51,73 +42,49 @@ impl Default for Transfer {
     }
 }
 
-/// The light of an implicit surface. What is left out follows from the plant.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Expressive {
-    /// Radius of a leaf's influence, rho, in metres, 0.000001 to 1000. Larger: a smoother crown.
-    pub radius: Option<f64>,
-    /// Density at the surface, tau, in leaves, 0 to 1000000. Larger: a surface closer to the densest foliage.
-    pub threshold: Option<f64>,
-    /// What the ambient light is a function of. Default `Depth`.
-    pub ambient: AmbientTerm,
-    /// First radius of `Depth` in metres, 0 to 1000. Larger: gaps between twigs no longer count.
-    pub ambient_radius: Option<f64>,
-    /// Ambient light of the crown's core, k_a_min, 0 to 1.
-    pub least: Option<f64>,
-    /// Depth or density from which on the ambient light is that of the core, d_min, in leaves, 0 to 1000000. Larger:
-    /// brighter.
-    pub core: Option<f64>,
-    /// Exponent n, 0.01 to 100: below 1 the crown darkens late on the way inside, above 1 early.
-    pub exponent: Option<f64>,
-    /// Share of the leaves that make the surface, 0.001 to 1. Smaller: a faster bake, a little off. Default 1.
-    pub share: Option<f64>,
-    /// Where normals come from. Default `Nearest`.
-    pub normals: CrownNormals,
-    /// Share of a leaf's own normal, 0 to 1. Default 0.
-    pub own_normal: Option<f64>,
-    /// Whether all trees of such species are lit together, so that a small tree is darkened by its tall neighbour [Luft
-    /// 2007, 5]. Each tree then is a model of its own, of which a scene has at most 64. The first such species' values
-    /// count for all. Default false.
-    pub together: bool,
+impl Transfer {
+    /// What the light asks of the bake.
+    pub fn settings(&self) -> TransferSettings {
+        let byte = |value: u32| value.min(u8::MAX.into()) as u8;
+        TransferSettings {
+            bands: byte(self.bands),
+            channels: if self.color { Channels::Rgb } else { Channels::One },
+            rays: self.rays,
+            interior: match byte(self.bounces) {
+                0 => Interior::Straight(1),
+                bounces => Interior::Diffuse(bounces),
+            },
+            ..TransferSettings::default()
+        }
+    }
 }
 
-/// What the ambient light of an implicit surface's light is a function of.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-pub enum AmbientTerm {
-    /// How many leaves a ray meets on its way out, on average. Near to what the path tracer finds.
-    #[default]
-    Depth,
-    /// The density within rho less tau, as published.
-    Published,
-}
-
-/// Where the normals of an implicit surface's light come from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-pub enum CrownNormals {
-    /// The nearest point of the surface, as published; jumps between lobes of the crown.
-    #[default]
-    Nearest,
-    /// The gradient of the density: smooth.
-    Smooth,
-}
-
-impl Expressive {
-    /// Range of [`radius`](Self::radius), metres.
-    pub const RADIUS: RangeInclusive<f64> = 1e-6..=1e3;
-    /// Range of [`threshold`](Self::threshold) and [`core`](Self::core), leaves.
-    pub const DENSITY: RangeInclusive<f64> = 0.0..=1e6;
-    /// Range of [`ambient_radius`](Self::ambient_radius), metres.
-    pub const AMBIENT_RADIUS: RangeInclusive<f64> = 0.0..=1e3;
-    /// Range of [`exponent`](Self::exponent).
-    pub const EXPONENT: RangeInclusive<f64> = 0.01..=100.0;
-    /// Range of [`share`](Self::share).
-    pub const SHARE: RangeInclusive<f64> = 1e-3..=1.0;
-    /// Range of [`least`](Self::least) and [`own_normal`](Self::own_normal).
-    pub const UNIT: RangeInclusive<f64> = 0.0..=1.0;
+/// A choice without fields, as a scene file writes it.
+pub(crate) fn word(choice: &impl Serialize) -> String {
+    ron::to_string(choice).unwrap_or_default()
 }
 
 impl Lighting {
+    /// What the light asks of the bake of a single plant.
+    pub fn settings(&self) -> LightingSettings {
+        match self {
+            Self::Local => LightingSettings::Local,
+            // Plants that are lit together are baked one by one first, as any others.
+            Self::Expressive(settings) => {
+                LightingSettings::Expressive(ImplicitSettings { together: false, ..*settings })
+            }
+            Self::Transfer(transfer) => LightingSettings::Transfer(transfer.settings()),
+        }
+    }
+
+    /// How the sun lights full models.
+    pub fn sun(&self) -> SunLight {
+        match self {
+            Self::Local | Self::Expressive(_) => SunLight::default(),
+            Self::Transfer(transfer) => transfer.sun,
+        }
+    }
+
     /// The light as a scene file writes it behind `lighting:`, as in `Expressive(radius: 0.8, normals: Smooth)`. What is as
     /// it is when left out is left out. A scene that has it gets the same light, to the last bit.
     pub fn to_ron(&self) -> String {
@@ -125,6 +92,7 @@ impl Lighting {
         let name = match self {
             Self::Local => return "Local".to_owned(),
             Self::Expressive(expressive) => {
+                let default = ImplicitSettings::default();
                 for (name, value) in [
                     ("radius", expressive.radius),
                     ("threshold", expressive.threshold),
@@ -132,20 +100,20 @@ impl Lighting {
                     ("least", expressive.least),
                     ("core", expressive.core),
                     ("exponent", expressive.exponent),
-                    ("share", expressive.share),
-                    ("own_normal", expressive.own_normal),
+                    ("surface_share", expressive.surface_share),
                 ] {
                     fields.extend(value.map(|value| format!("{name}: {value}")));
                 }
-                if expressive.ambient != AmbientTerm::default() {
-                    fields.push(format!("ambient: {:?}", expressive.ambient));
-                }
-                if expressive.normals != CrownNormals::default() {
-                    fields.push(format!("normals: {:?}", expressive.normals));
-                }
-                if expressive.together {
-                    fields.push("together: true".to_owned());
-                }
+                let mut field = |differs: bool, text: String| fields.extend(differs.then_some(text));
+                let (share, own_normal) = (expressive.generator_share, expressive.own_normal);
+                field(share != default.generator_share, format!("share: {share}"));
+                field(own_normal != default.own_normal, format!("own_normal: {own_normal}"));
+                field(expressive.ambient != default.ambient, format!("ambient: {}", word(&expressive.ambient)));
+                field(expressive.normals != default.normals, format!("normals: {}", word(&expressive.normals)));
+                field(expressive.weighting != default.weighting, format!("weighting: {}", word(&expressive.weighting)));
+                field(expressive.surface != default.surface, format!("surface: {}", expressive.surface));
+                field(expressive.resolution != default.resolution, format!("resolution: {}", expressive.resolution));
+                field(expressive.together, "together: true".to_owned());
                 "Expressive"
             }
             Self::Transfer(transfer) => {
@@ -155,7 +123,7 @@ impl Lighting {
                 field(transfer.color != default.color, format!("color: {}", transfer.color));
                 field(transfer.rays != default.rays, format!("rays: {}", transfer.rays));
                 field(transfer.bounces != default.bounces, format!("bounces: {}", transfer.bounces));
-                field(transfer.sun != default.sun, format!("sun: {:?}", transfer.sun));
+                field(transfer.sun != default.sun, format!("sun: {}", word(&transfer.sun)));
                 "Transfer"
             }
         };
@@ -169,18 +137,21 @@ impl Lighting {
             check.count(&format!("{at}.lighting.bounces"), transfer.bounces, 0..=8);
         }
         let Self::Expressive(expressive) = self else { return };
-        let mut number = |name: &str, value: Option<f64>, range: RangeInclusive<f64>, unit: &str| {
+        for (name, value, range, unit) in [
+            ("radius", expressive.radius, ImplicitSettings::RADIUS, "m"),
+            ("threshold", expressive.threshold, ImplicitSettings::DENSITY, "leaves"),
+            ("ambient_radius", expressive.ambient_radius, ImplicitSettings::AMBIENT_RADIUS, "m"),
+            ("least", expressive.least, ImplicitSettings::UNIT, ""),
+            ("core", expressive.core, ImplicitSettings::DENSITY, "leaves"),
+            ("exponent", expressive.exponent, ImplicitSettings::EXPONENT, ""),
+            ("share", Some(expressive.generator_share), ImplicitSettings::SHARE, ""),
+            ("own_normal", Some(expressive.own_normal), ImplicitSettings::UNIT, ""),
+            ("resolution", Some(expressive.resolution), ImplicitSettings::RESOLUTION, "cells"),
+            ("surface_share", expressive.surface_share, ImplicitSettings::UNIT, ""),
+        ] {
             if let Some(value) = value {
                 check.number(&format!("{at}.lighting.{name}"), value, range, unit);
             }
-        };
-        number("radius", expressive.radius, Expressive::RADIUS, "m");
-        number("threshold", expressive.threshold, Expressive::DENSITY, "leaves");
-        number("ambient_radius", expressive.ambient_radius, Expressive::AMBIENT_RADIUS, "m");
-        number("least", expressive.least, Expressive::UNIT, "");
-        number("core", expressive.core, Expressive::DENSITY, "leaves");
-        number("exponent", expressive.exponent, Expressive::EXPONENT, "");
-        number("share", expressive.share, Expressive::SHARE, "");
-        number("own_normal", expressive.own_normal, Expressive::UNIT, "");
+        }
     }
 }

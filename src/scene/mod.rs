@@ -36,13 +36,14 @@
 //! Positions are metres from the terrain's centre: +X east, −Z north. Angles in scene files and on the command line
 //! are degrees, yaw is a compass bearing; [`Viewpoint`] turns both into the renderer's frame.
 //!
-//! This room knows no other: it says what the user wants, not how it is built.
+//! Settings that belong to another room are that room's own types (a `Crop` of `terrain`, a `Gloss` of `plant`, ...), which
+//! say themselves how a scene file writes them.
 
 mod camera;
 mod check;
 mod error;
 mod ground;
-mod lighting;
+pub(crate) mod lighting;
 mod locate;
 mod overrides;
 mod path;
@@ -55,17 +56,17 @@ mod trees;
 
 pub use camera::{Camera, PathKey, Pose, Viewpoint};
 pub use error::{Problem, SceneError};
-pub use ground::{Coordinates, Crop, Ground, GroundFile, GroundFlat, GroundImage, GroundNoise, Surroundings};
-pub use lighting::{AmbientTerm, CrownNormals, Expressive, Lighting, SunLight, Transfer};
+pub use ground::{Ground, GroundFile, GroundFlat, GroundImage, GroundNoise};
+pub use lighting::{Lighting, Transfer};
 pub use locate::Position;
 pub use overrides::Overrides;
 pub use path::Path;
-pub use place::{Moon, Place};
+pub use place::Place;
 pub use quality::Quality;
 pub use source::SceneSource;
-pub use species::{GltfPlants, GrownForm, GrownPlants, LeafGloss, PlantSource, Species};
+pub use species::{GltfPlants, GrownForm, GrownPlants, PlantSource, Species};
 pub use time::{LocalTime, TimeError, YEARS};
-pub use trees::{Anchor, Area, Clearings, InventoryTrees, LengthUnit, ScatteredTrees, Sequence, Trees};
+pub use trees::{Anchor, InventoryTrees, ScatteredTrees, Trees};
 
 use std::fs::File;
 use std::io::Read;
@@ -201,7 +202,7 @@ impl Scene {
                 Err(SceneError::Syntax {
                     path: path.to_owned(),
                     position: Position::of_offset(&before, before.len()),
-                    message: "the text is no UTF-8 from here on".to_owned(),
+                    message: "the text is not UTF-8 from here on".to_owned(),
                     remedy: "save the file as UTF-8; a scene file is a RON text".to_owned(),
                 })
             }

@@ -5,6 +5,7 @@ use serde::Deserialize;
 use super::check::Check;
 use super::ground::Ground;
 use super::time::LocalTime;
+use crate::light::MoonSetting;
 
 /// Place and time of a scene.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -18,8 +19,8 @@ pub struct Place {
     /// Date and time with the offset from UTC, years 1900 to 2200: `"2026-06-21T15:30+02:00"`.
     /// Default `"2026-06-21T12:00Z"`.
     pub time: LocalTime,
-    /// The moon that lights the night. Default `Full`.
-    pub moon: Moon,
+    /// The moon that lights the night: `Full`, `Astronomical` or `None`. Default `Full`.
+    pub moon: MoonSetting,
     /// Distance in metres at which the air has taken all but 2 % of the contrast (Koschmieder 1924), 2000 to 250000.
     /// Lower is hazier. Default 40000.
     pub visibility: f64,
@@ -27,19 +28,14 @@ pub struct Place {
 
 impl Default for Place {
     fn default() -> Self {
-        Self { latitude: None, longitude: None, time: LocalTime::default(), moon: Moon::Full, visibility: 40_000.0 }
+        Self {
+            latitude: None,
+            longitude: None,
+            time: LocalTime::default(),
+            moon: MoonSetting::Full,
+            visibility: 40_000.0,
+        }
     }
-}
-
-/// The moon of a scene.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-pub enum Moon {
-    /// A full moon that stands opposite the sun: every night is readable.
-    Full,
-    /// The moon where and as full as it is at the date.
-    Astronomical,
-    /// No moon: starlight and airglow only.
-    None,
 }
 
 impl Place {

@@ -7,6 +7,7 @@ use serde::Deserialize;
 
 use super::check::Check;
 use super::lighting::Lighting;
+use crate::plant::Gloss;
 
 /// One species.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -24,7 +25,7 @@ pub struct Species {
     pub lighting: Option<Lighting>,
     /// The gloss of its leaves. Default `(share: 0.045, roughness: 0.4)`, a leaf's as measured.
     #[serde(default)]
-    pub gloss: LeafGloss,
+    pub gloss: Gloss,
     /// Range of heights in metres, `(lowest, highest)`, each 0.1 to 150. Default (16, 26).
     #[serde(default = "default_height")]
     pub height: (f64, f64),
@@ -38,25 +39,6 @@ pub struct Species {
     /// a trunk must reach into a slope. Default: 1.5 % of the mean height.
     #[serde(default)]
     pub trunk_radius: Option<f64>,
-}
-
-/// What the surface of leaves reflects without letting it in: `(share: 0.045, roughness: 0.4)`.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct LeafGloss {
-    /// Share of the light that the surface reflects, no unit, 0 to 0.09. It is taken from the leaves' colour, so that more of
-    /// it does not make a brighter tree: highlights grow, the rest darkens, light from behind is yellower. 0: matt leaves,
-    /// light from behind has the leaves' colour. Default 0.045, the mean of 23 species.
-    pub share: f64,
-    /// Root mean square slope of the surface, no unit, 0.1 to 1. Smaller: smaller, brighter highlights, as of wax (0.2);
-    /// larger: as of down (0.6 and more). Default 0.4.
-    pub roughness: f64,
-}
-
-impl Default for LeafGloss {
-    fn default() -> Self {
-        Self { share: 0.045, roughness: 0.4 }
-    }
 }
 
 /// Where a species' plants come from: `Grown(form: Broadleaf)` or `Gltf(files: ["oak.glb"])`.
@@ -155,7 +137,7 @@ impl Species {
             weight: one(),
             plant: plant.into(),
             lighting: None,
-            gloss: LeafGloss::default(),
+            gloss: Gloss::default(),
             height: default_height(),
             elevation: None,
             slope_limit: ninety(),
@@ -188,7 +170,7 @@ impl Species {
         if let Some(lighting) = &self.lighting {
             lighting.check(at, check);
         }
-        check.number(&format!("{at}.gloss.share"), self.gloss.share, 0.0..=0.09, "");
+        check.number(&format!("{at}.gloss.share"), self.gloss.reflectance, 0.0..=0.09, "");
         check.number(&format!("{at}.gloss.roughness"), self.gloss.roughness, 0.1..=1.0, "");
         check.number(&format!("{at}.slope_limit"), self.slope_limit, 0.0..=90.0, "degrees");
         if let Some(radius) = self.trunk_radius {

@@ -18,7 +18,7 @@ pub enum TimeError {
     #[error("the time `{0}` has no zone; write the offset from UTC behind it, as in {0}+02:00, or {0}Z if it is UTC")]
     MissingZone(String),
     /// The zone is none.
-    #[error("the zone `{zone}` of the time `{text}` is none; write an offset such as +02:00 or -04:00, or Z for UTC")]
+    #[error("`{zone}` in `{text}` is not a time zone (expected an offset such as +02:00 or -04:00, or Z for UTC)")]
     BadZone {
         /// What was written.
         text: String,

@@ -9,6 +9,7 @@ use serde::Deserialize;
 use super::check::Check;
 use super::error::nearest;
 use super::species::{ELEVATIONS, Species};
+use crate::scatter::{Area, ClearingNoise, LengthUnit, Sequence};
 
 /// Where the trees stand. In a scene file: `trees: Scattered(...)`, `Inventory(...)` or `None`.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
@@ -29,7 +30,7 @@ pub struct ScatteredTrees {
     /// Stems per hectare of ground where trees stand (clearings, cliffs and the like not counted), 0.01 to 100000.
     /// Default 300.
     pub stems_per_hectare: f64,
-    /// The sequence of points. Default `Halton`.
+    /// The sequence of points, `Halton`, `Hammersley` or `Random` [Franzke 2005, 4.3.3]. Default `Halton`.
     pub sequence: Sequence,
     /// Least distance between two stems in metres, 0 to 100; discs of this diameter must leave room for all stems.
     /// Default 0: none.
@@ -38,10 +39,11 @@ pub struct ScatteredTrees {
     pub slope_limit: f64,
     /// Range of wooded ground heights in metres above the terrain's datum. Default: everywhere.
     pub elevation: Option<(f64, f64)>,
-    /// The wooded part of the terrain. Default: all of it.
+    /// The wooded part of the terrain, `(west: ..., south: ..., east: ..., north: ...)` in metres from its centre, east and
+    /// north positive. Default: all of it.
     pub area: Option<Area>,
-    /// Clearings. Default: none.
-    pub clearings: Option<Clearings>,
+    /// Treeless patches where smooth noise is high: `(wavelength: 400, share: 0.1, edge: 0.15)`. Default: none.
+    pub clearings: Option<ClearingNoise>,
 }
 
 impl Default for ScatteredTrees {
@@ -58,49 +60,6 @@ impl Default for ScatteredTrees {
     }
 }
 
-/// A sequence of points in the unit square ([Franzke 2005], 4.3.3).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-pub enum Sequence {
-    /// Halton's, bases 2 and 3: evenly spread, and any prefix of it is.
-    Halton,
-    /// Hammersley's, base 2: a little more even, for a number of points known beforehand.
-    Hammersley,
-    /// Independent random points: clumps and gaps, to compare with.
-    Random,
-}
-
-/// A rectangle in metres from the terrain's centre, east and north positive.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Area {
-    /// Western edge, below `east`. Required.
-    pub west: f64,
-    /// Southern edge, below `north`. Required.
-    pub south: f64,
-    /// Eastern edge. Required.
-    pub east: f64,
-    /// Northern edge. Required.
-    pub north: f64,
-}
-
-/// Treeless patches where smooth noise is high.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Clearings {
-    /// Distance between clearings in metres, about, 1 to 100000. Default 400.
-    pub wavelength: f64,
-    /// Share of the ground that they cover, about, 0 to 1. Default 0.1.
-    pub share: f64,
-    /// Width of the margin in which trees thin out, as a fraction of the wavelength, 0 (sharp) to 1. Default 0.15.
-    pub edge: f64,
-}
-
-impl Default for Clearings {
-    fn default() -> Self {
-        Self { wavelength: 400.0, share: 0.1, edge: 0.15 }
-    }
-}
-
 /// Trees from a CSV file with a header line. Columns are found by name: `x` and `y` in metres (required), `dbh`,
 /// `height` and `species`; a unit in a column's name (`dbh_cm`, `height_m`) overrides the one stated here.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -108,13 +67,15 @@ impl Default for Clearings {
 pub struct InventoryTrees {
     /// The file, relative to the scene file. Required.
     pub path: PathBuf,
-    /// Unit of `dbh` (trunk diameter at breast height) where the column does not say. Default `Centimetres`.
+    /// Unit of `dbh` (trunk diameter at breast height) where the column does not say: `Metres`, `Centimetres` or
+    /// `Millimetres`. Default `Centimetres`.
     #[serde(default = "centimetres")]
     pub dbh_unit: LengthUnit,
     /// Unit of `height` where the column does not say. Default `Metres`.
     #[serde(default)]
     pub height_unit: LengthUnit,
-    /// What the coordinates are measured from; x grows eastward, y northward. Default `Centre`.
+    /// What the coordinates are measured from; x grows eastward, y northward. Default
+    /// `TerrainCentre`.
     #[serde(default)]
     pub anchor: Anchor,
     /// Height in metres of trees that have neither height nor diameter, 0.1 to 150. Default: the mean of their
@@ -131,39 +92,19 @@ pub struct InventoryTrees {
     pub default_species: Option<String>,
 }
 
-/// A unit of length.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-pub enum LengthUnit {
-    /// 1 m.
-    #[default]
-    Metres,
-    /// 0.01 m.
-    Centimetres,
-    /// 0.001 m.
-    Millimetres,
-}
-
-impl LengthUnit {
-    /// One of this unit, in metres.
-    pub fn metres(self) -> f64 {
-        match self {
-            Self::Metres => 1.0,
-            Self::Centimetres => 0.01,
-            Self::Millimetres => 0.001,
-        }
-    }
-}
-
 /// What an inventory's coordinates are measured from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 pub enum Anchor {
-    /// From the terrain's centre.
+    /// From the terrain's centre. Older scene files call it `Centre`.
     #[default]
-    Centre,
+    #[serde(alias = "Centre")]
+    TerrainCentre,
     /// From the terrain's south-western corner, as plot coordinates mostly are.
     SouthWest,
-    /// The middle of the stand's bounding box is put on the terrain's centre, whatever its coordinates.
-    Middle,
+    /// From the centre of the stand's bounding box, which is put on the terrain's centre whatever the coordinates are.
+    /// Older scene files call it `Middle`.
+    #[serde(alias = "Middle")]
+    StandCentre,
     /// The terrain file's own coordinates: easting and northing, or degrees of longitude and latitude.
     Terrain,
 }
@@ -176,9 +117,9 @@ impl Anchor {
     /// `None` for [`Anchor::Terrain`]: there the terrain's own georeference leads from coordinates to places.
     pub fn origin(self, stand: (DVec2, DVec2), extent: DVec2) -> Option<DVec2> {
         match self {
-            Self::Centre => Some(DVec2::ZERO),
+            Self::TerrainCentre => Some(DVec2::ZERO),
             Self::SouthWest => Some(0.5 * extent),
-            Self::Middle => Some(0.5 * (stand.0 + stand.1)),
+            Self::StandCentre => Some(0.5 * (stand.0 + stand.1)),
             Self::Terrain => None,
         }
     }
@@ -250,36 +191,35 @@ impl ScatteredTrees {
             check.interval("trees.elevation", elevation, ELEVATIONS, "m");
         }
         if let Some(area) = self.area {
-            area.check(check);
+            check_area(&area, check);
         }
         if let Some(clearings) = self.clearings {
-            check.number("trees.clearings.wavelength", clearings.wavelength, 1.0..=100_000.0, "m");
-            check.number("trees.clearings.share", clearings.share, 0.0..=1.0, "");
+            check.number("trees.clearings.wavelength", clearings.wavelength_m, 1.0..=100_000.0, "m");
+            check.number("trees.clearings.share", clearings.cover, 0.0..=1.0, "");
             check.number("trees.clearings.edge", clearings.edge, 0.0..=1.0, "");
         }
     }
 }
 
-impl Area {
-    fn check(&self, check: &mut Check) {
-        let mut finite = true;
-        for (name, value) in [("west", self.west), ("south", self.south), ("east", self.east), ("north", self.north)] {
-            finite &= check.number(&format!("trees.area.{name}"), value, -1e7..=1e7, "m");
-        }
-        if finite && self.west >= self.east {
-            check.problem(
-                "trees.area.west",
-                format!("is {} m, not west of `east` ({} m)", self.west, self.east),
-                "exchange the two, or widen the area",
-            );
-        }
-        if finite && self.south >= self.north {
-            check.problem(
-                "trees.area.south",
-                format!("is {} m, not south of `north` ({} m)", self.south, self.north),
-                "exchange the two, or widen the area",
-            );
-        }
+fn check_area(area: &Area, check: &mut Check) {
+    let [west, south, east, north] = area.sides();
+    let mut finite = true;
+    for (name, value) in [("west", west), ("south", south), ("east", east), ("north", north)] {
+        finite &= check.number(&format!("trees.area.{name}"), value, -1e7..=1e7, "m");
+    }
+    if finite && west >= east {
+        check.problem(
+            "trees.area.west",
+            format!("is {west} m, not west of `east` ({east} m)"),
+            "exchange the two, or widen the area",
+        );
+    }
+    if finite && south >= north {
+        check.problem(
+            "trees.area.south",
+            format!("is {south} m, not south of `north` ({north} m)"),
+            "exchange the two, or widen the area",
+        );
     }
 }
 
@@ -320,9 +260,9 @@ mod tests {
         let stand = (DVec2::new(500_100.0, 4_000_000.0), DVec2::new(500_300.0, 4_000_100.0));
         let extent = DVec2::new(400.0, 200.0);
         let place = |anchor: Anchor, tree: DVec2| anchor.origin(stand, extent).map(|origin| tree - origin);
-        assert_eq!(place(Anchor::Centre, DVec2::new(3.0, 4.0)), Some(DVec2::new(3.0, 4.0)));
+        assert_eq!(place(Anchor::TerrainCentre, DVec2::new(3.0, 4.0)), Some(DVec2::new(3.0, 4.0)));
         assert_eq!(place(Anchor::SouthWest, DVec2::ZERO), Some(DVec2::new(-200.0, -100.0)));
-        assert_eq!(place(Anchor::Middle, stand.0), Some(DVec2::new(-100.0, -50.0)));
+        assert_eq!(place(Anchor::StandCentre, stand.0), Some(DVec2::new(-100.0, -50.0)));
         assert_eq!(place(Anchor::Terrain, stand.0), None);
     }
 }

@@ -1,6 +1,7 @@
 //! What a file's horizontal coordinates mean, and how they map to the local frame.
 
 use glam::DVec2;
+use serde::Deserialize;
 
 use super::TerrainError;
 
@@ -14,7 +15,11 @@ const UTM_SCALE: f64 = 0.9996;
 const MAX_LATITUDE: f64 = 89.0;
 
 /// The horizontal coordinate system of a file.
-#[derive(Clone, Copy, Debug, PartialEq)]
+///
+/// A scene file writes it as `Geographic`, `Utm(zone: 17)`, `Utm(zone: 33, south: true)`, `Local`,
+/// `Projected(metres_per_unit: 0.3048)` or by its EPSG code, `Epsg(25832)` (see [`from_epsg`](Self::from_epsg)).
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(from = "Written")]
 pub enum CoordinateSystem {
     /// Degrees of longitude (x) and latitude (y). The datum is taken as WGS84: others differ by some 100 m in place
     /// and by less than 0.01 % in scale.
@@ -39,6 +44,43 @@ pub enum CoordinateSystem {
     },
     /// Metres from a corner or any other point, x east and y north, without a place on earth.
     Local,
+}
+
+/// A coordinate system as a scene file writes it.
+#[derive(Deserialize)]
+#[serde(rename = "CoordinateSystem", deny_unknown_fields)]
+enum Written {
+    Geographic,
+    Utm {
+        zone: u8,
+        #[serde(default)]
+        south: bool,
+    },
+    Epsg(u32),
+    Projected {
+        #[serde(default = "one")]
+        metres_per_unit: f64,
+    },
+    Local,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl From<Written> for CoordinateSystem {
+    /// A code that stands for no system that is known here becomes a projection in metres with that code.
+    fn from(written: Written) -> Self {
+        match written {
+            Written::Geographic => Self::Geographic,
+            Written::Utm { zone, south } => Self::Utm { zone, south },
+            Written::Epsg(code) => {
+                Self::from_epsg(code).unwrap_or(Self::Projected { epsg: Some(code), metres_per_unit: 1.0 })
+            }
+            Written::Projected { metres_per_unit } => Self::Projected { epsg: None, metres_per_unit },
+            Written::Local => Self::Local,
+        }
+    }
 }
 
 impl CoordinateSystem {

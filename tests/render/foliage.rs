@@ -1,6 +1,6 @@
 //! The light of leaves: their gloss, and the two ways of the sun.
 
-use canopy::{assets::Stage, render::components::SunLight};
+use canopy::{assets::Stage, bake::lighting::SunLight};
 
 use super::{SIZE, again, draw, renderer, showing};
 use crate::support::{

@@ -102,7 +102,7 @@ pub fn trees_at(places: &[DVec2], msaa: u32) -> Built {
     build(
         &format!(
             "(name: \"single\", seed: 7, terrain: Flat(size: 200), species: [{BROADLEAF}], trees: Inventory(path: \
-             \"trees.csv\", anchor: Centre), {PLACE}, {quality})"
+             \"trees.csv\", anchor: TerrainCentre), {PLACE}, {quality})"
         ),
         &[("trees.csv", table.as_bytes())],
     )

@@ -9,13 +9,13 @@ use super::{
 };
 use crate::{
     app::AppError,
-    assets::{ground::build_terrain, observer, plants, trees},
+    assets::{ground::build_terrain, plants, stage::observer, trees},
     bake::plant_size,
     light::sun::{Observer, SunPosition},
     math::digits::grouped,
     plant::{PartKind, Plant, grow::GrowParameters},
     progress::Progress,
-    scatter::{InventoryOptions, LengthUnit, PlantSize, Stand, read_inventory},
+    scatter::{InventoryOptions, PlantSize, Stand, read_inventory},
     scene::{self, PlantSource, Scene, Species, Trees},
     terrain::Terrain,
 };
@@ -187,12 +187,7 @@ fn describe_trees(
             page.row("of species", format!("{}: {}", species.name, grouped(count)));
         }
         if let Trees::Inventory(file) = &scene.trees {
-            let unit = |unit: scene::LengthUnit| match unit {
-                scene::LengthUnit::Metres => LengthUnit::Metre,
-                scene::LengthUnit::Centimetres => LengthUnit::Centimetre,
-                scene::LengthUnit::Millimetres => LengthUnit::Millimetre,
-            };
-            let options = InventoryOptions { dbh_unit: unit(file.dbh_unit), height_unit: unit(file.height_unit) };
+            let options = InventoryOptions { dbh_unit: file.dbh_unit, height_unit: file.height_unit };
             inventory::describe(page, &read_inventory(&file.path, options)?);
         }
         Ok(())

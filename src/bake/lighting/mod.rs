@@ -20,6 +20,18 @@ use crate::plant::Plant;
 use implicit::{ImplicitSettings, NoSurface, bake_implicit};
 use transfer::{PackedPart, PackedTransfer, SCATTERED, TransferFormat, TransferSettings, bake_transfer};
 
+/// How the sun (or the moon, where it is the brighter) lights a plant's full models. Nothing is baked for it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Serialize)]
+pub enum SunLight {
+    /// Each leaf by the angle of its own normal to the sun, front and back [Franzke 2005, 4.2.2]: sharp, and true.
+    #[default]
+    LeafShader,
+    /// The sun projected onto spherical harmonics, through the plant's transfer, dimmed by the shadow map, as published for
+    /// landscapes [Franzke 2005, 4.3.3]. A few bands hold no disc, and the plant's own shadow counts twice: soft and dark,
+    /// to compare with. Only for plants that are lit by transfer; others, and crosses, take the leaf shader.
+    Harmonics,
+}
+
 /// Which light a plant gets.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum LightingSettings {

@@ -185,7 +185,8 @@ fn triangulate(indices: &[u32], mode: Mode, place: &str, warnings: &mut Warnings
         },
         _ => {
             if !indices.len().is_multiple_of(3) {
-                let message = format!("{} indices are no whole triangles; the rest is left out", indices.len());
+                let message =
+                    format!("{} indices are not a whole number of triangles; the rest is left out", indices.len());
                 warnings.push(WarningKind::Repaired, place, message);
             }
             indices.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect()

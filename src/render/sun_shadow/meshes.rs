@@ -159,7 +159,9 @@ pub fn prepare_mesh_casters(
         let Some(offset) = position.and_then(|index| layout.attributes.get(index)).map(|a| a.offset) else { continue };
         let topology = ready.primitive_topology();
         if offset != 0 || !matches!(topology, PrimitiveTopology::TriangleList) {
-            warn_once!("a mesh with CastsCanopyShadow is no list of triangles, or has no positions first: no shadow");
+            warn_once!(
+                "a mesh with CastsCanopyShadow is not a triangle list, or its first attribute is not the position: it casts no shadow"
+            );
             continue;
         }
         let pipeline = *casters.pipelines.entry((layout.array_stride, topology)).or_insert_with(|| {

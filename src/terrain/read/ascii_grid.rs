@@ -120,7 +120,7 @@ impl Header {
                 if word.text[0].is_ascii_alphabetic() && number(source, &word).is_err() {
                     return Err(source.malformed(
                         format!("line {}, column {}", word.line, word.column),
-                        format!("\"{}\" is no key of an ASCII grid", String::from_utf8_lossy(word.text)),
+                        format!("\"{}\" is not a key of an ASCII grid", String::from_utf8_lossy(word.text)),
                         format!("known keys are {}", KEYS.join(", ")),
                     ));
                 }
@@ -202,7 +202,7 @@ fn number(source: &Source, word: &Word) -> Result<f64, TerrainError> {
         let shown: String = String::from_utf8_lossy(word.text).chars().take(40).collect();
         source.malformed(
             format!("line {}, column {}", word.line, word.column),
-            format!("\"{shown}\" is no number"),
+            format!("\"{shown}\" is not a number"),
             remedy,
         )
     })

@@ -39,6 +39,7 @@ pub struct ReadOptions {
 
 /// A window in the coordinates of the file (degrees, or easting and northing). Samples on its border are inside.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Crop {
     /// Smallest x.
     pub west: f64,

@@ -22,7 +22,10 @@ use crate::{
     bake::{
         BakedPlant,
         levels::cross::CrossSettings,
-        lighting::{LightingSettings, implicit::ImplicitParameters},
+        lighting::{
+            LightingSettings,
+            implicit::{ImplicitParameters, ImplicitSettings},
+        },
     },
     render::components::Forest,
     scene::{Lighting, Transfer},
@@ -166,8 +169,7 @@ impl LightPanel {
     fn order(&mut self, number: usize, cross: Option<CrossSettings>) {
         let Some(species) = self.species.get(number) else { return };
         let Some(expressive) = species.tuning.expressive() else { return };
-        let lighting = plants::lighting_settings(Some(&Lighting::Expressive(expressive.clone())));
-        let LightingSettings::Expressive(settings) = lighting else { return };
+        let settings = ImplicitSettings { together: false, ..*expressive };
         let plants = self.plants.get(species.variants.clone()).unwrap_or_default();
         let plants = plants.iter().map(|plant| plant.plant.clone()).collect();
         self.baker.order(Order { species: number, plants, settings, cross });

@@ -6,8 +6,8 @@
 use std::ops::RangeInclusive;
 
 use crate::{
-    bake::lighting::implicit::ImplicitParameters,
-    scene::{AmbientTerm, CrownNormals, Expressive, Lighting},
+    bake::lighting::implicit::{AmbientField, ImplicitParameters, ImplicitSettings, NormalSource},
+    scene::{Lighting, lighting::word},
 };
 
 /// Something that can be turned.
@@ -108,28 +108,51 @@ impl Line {
     }
 
     fn number(self) -> Option<(RangeInclusive<f64>, Step)> {
-        Some(match self {
+        let (range, step) = match self {
             Self::Light | Self::Normals | Self::Ambient => return None,
-            Self::AmbientRadius => (Expressive::AMBIENT_RADIUS, Step::Factor(1e-3)),
-            Self::Radius => (Expressive::RADIUS, Step::Factor(*Expressive::RADIUS.start())),
-            Self::Threshold | Self::Core => (Expressive::DENSITY, Step::Factor(1e-3)),
-            Self::Exponent => (Expressive::EXPONENT, Step::Factor(*Expressive::EXPONENT.start())),
-            Self::Share => (Expressive::SHARE, Step::Factor(*Expressive::SHARE.start())),
-            Self::Least | Self::OwnNormal => (Expressive::UNIT, Step::Hundredths),
-        })
+            Self::AmbientRadius => (ImplicitSettings::AMBIENT_RADIUS, Step::Factor(1e-3)),
+            Self::Radius => (ImplicitSettings::RADIUS, Step::Factor(as_written(*ImplicitSettings::RADIUS.start()))),
+            Self::Threshold | Self::Core => (ImplicitSettings::DENSITY, Step::Factor(1e-3)),
+            Self::Exponent => {
+                (ImplicitSettings::EXPONENT, Step::Factor(as_written(*ImplicitSettings::EXPONENT.start())))
+            }
+            Self::Share => (ImplicitSettings::SHARE, Step::Factor(as_written(*ImplicitSettings::SHARE.start()))),
+            Self::Least | Self::OwnNormal => (ImplicitSettings::UNIT, Step::Hundredths),
+        };
+        Some((as_written(*range.start())..=as_written(*range.end()), step))
     }
 
-    fn field(self, expressive: &mut Expressive) -> Option<&mut Option<f64>> {
-        match self {
+    /// The number; `None` where it is not set, and for lines that are none.
+    fn get(self, settings: &ImplicitSettings) -> Option<f64> {
+        let default = ImplicitSettings::default();
+        let value = match self {
             Self::Light | Self::Normals | Self::Ambient => None,
-            Self::AmbientRadius => Some(&mut expressive.ambient_radius),
-            Self::Radius => Some(&mut expressive.radius),
-            Self::Threshold => Some(&mut expressive.threshold),
-            Self::Core => Some(&mut expressive.core),
-            Self::Exponent => Some(&mut expressive.exponent),
-            Self::Least => Some(&mut expressive.least),
-            Self::OwnNormal => Some(&mut expressive.own_normal),
-            Self::Share => Some(&mut expressive.share),
+            Self::AmbientRadius => settings.ambient_radius,
+            Self::Radius => settings.radius,
+            Self::Threshold => settings.threshold,
+            Self::Core => settings.core,
+            Self::Exponent => settings.exponent,
+            Self::Least => settings.least,
+            Self::OwnNormal => Some(settings.own_normal).filter(|value| *value != default.own_normal),
+            Self::Share => Some(settings.generator_share).filter(|value| *value != default.generator_share),
+        };
+        value.map(as_written)
+    }
+
+    /// Sets the number, or takes it back.
+    fn set(self, settings: &mut ImplicitSettings, value: Option<f64>) {
+        let value = value.map(|value| value as f32);
+        let default = ImplicitSettings::default();
+        match self {
+            Self::Light | Self::Normals | Self::Ambient => {}
+            Self::AmbientRadius => settings.ambient_radius = value,
+            Self::Radius => settings.radius = value,
+            Self::Threshold => settings.threshold = value,
+            Self::Core => settings.core = value,
+            Self::Exponent => settings.exponent = value,
+            Self::Least => settings.least = value,
+            Self::OwnNormal => settings.own_normal = value.unwrap_or(default.own_normal),
+            Self::Share => settings.generator_share = value.unwrap_or(default.generator_share),
         }
     }
 
@@ -154,7 +177,7 @@ impl Line {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tuning {
     scene: Lighting,
-    expressive: Expressive,
+    expressive: ImplicitSettings,
     is_expressive: bool,
 }
 
@@ -162,19 +185,19 @@ impl Tuning {
     /// The scene's own light.
     pub fn new(scene: Lighting) -> Self {
         let (expressive, is_expressive) = match &scene {
-            Lighting::Expressive(expressive) => (expressive.clone(), true),
-            Lighting::Local | Lighting::Transfer(_) => (Expressive::default(), false),
+            Lighting::Expressive(expressive) => (*expressive, true),
+            Lighting::Local | Lighting::Transfer(_) => (ImplicitSettings::default(), false),
         };
         Self { scene, expressive, is_expressive }
     }
 
     /// The light as it is now.
     pub fn lighting(&self) -> Lighting {
-        if self.is_expressive { Lighting::Expressive(self.expressive.clone()) } else { self.scene.clone() }
+        if self.is_expressive { Lighting::Expressive(self.expressive) } else { self.scene.clone() }
     }
 
     /// The values of the implicit surface, where it is what lights the species.
-    pub fn expressive(&self) -> Option<&Expressive> {
+    pub fn expressive(&self) -> Option<&ImplicitSettings> {
         self.is_expressive.then_some(&self.expressive)
     }
 
@@ -195,14 +218,14 @@ impl Tuning {
         match line {
             Line::Light => self.is_expressive = up || matches!(self.scene, Lighting::Expressive(_)),
             _ if !self.is_expressive => {}
-            Line::Ambient => self.expressive.ambient = if up { AmbientTerm::Depth } else { AmbientTerm::Published },
-            Line::Normals => self.expressive.normals = if up { CrownNormals::Smooth } else { CrownNormals::Nearest },
+            Line::Ambient => self.expressive.ambient = if up { AmbientField::Depth } else { AmbientField::Published },
+            Line::Normals => {
+                self.expressive.normals = if up { NormalSource::Gradient } else { NormalSource::NearestVertex }
+            }
             _ => {
-                let (Some((range, step)), Some(field)) = (line.number(), line.field(&mut self.expressive)) else {
-                    return false;
-                };
-                if let Some(value) = field.or(line.automatic(used)) {
-                    *field = Some(turned(value, &range, step, up, fine));
+                let Some((range, step)) = line.number() else { return false };
+                if let Some(value) = line.get(&self.expressive).or(line.automatic(used)) {
+                    line.set(&mut self.expressive, Some(turned(value, &range, step, up, fine)));
                 }
             }
         }
@@ -215,21 +238,17 @@ impl Tuning {
         let before = self.clone();
         match line {
             Line::Light => *self = Self::new(self.scene.clone()),
-            Line::Ambient => self.expressive.ambient = AmbientTerm::default(),
-            Line::Normals => self.expressive.normals = CrownNormals::default(),
-            _ => {
-                if let Some(field) = line.field(&mut self.expressive) {
-                    *field = None;
-                }
-            }
+            Line::Ambient => self.expressive.ambient = AmbientField::default(),
+            Line::Normals => self.expressive.normals = NormalSource::default(),
+            _ => line.set(&mut self.expressive, None),
         }
         *self != before
     }
 
     /// A line's value as the panel shows it.
     pub fn value(&self, line: Line, used: Option<&ImplicitParameters>) -> String {
-        let mut expressive = self.expressive.clone();
-        match (line, line.field(&mut expressive)) {
+        let number = |value: f64| format!("{}{}", three_digits(value), line.unit());
+        match (line, line.get(&self.expressive)) {
             (Line::Light, _) => {
                 let name = match self.lighting() {
                     Lighting::Local => "local",
@@ -239,14 +258,19 @@ impl Tuning {
                 let whose = if self.is_turned() { "for this session" } else { "the scene's" };
                 format!("{name} ({whose})")
             }
-            (Line::Ambient, _) => format!("{:?}", self.expressive.ambient).to_lowercase(),
-            (_, None) => format!("{:?}", self.expressive.normals).to_lowercase(),
-            (_, Some(Some(value))) => format!("{}{}", three_digits(*value), line.unit()),
-            (_, Some(None)) => line
-                .automatic(used)
-                .map_or("automatic".to_owned(), |value| format!("{}{} (automatic)", three_digits(value), line.unit())),
+            (Line::Ambient, _) => word(&self.expressive.ambient).to_lowercase(),
+            (Line::Normals, _) => word(&self.expressive.normals).to_lowercase(),
+            (_, Some(value)) => number(value),
+            (_, None) => {
+                line.automatic(used).map_or("automatic".to_owned(), |value| format!("{} (automatic)", number(value)))
+            }
         }
     }
+}
+
+/// The decimal number that `value` is written as: 0.833, where `f64::from` has 0.83300000429.
+fn as_written(value: f32) -> f64 {
+    value.to_string().parse().unwrap_or(f64::from(value))
 }
 
 /// `value` one step further, within `range`.
@@ -309,7 +333,7 @@ mod tests {
     };
 
     fn expressive() -> Tuning {
-        Tuning::new(Lighting::Expressive(Expressive::default()))
+        Tuning::new(Lighting::Expressive(ImplicitSettings::default()))
     }
 
     /// The light of a scene with `lighting` written into it.
@@ -349,7 +373,7 @@ mod tests {
         assert!(tuning.turn(Line::Light, false, false, None) && !tuning.is_turned());
         assert!(
             tuning.turn(Line::Light, true, false, None)
-                && tuning.expressive().is_some_and(|e| *e != Expressive::default())
+                && tuning.expressive().is_some_and(|e| *e != ImplicitSettings::default())
         );
         assert!(tuning.reset(Line::Light));
         assert_eq!(tuning, Tuning::new(scene));
@@ -368,7 +392,8 @@ mod tests {
                     steps += 1;
                     assert!(steps < 300, "{line:?}");
                 }
-                assert_eq!(line.field(&mut tuning.expressive).and_then(|value| *value), Some(end), "{line:?}");
+                let reached = line.get(&tuning.expressive).or(line.automatic(None));
+                assert_eq!(reached, Some(end), "{line:?}");
             }
         }
     }
@@ -399,10 +424,9 @@ mod tests {
                     _ => tuning.turn(LINES[line], up, fine, known.then_some(&used)),
                 };
             }
-            let mut values = tuning.expressive.clone();
             for line in LINES {
-                if let (Some(Some(value)), Some((range, _))) = (line.field(&mut values), line.number()) {
-                    prop_assert!(range.contains(value), "{:?} {}", line, value);
+                if let (Some(value), Some((range, _))) = (line.get(&tuning.expressive), line.number()) {
+                    prop_assert!(range.contains(&value), "{:?} {}", line, value);
                 }
                 prop_assert!(!tuning.value(line, Some(&used)).contains("NaN"));
             }

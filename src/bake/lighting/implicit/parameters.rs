@@ -9,6 +9,8 @@
 //! - k_a_min, d_min and n: constants of each [`AmbientField`], as both are in units that mean the same for any plant. They
 //!   were fitted to the traced visibility of ten plants, which `benches/implicit.rs` prints beside what they give.
 
+use std::ops::RangeInclusive;
+
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -61,15 +63,19 @@ impl AmbientField {
 /// Where the normals of the foliage come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum NormalSource {
-    /// The nearest vertex of the surface, as published. Jumps between lobes of the crown.
+    /// The nearest vertex of the surface, as published. Jumps between lobes of the crown. In a scene file: `Nearest`.
     #[default]
+    #[serde(rename = "Nearest")]
     NearestVertex,
-    /// The gradient of the density field: smooth.
+    /// The gradient of the density field: smooth. In a scene file: `Smooth`.
+    #[serde(rename = "Smooth")]
     Gradient,
 }
 
-/// How a plant is lit by implicit surfaces. Values out of range are moved into it; `None` follows from the model.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// How a plant is lit by implicit surfaces. Values out of range are moved into it; `None`, and what a scene file leaves out
+/// behind `lighting: Expressive(`, follows from the model. Scene files state values within the ranges that are constants here.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct ImplicitSettings {
     /// ρ, metres, 0..=1e6. Larger: a smoother, more general shape of the crown.
     pub radius: Option<f32>,
@@ -87,6 +93,8 @@ pub struct ImplicitSettings {
     pub exponent: Option<f32>,
     /// Share of the foliage's primitives that are generators, 0..=1 (at least one is). Smaller: faster, a little off.
     /// [`AmbientField::Depth`] has all of them: it is from few leaves that it finds gaps, and it thins them out itself.
+    /// In a scene file: `share`.
+    #[serde(rename = "share")]
     pub generator_share: f32,
     /// What a generator counts.
     pub weighting: Weighting,
@@ -102,6 +110,10 @@ pub struct ImplicitSettings {
     /// [`COARSE_SHARE`](super::COARSE_SHARE) and [`FINE_SHARE`](super::FINE_SHARE)); `None` leaves it as extracted.
     /// Normals always come from the surface as extracted.
     pub surface_share: Option<f32>,
+    /// Whether all trees of such species are lit together, so that a small tree is darkened by its tall neighbour [Luft
+    /// 2007, 5]. Each tree then is a model of its own, of which a scene has at most 64. The first such species' values
+    /// count for all. For who places trees: the bake of one plant does not look at it. Default false.
+    pub together: bool,
 }
 
 impl Default for ImplicitSettings {
@@ -121,11 +133,28 @@ impl Default for ImplicitSettings {
             surface: true,
             resolution: 4.0,
             surface_share: None,
+            together: false,
         }
     }
 }
 
 impl ImplicitSettings {
+    /// Range of [`radius`](Self::radius) in a scene, metres.
+    pub const RADIUS: RangeInclusive<f32> = 1e-6..=1e3;
+    /// Range of [`threshold`](Self::threshold) and [`core`](Self::core) in a scene, leaves.
+    pub const DENSITY: RangeInclusive<f32> = 0.0..=1e6;
+    /// Range of [`ambient_radius`](Self::ambient_radius) in a scene, metres.
+    pub const AMBIENT_RADIUS: RangeInclusive<f32> = 0.0..=1e3;
+    /// Range of [`exponent`](Self::exponent) in a scene.
+    pub const EXPONENT: RangeInclusive<f32> = 0.01..=100.0;
+    /// Range of [`generator_share`](Self::generator_share) in a scene.
+    pub const SHARE: RangeInclusive<f32> = 1e-3..=1.0;
+    /// Range of [`least`](Self::least), [`own_normal`](Self::own_normal) and [`surface_share`](Self::surface_share) in a
+    /// scene.
+    pub const UNIT: RangeInclusive<f32> = 0.0..=1.0;
+    /// Range of [`resolution`](Self::resolution) in a scene, cells a radius.
+    pub const RESOLUTION: RangeInclusive<f32> = 1.0..=16.0;
+
     /// The settings with every value moved into its range; what is not finite becomes the default.
     pub fn in_range(self) -> Self {
         let default = Self::default();
