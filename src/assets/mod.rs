@@ -8,16 +8,29 @@
 //!
 //! [`Stage::build`] blocks, reports to a [`Progress`](crate::progress::Progress) and can be cancelled;
 //! [`CanopyScenePlugin`] runs it beside a Bevy program's frames, on threads of its own.
+//!
+//! What a program builds its forests of in code are Bevy assets: [`PlantAsset`], [`TerrainMap`] and [`SceneAsset`], registered
+//! by [`CanopyAssetPlugin`].
 
+pub(crate) mod background;
 mod error;
 pub(crate) mod ground;
 mod load;
+mod plant;
 pub(crate) mod plants;
+mod plugin;
+mod read;
+mod scene_asset;
 pub(crate) mod stage;
+mod terrain_map;
 pub(crate) mod threads;
 mod together;
 pub(crate) mod trees;
 
 pub use error::StageError;
 pub use load::{CanopyScenePlugin, LoadScene, LoadedScene, SceneFailed, SceneProgress, SceneReady, SceneState};
+pub use plant::{Growth, PlantAsset, PlantLoader, PlantSettings};
+pub use plugin::CanopyAssetPlugin;
+pub use scene_asset::{SceneAsset, SceneLoader};
 pub use stage::{Shown, Stage};
+pub use terrain_map::{TerrainMap, TerrainMapLoader, TerrainMapSettings};
