@@ -49,6 +49,7 @@
 pub mod app;
 pub mod assets;
 pub mod bake;
+pub mod components;
 pub mod cull;
 mod files;
 pub mod light;
@@ -71,7 +72,12 @@ pub mod prelude {
     pub use crate::{
         CanopyPlugins,
         assets::{
-            CanopyScenePlugin, LoadScene, LoadedScene, SceneFailed, SceneProgress, SceneReady, SceneState, Stage,
+            CanopyAssetPlugin, CanopyScenePlugin, LoadScene, LoadedScene, PlantAsset, PlantSettings, SceneAsset,
+            SceneFailed, SceneProgress, SceneReady, SceneState, Stage, TerrainMap, TerrainMapSettings,
+        },
+        components::{
+            Forest3d, ForestFailed, ForestReady, ForestSettings, ForestSpecies, ForestTrees, Terrain3d, TerrainFailed,
+            TerrainReady, TerrainSettings,
         },
         lod::{FadeBand, Levels, Representation},
         progress::{Progress, Silent},
