@@ -64,10 +64,11 @@ pub use plugin::CanopyPlugins;
 pub mod prelude {
     pub use crate::{
         CanopyPlugins,
-        assets::Stage,
+        assets::{CanopyAssetPlugin, PlantAsset, PlantSettings, SceneAsset, Stage, TerrainMap, TerrainMapSettings},
         components::{
-            CanopyScene, CanopySystems, FloatingOrigin, FollowsDaylight, LoadedScene, SceneFailed, SceneProgress,
-            SceneReady, SceneState, Sun, SunRefresh,
+            CanopyScene, CanopySystems, FloatingOrigin, FollowsDaylight, Forest3d, ForestFailed, ForestReady,
+            ForestSettings, ForestSpecies, ForestTrees, LoadedScene, SceneFailed, SceneProgress, SceneReady,
+            SceneState, Sun, SunRefresh, Terrain3d, TerrainFailed, TerrainReady, TerrainSettings,
         },
         lod::{FadeBand, Levels, Representation},
         progress::{Progress, Silent},

@@ -3,7 +3,8 @@
 use bevy::app::{PluginGroup, PluginGroupBuilder};
 
 use crate::{
-    components::{OriginPlugin, ScenePlugin, SunPlugin},
+    assets::CanopyAssetPlugin,
+    components::{ForestPlugin, OriginPlugin, ScenePlugin, SunPlugin},
     render::CanopyRenderPlugin,
 };
 
@@ -12,6 +13,12 @@ pub struct CanopyPlugins;
 
 impl PluginGroup for CanopyPlugins {
     fn build(self) -> PluginGroupBuilder {
-        PluginGroupBuilder::start::<Self>().add(CanopyRenderPlugin).add(SunPlugin).add(OriginPlugin).add(ScenePlugin)
+        PluginGroupBuilder::start::<Self>()
+            .add(CanopyAssetPlugin)
+            .add(CanopyRenderPlugin)
+            .add(SunPlugin)
+            .add(OriginPlugin)
+            .add(ScenePlugin)
+            .add(ForestPlugin)
     }
 }

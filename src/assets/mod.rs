@@ -6,15 +6,29 @@
 //!       \--> trees (stand) --> trees lit together -----+
 //! ```
 //!
-//! [`Stage::build`] blocks, reports to a [`Progress`](crate::progress::Progress) and can be cancelled.
+//! [`Stage::build`] blocks, reports to a [`Progress`](crate::progress::Progress) and can be cancelled;
+//! [`CanopyScene`](crate::components::CanopyScene) runs it beside a Bevy program's frames, on threads of its own.
+//!
+//! What a program builds its forests of in code are Bevy assets: [`PlantAsset`], [`TerrainMap`] and [`SceneAsset`], registered
+//! by [`CanopyAssetPlugin`].
 
+pub(crate) mod background;
 mod error;
 pub(crate) mod ground;
+mod plant;
 pub(crate) mod plants;
+mod plugin;
+mod read;
+mod scene_asset;
 pub(crate) mod stage;
+mod terrain_map;
 pub(crate) mod threads;
 mod together;
 pub(crate) mod trees;
 
 pub use error::StageError;
+pub use plant::{Growth, PlantAsset, PlantLoader, PlantSettings};
+pub use plugin::CanopyAssetPlugin;
+pub use scene_asset::{SceneAsset, SceneLoader};
 pub use stage::Stage;
+pub use terrain_map::{TerrainMap, TerrainMapLoader, TerrainMapSettings};

@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// Metres a texel of the cover map.
-const COVER_TEXEL: f64 = 8.0;
+pub(crate) const COVER_TEXEL: f64 = 8.0;
 /// Share of a plant's half width, the greater of its two, that counts as its crown's radius.
 const CROWN_SHARE: f32 = 0.8;
 /// Extent of a plant without any surface, metres.
@@ -97,17 +97,12 @@ impl Stage {
     /// # Errors
     /// [`StageError::TooManyTrees`].
     pub fn check_device(&self, device: &RenderDevice) -> Result<(), StageError> {
-        let limits = device.limits();
-        let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let limit = usize::try_from(bytes).unwrap_or(usize::MAX) / size_of::<PackedTree>();
-        let count = self.stand.trees.len();
-        if count > limit {
-            return Err(StageError::TooManyTrees { count, limit });
-        }
+        check_trees(self.stand.trees.len(), device)?;
         // The crosses of all plants share a texture array.
         let planes = self.plants.iter().filter_map(BakedPlant::cross).map(|cross| cross.planes.len());
-        let (most, layers) = (planes.clone().max().unwrap_or(1).max(1), limits.max_texture_array_layers as usize);
-        let (count, limit) = (planes.count(), layers / most);
+        let layers = device.limits().max_texture_array_layers as usize;
+        let (most, count) = (planes.clone().max().unwrap_or(1).max(1), planes.count());
+        let limit = layers / most;
         if count > limit { Err(StageError::TooManyPlants { count, limit }) } else { Ok(()) }
     }
 
@@ -152,6 +147,17 @@ fn shadow(quality: &Quality) -> SunShadowSettings {
     }
 }
 
+/// Whether `device` can hold the `count` trees of a forest.
+///
+/// # Errors
+/// [`StageError::TooManyTrees`].
+pub(crate) fn check_trees(count: usize, device: &RenderDevice) -> Result<(), StageError> {
+    let limits = device.limits();
+    let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    let limit = usize::try_from(bytes).unwrap_or(usize::MAX) / size_of::<PackedTree>();
+    if count > limit { Err(StageError::TooManyTrees { count, limit }) } else { Ok(()) }
+}
+
 /// Stops a build that nobody waits for any more.
 fn check_wanted(progress: &dyn Progress) -> Result<(), StageError> {
     if progress.is_cancelled() { Err(StageError::Cancelled) } else { Ok(()) }
@@ -173,7 +179,7 @@ pub(crate) fn observer(scene: &Scene, terrain: &Terrain) -> Result<Observer, Sta
 }
 
 /// The disc of ground that the plant's crown covers, which is smaller than what holds every twig of it.
-fn crown(plant: &BakedPlant) -> PlantSize {
+pub(crate) fn crown(plant: &BakedPlant) -> PlantSize {
     let (half_width, height) = plant.plant.bounds().map_or((NO_PLANT.radius, NO_PLANT.height), |bounds| {
         let size = bounds.size();
         ((0.5 * size.x.max(size.z)).max(0.01), bounds.max.y.max(0.01))

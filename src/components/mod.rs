@@ -1,13 +1,62 @@
-//! What a Bevy program spawns, beside the [renderer's own components](crate::render::components): scenes, the sun, the origin.
+//! What a Bevy program spawns, beside the [renderer's own components](crate::render::components): scenes, terrain and forests, of
+//! assets or of values made in code; the sun, the origin.
+//!
+//! ```text
+//!  CanopyScene { file or value } ----------------------------> Ground, Forest, Sun as children, SceneReady
+//!  Terrain3d(Handle<TerrainMap>) ----------------------------> Ground (renderer) <--- canopy cover of its forests, summed
+//!  Forest3d { trees, species: Handle<PlantAsset>, ground } --> built beside the frames --> Forest (renderer), ForestReady
+//!  Sun ------------------------------------------------------> Daylight (renderer), exposure, DirectionalLight
+//! ```
+//!
+//! The components of this room say what a program wants; systems ([`CanopySystems`]) bring the renderer's own components to it:
+//! when an asset is loaded, when it changes, when a component changes, when either goes. Any number of scenes, terrains and
+//! forests may stand in one world.
 
+mod cover;
 mod daylight;
+mod forest;
 mod origin;
 mod scene;
 mod sets;
 mod sun;
+mod terrain;
 
+use bevy::{
+    app::{App, Plugin, PostUpdate},
+    asset::{AssetEventSystems, Assets},
+    ecs::schedule::{IntoScheduleConfigs, common_conditions::resource_exists},
+    transform::TransformSystems,
+};
+
+use crate::assets::{PlantAsset, TerrainMap};
 pub use daylight::FollowsDaylight;
+pub use forest::{Forest3d, ForestError, ForestFailed, ForestReady, ForestSettings, ForestSpecies, ForestTrees};
 pub use origin::{FloatingOrigin, OriginPlugin};
 pub use scene::{CanopyScene, LoadedScene, SceneFailed, ScenePlugin, SceneProgress, SceneReady, SceneState, Shown};
 pub use sets::CanopySystems;
 pub use sun::{DrawnSun, Sun, SunError, SunPlugin, SunRefresh};
+pub use terrain::{Terrain3d, TerrainFailed, TerrainReady, TerrainSettings};
+
+/// [`Terrain3d`] and [`Forest3d`]. Part of [`CanopyPlugins`](crate::CanopyPlugins); needs
+/// [`CanopyAssetPlugin`](crate::assets::CanopyAssetPlugin), without whose assets the systems rest.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ForestPlugin;
+
+impl Plugin for ForestPlugin {
+    fn build(&self, app: &mut App) {
+        app.register_type::<Terrain3d>()
+            .register_type::<TerrainSettings>()
+            .register_type::<Forest3d>()
+            .register_type::<ForestSettings>()
+            .add_systems(
+                PostUpdate,
+                (terrain::show_terrains, forest::tend_forests, cover::cover_grounds)
+                    .chain()
+                    .in_set(CanopySystems::Forests)
+                    .after(AssetEventSystems)
+                    .after(TransformSystems::Propagate)
+                    .run_if(resource_exists::<Assets<PlantAsset>>)
+                    .run_if(resource_exists::<Assets<TerrainMap>>),
+            );
+    }
+}

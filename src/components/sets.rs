@@ -9,6 +9,8 @@ pub enum CanopySystems {
     Load,
     /// Clocks run, in `PreUpdate`.
     Clock,
+    /// Terrains and forests follow their components and assets, in `PostUpdate`, after transforms are propagated.
+    Forests,
     /// Light, exposure and the lights that follow, in `PostUpdate`, before transforms are propagated.
     Light,
     /// The origin of the Bevy world follows the camera, in `PostUpdate`, before transforms are propagated.

@@ -18,12 +18,12 @@
 //! all directions nothing of it is lost: what facets of a rough leaf shade is made up for ([`lobe_gain`]).
 
 use glam::Vec3;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::{PartKind, Plant, PlantMaterial};
 
 /// The gloss of a leaf: what its surface reflects without letting it in. In a scene file: `(share: 0.045, roughness: 0.4)`.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Gloss {
     /// Share of diffuse light that the surface reflects, 0..=0.09; a share `s` counts as `s / 2` for light that comes straight

@@ -51,6 +51,7 @@ mod place;
 mod quality;
 mod source;
 mod species;
+mod species_file;
 mod time;
 mod trees;
 

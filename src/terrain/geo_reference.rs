@@ -1,7 +1,7 @@
 //! What a file's horizontal coordinates mean, and how they map to the local frame.
 
 use glam::DVec2;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::TerrainError;
 
@@ -18,8 +18,8 @@ const MAX_LATITUDE: f64 = 89.0;
 ///
 /// A scene file writes it as `Geographic`, `Utm(zone: 17)`, `Utm(zone: 33, south: true)`, `Local`,
 /// `Projected(metres_per_unit: 0.3048)` or by its EPSG code, `Epsg(25832)` (see [`from_epsg`](Self::from_epsg)).
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(from = "Written")]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(from = "Written", into = "Written")]
 pub enum CoordinateSystem {
     /// Degrees of longitude (x) and latitude (y). The datum is taken as WGS84: others differ by some 100 m in place
     /// and by less than 0.01 % in scale.
@@ -47,7 +47,7 @@ pub enum CoordinateSystem {
 }
 
 /// A coordinate system as a scene file writes it.
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(rename = "CoordinateSystem", deny_unknown_fields)]
 enum Written {
     Geographic,
@@ -58,6 +58,8 @@ enum Written {
     },
     Epsg(u32),
     Projected {
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        epsg: Option<u32>,
         #[serde(default = "one")]
         metres_per_unit: f64,
     },
@@ -77,8 +79,20 @@ impl From<Written> for CoordinateSystem {
             Written::Epsg(code) => {
                 Self::from_epsg(code).unwrap_or(Self::Projected { epsg: Some(code), metres_per_unit: 1.0 })
             }
-            Written::Projected { metres_per_unit } => Self::Projected { epsg: None, metres_per_unit },
+            Written::Projected { epsg, metres_per_unit } => Self::Projected { epsg, metres_per_unit },
             Written::Local => Self::Local,
+        }
+    }
+}
+
+impl From<CoordinateSystem> for Written {
+    fn from(system: CoordinateSystem) -> Self {
+        match system {
+            CoordinateSystem::Geographic => Self::Geographic,
+            CoordinateSystem::Utm { zone, south } => Self::Utm { zone, south },
+            CoordinateSystem::WebMercator => Self::Epsg(3857),
+            CoordinateSystem::Projected { epsg, metres_per_unit } => Self::Projected { epsg, metres_per_unit },
+            CoordinateSystem::Local => Self::Local,
         }
     }
 }
@@ -272,6 +286,24 @@ fn utm_to_geographic(point: DVec2, zone: u8, south: bool) -> Option<(f64, f64)> 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn systems_are_written_as_they_are_read() -> Result<(), ron::Error> {
+        use CoordinateSystem::{Geographic, Local, Projected, Utm, WebMercator};
+        let feet = 0.3048;
+        for system in [
+            Geographic,
+            Utm { zone: 33, south: true },
+            WebMercator,
+            Projected { epsg: Some(2056), metres_per_unit: 1.0 },
+            Projected { epsg: None, metres_per_unit: feet },
+            Local,
+        ] {
+            let text = ron::to_string(&system)?;
+            assert_eq!(ron::from_str::<CoordinateSystem>(&text).map_err(|error| error.code)?, system, "{text}");
+        }
+        Ok(())
+    }
 
     #[test]
     fn a_degree_has_its_published_length() {

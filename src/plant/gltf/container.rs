@@ -5,34 +5,64 @@
 
 use std::fs::File;
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use gltf::json;
 
+use super::ExternalFiles;
 use super::error::{EXPORT_AGAIN, Fault, PlantError, WarningKind, Warnings};
 
+/// Where the files beside a file are.
+pub(super) enum Beside<'a> {
+    /// In the folder of the file.
+    Folder(&'a Path),
+    /// In memory, by the paths that [`external_files`] lists.
+    Memory(&'a ExternalFiles),
+}
+
 /// A parsed file: the JSON part and access to its bytes.
-pub(super) struct Document {
-    pub path: PathBuf,
+pub(super) struct Document<'a> {
     pub root: json::Root,
+    beside: Beside<'a>,
     blob: Option<Vec<u8>>,
     /// The buffers that have been asked for.
     buffers: Vec<Option<Vec<u8>>>,
 }
 
-/// Reads and parses `path` (.gltf or .glb, told apart by content).
-pub(super) fn open(path: &Path, warnings: &mut Warnings) -> Result<Document, PlantError> {
-    let bytes = std::fs::read(path).map_err(|source| PlantError::Io { path: path.to_path_buf(), source })?;
-    let (text, blob) = if looks_binary(&bytes, path) {
-        let (text, blob) = split_glb(&bytes, path, warnings)?;
-        (text, blob.map(<[u8]>::to_vec))
-    } else {
-        (bytes.as_slice(), None)
-    };
-    let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
-    let root = parse(text, path)?;
+/// Parses `bytes`, those of the file `path` (.gltf or .glb, told apart by content).
+pub(super) fn open<'a>(
+    bytes: &[u8],
+    path: &Path,
+    beside: Beside<'a>,
+    warnings: &mut Warnings,
+) -> Result<Document<'a>, PlantError> {
+    let (root, blob) = read_root(bytes, path, warnings)?;
     let buffers = vec![None; root.buffers.len()];
-    Ok(Document { path: path.to_path_buf(), root, blob, buffers })
+    Ok(Document { root, beside, blob: blob.map(<[u8]>::to_vec), buffers })
+}
+
+/// The JSON part of a file, and the binary chunk of GLB.
+fn read_root<'a>(
+    bytes: &'a [u8],
+    path: &Path,
+    warnings: &mut Warnings,
+) -> Result<(json::Root, Option<&'a [u8]>), PlantError> {
+    let (text, blob) = if looks_binary(bytes, path) { split_glb(bytes, path, warnings)? } else { (bytes, None) };
+    let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
+    Ok((parse(text, path)?, blob))
+}
+
+/// The files beside `path` that its `bytes` name for their buffers and images, each once, as relative paths with forward
+/// slashes as written.
+pub(super) fn external_files(bytes: &[u8], path: &Path) -> Result<Vec<String>, PlantError> {
+    let (root, _) = read_root(bytes, path, &mut Warnings::default())?;
+    let buffers = root.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
+    let images =
+        root.images.iter().filter(|image| image.buffer_view.is_none()).filter_map(|image| image.uri.as_deref());
+    let mut files: Vec<String> = buffers.chain(images).filter_map(|uri| relative_path(uri).ok()).collect();
+    files.sort();
+    files.dedup();
+    Ok(files)
 }
 
 /// GLB by its magic number; a file of that name without it is damaged GLB rather than JSON.
@@ -157,7 +187,7 @@ fn integers(value: &mut json::Value) {
     }
 }
 
-impl Document {
+impl Document<'_> {
     /// The bytes of buffer view `index`.
     pub fn view(&mut self, index: usize) -> Result<&[u8], Fault> {
         let place = format!("/bufferViews/{index}");
@@ -190,7 +220,7 @@ impl Document {
             let buffer = &self.root.buffers[index];
             let length = buffer.byte_length.0;
             let bytes = match (&buffer.uri, &self.blob) {
-                (Some(uri), _) => read_uri(uri, &self.path, &place, Some(length))?,
+                (Some(uri), _) => read_uri(uri, &self.beside, &place, Some(length))?,
                 (None, Some(blob)) if index == 0 => blob.clone(),
                 (None, _) => {
                     let what = "has neither a uri nor the binary chunk of a GLB file";
@@ -214,14 +244,14 @@ impl Document {
         };
         match (image.buffer_view.map(|view| view.value()), image.uri.clone()) {
             (Some(view), _) => self.view(view).map(<[u8]>::to_vec),
-            (None, Some(uri)) => read_uri(&uri, &self.path, &place, None),
+            (None, Some(uri)) => read_uri(&uri, &self.beside, &place, None),
             (None, None) => Err(Fault::new(place, "has neither a uri nor a bufferView", EXPORT_AGAIN)),
         }
     }
 }
 
-/// The bytes behind `uri`: a data URI or a path relative to the file `base`. At most `limit` bytes are read.
-fn read_uri(uri: &str, base: &Path, place: &str, limit: Option<u64>) -> Result<Vec<u8>, Fault> {
+/// The bytes behind `uri`: a data URI or a path relative to the file. At most `limit` bytes are read.
+fn read_uri(uri: &str, beside: &Beside, place: &str, limit: Option<u64>) -> Result<Vec<u8>, Fault> {
     if let Some(data) = uri.strip_prefix("data:") {
         let Some((kind, payload)) = data.split_once(',') else {
             return Err(Fault::new(place, "the data URI has no comma", EXPORT_AGAIN));
@@ -233,25 +263,44 @@ fn read_uri(uri: &str, base: &Path, place: &str, limit: Option<u64>) -> Result<V
             Ok(decode_percent(payload))
         };
     }
-    let relative = String::from_utf8_lossy(&decode_percent(uri)).into_owned();
-    let scheme = relative.split_once(':').is_some_and(|(scheme, _)| scheme.len() > 1 && !scheme.contains(['/', '\\']));
-    if scheme || Path::new(&relative).has_root() {
-        let what = format!("the uri '{}' is not a path beside the file", shortened(&relative));
-        return Err(Fault::new(place, what, "copy the data beside the .gltf file and name it by a relative path"));
-    }
-    let file = base.parent().unwrap_or(Path::new("")).join(&relative);
-    let unreadable = |reason: String| {
+    let relative = relative_path(uri).map_err(|path| {
+        let what = format!("the uri '{}' is not a path beside the file", shortened(&path));
+        Fault::new(place, what, "copy the data beside the .gltf file and name it by a relative path")
+    })?;
+    let bytes = match beside {
+        Beside::Folder(folder) => read_file(&folder.join(&relative), limit),
+        Beside::Memory(files) => match files.get(&relative) {
+            Some(Ok(bytes)) => {
+                let end = limit.and_then(|limit| usize::try_from(limit).ok()).unwrap_or(usize::MAX).min(bytes.len());
+                Ok(bytes[..end].to_vec())
+            }
+            Some(Err(reason)) => Err(reason.clone()),
+            None => Err("it was not given".to_owned()),
+        },
+    };
+    bytes.map_err(|reason| {
         let what = format!("the file '{}' cannot be read: {reason}", shortened(&relative));
         Fault::new(place, what, "put the file beside the .gltf file, or export as .glb, which holds everything")
-    };
-    let is_file = std::fs::metadata(&file).map_err(|error| unreadable(error.to_string()))?.is_file();
-    if !is_file {
-        return Err(unreadable("it is not a file".into()));
+    })
+}
+
+/// The path beside the file that `uri` stands for; `Err` with the text of one that is none, such as a data URI or the address
+/// of a page.
+fn relative_path(uri: &str) -> Result<String, String> {
+    let path = String::from_utf8_lossy(&decode_percent(uri)).into_owned();
+    let scheme = path.split_once(':').is_some_and(|(scheme, _)| scheme.len() > 1 && !scheme.contains(['/', '\\']));
+    if scheme || Path::new(&path).has_root() { Err(path) } else { Ok(path) }
+}
+
+/// At most `limit` bytes of `file`; why not, otherwise.
+fn read_file(file: &Path, limit: Option<u64>) -> Result<Vec<u8>, String> {
+    if !std::fs::metadata(file).map_err(|error| error.to_string())?.is_file() {
+        return Err("it is not a file".into());
     }
     let mut bytes = Vec::new();
-    File::open(&file)
+    File::open(file)
         .and_then(|opened| opened.take(limit.unwrap_or(u64::MAX)).read_to_end(&mut bytes))
-        .map_err(|error| unreadable(error.to_string()))?;
+        .map_err(|error| error.to_string())?;
     Ok(bytes)
 }
 

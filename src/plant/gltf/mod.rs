@@ -29,6 +29,7 @@ pub use error::{PlantError, Warning, WarningKind};
 pub use report::{PartReport, PlantReport};
 
 use super::{Gloss, LeafKind, PartKind, Plant, PlantMesh, PlantPart};
+use container::Beside;
 use error::{EXPORT_AGAIN, Fault, Warnings};
 use material::{Images, Surface};
 
@@ -72,12 +73,49 @@ pub struct GltfOptions {
 /// [`PlantError`] if the file cannot be read, is no glTF 2.0, demands an unknown extension, has geometry that cannot
 /// be used or has no triangles, or if an option is out of range.
 pub fn load_plant(path: &Path, options: &GltfOptions) -> Result<(Plant, Vec<Warning>), PlantError> {
+    let bytes = std::fs::read(path).map_err(|source| PlantError::Io { path: path.to_path_buf(), source })?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    read_plant(&bytes, path, Beside::Folder(folder), options)
+}
+
+/// Files beside a .gltf file, by the relative paths that [`external_files`] lists: their bytes, or why they cannot be read.
+pub type ExternalFiles = BTreeMap<String, Result<Vec<u8>, String>>;
+
+/// The files that the bytes of a glTF file name for its buffers and images: relative paths, sorted, each once. A GLB mostly
+/// names none. `name` is the file's name, for messages.
+///
+/// # Errors
+/// [`PlantError`] where the bytes are not glTF 2.0.
+pub fn external_files(bytes: &[u8], name: &Path) -> Result<Vec<String>, PlantError> {
+    container::external_files(bytes, name)
+}
+
+/// Reads the plant in the `bytes` of a glTF file, as [`load_plant`] does from the file itself: `name` is the file's name, for
+/// messages and for the plant's own name, `files` what stands beside it.
+///
+/// # Errors
+/// Those of [`load_plant`]. A file that is missing is an error for a buffer and a warning for an image.
+pub fn load_plant_bytes(
+    bytes: &[u8],
+    name: &Path,
+    files: &ExternalFiles,
+    options: &GltfOptions,
+) -> Result<(Plant, Vec<Warning>), PlantError> {
+    read_plant(bytes, name, Beside::Memory(files), options)
+}
+
+fn read_plant(
+    bytes: &[u8],
+    path: &Path,
+    beside: Beside,
+    options: &GltfOptions,
+) -> Result<(Plant, Vec<Warning>), PlantError> {
     if let Some(height) = options.height.filter(|height| !(height.is_finite() && *height > 0.0)) {
         let what = format!("height = {height} m cannot be; give a height above 0 or leave it out");
         return Err(PlantError::Option { path: path.to_path_buf(), what });
     }
     let mut warnings = Warnings::default();
-    let mut document = container::open(path, &mut warnings)?;
+    let mut document = container::open(bytes, path, beside, &mut warnings)?;
     check_extensions(&document.root, path, &mut warnings)?;
     let mut gathered = gather(&mut document, options, &mut warnings).map_err(|fault| fault.into_error(path))?;
     gathered.retain(|(_, mesh)| !mesh.triangles.is_empty());

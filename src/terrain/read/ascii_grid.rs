@@ -1,7 +1,5 @@
 //! ESRI ASCII grids ("Arc/Info ASCII Grid"): a header of keys and numbers, then the heights from the north-west.
 
-use std::fs;
-
 use glam::DVec2;
 
 use super::{Grid, Raster, Source, Window};
@@ -25,8 +23,7 @@ pub(super) fn read(source: &Source) -> Result<Raster, TerrainError> {
             source.unsupported("a text of more than 4 GiB", "convert it with `gdal_translate -of GTiff IN OUT.tif`")
         );
     }
-    let text =
-        fs::read(source.path).map_err(|error| TerrainError::Io { path: source.path.to_owned(), source: error })?;
+    let text = source.all()?;
     let mut words = Words::new(&text);
     let header = Header::read(source, &mut words)?;
     let (grid, missing) = (header.grid(source)?, header.missing);

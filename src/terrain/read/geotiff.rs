@@ -2,15 +2,12 @@
 
 mod keys;
 
-use std::fs::File;
-use std::io::BufReader;
-
 use glam::DVec2;
 use tiff::ColorType;
 use tiff::decoder::{ChunkType, Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
 
-use super::{Grid, Raster, Source, Window};
+use super::{Grid, Input, Raster, Source, Window};
 use crate::terrain::{MAX_SAMPLES, TerrainError};
 use keys::GeoKeys;
 
@@ -28,13 +25,11 @@ pub(super) fn recognises(start: &[u8]) -> bool {
 }
 
 pub(super) fn read(source: &Source) -> Result<Raster, TerrainError> {
-    let file =
-        File::open(source.path).map_err(|error| TerrainError::Io { path: source.path.to_owned(), source: error })?;
     let mut limits = Limits::default();
     limits.decoding_buffer_size = MAX_CHUNK;
     limits.intermediate_buffer_size = MAX_CHUNK;
     limits.ifd_value_size = MAX_TAG;
-    let mut decoder = Decoder::new(BufReader::new(file))
+    let mut decoder = Decoder::new(source.open()?)
         .map_err(|error| source.malformed("TIFF directory", error, FETCH))?
         .with_limits(limits);
     let (columns, rows) = decoder.dimensions().map_err(|error| source.malformed("TIFF directory", error, FETCH))?;
@@ -67,14 +62,14 @@ pub(super) fn read(source: &Source) -> Result<Raster, TerrainError> {
 /// from south to north.
 fn read_grid(
     source: &Source,
-    decoder: &mut Decoder<BufReader<File>>,
+    decoder: &mut Decoder<Input>,
     columns: usize,
     rows: usize,
     point: bool,
 ) -> Result<(Grid, bool), TerrainError> {
     // A sample is the middle of its cell, unless the file says that the raster is made of points.
     let middle = if point { 0.0 } else { 0.5 };
-    let numbers = |decoder: &mut Decoder<BufReader<File>>, tag| {
+    let numbers = |decoder: &mut Decoder<Input>, tag| {
         decoder.find_tag(tag).ok().flatten().and_then(|value| value.into_f64_vec().ok())
     };
     let (origin, step) = if let Some(m) = numbers(decoder, Tag::ModelTransformationTag).filter(|m| m.len() >= 8) {
@@ -118,7 +113,7 @@ fn read_grid(
 }
 
 /// The value that marks missing data: GDAL writes it as text.
-fn read_missing(decoder: &mut Decoder<BufReader<File>>) -> Option<f64> {
+fn read_missing(decoder: &mut Decoder<Input>) -> Option<f64> {
     let text = decoder.find_tag(Tag::GdalNodata).ok().flatten()?.into_string().ok()?;
     text.trim_matches(|c: char| c.is_whitespace() || c == '\0').parse().ok()
 }
@@ -126,7 +121,7 @@ fn read_missing(decoder: &mut Decoder<BufReader<File>>) -> Option<f64> {
 /// Decodes the strips or tiles that a window touches.
 fn read_samples(
     source: &Source,
-    decoder: &mut Decoder<BufReader<File>>,
+    decoder: &mut Decoder<Input>,
     columns: usize,
     rows: usize,
     window: &Window,

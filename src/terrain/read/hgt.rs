@@ -1,7 +1,5 @@
 //! SRTM `.hgt` files: one degree of 16-bit big-endian heights, placed by the name of the file [USGS, "SRTM Topo"].
 
-use std::fs;
-
 use glam::DVec2;
 
 use super::{Grid, Raster, Source};
@@ -29,8 +27,7 @@ pub(super) fn read(source: &Source) -> Result<Raster, TerrainError> {
             problem: "an .hgt file is placed by its name, which must begin like N36W085".into(),
         });
     };
-    let bytes =
-        fs::read(source.path).map_err(|error| TerrainError::Io { path: source.path.to_owned(), source: error })?;
+    let bytes = source.all()?;
     let Some(side) = side(bytes.len() as u64) else {
         return Err(source.malformed("end of file", "the size has changed while reading", "read it again"));
     };

@@ -1,8 +1,5 @@
 //! 16-bit greyscale PNG as exported by terrain editors. Metres come from [`ImageScale`](super::ImageScale).
 
-use std::fs::File;
-use std::io::BufReader;
-
 use glam::DVec2;
 use png::{BitDepth, ColorType, Decoder, Limits, Transformations};
 
@@ -32,9 +29,7 @@ pub(super) fn read(source: &Source) -> Result<Raster, TerrainError> {
         return Err(TerrainError::BadParameter { name, value, range: "0.001 m to 1000000 m" });
     }
     let broken = |error: png::DecodingError| source.malformed("image data", error, "fetch or export the image again");
-    let file =
-        File::open(source.path).map_err(|error| TerrainError::Io { path: source.path.to_owned(), source: error })?;
-    let mut decoder = Decoder::new_with_limits(BufReader::new(file), Limits { bytes: 64 << 20 });
+    let mut decoder = Decoder::new_with_limits(source.open()?, Limits { bytes: 64 << 20 });
     decoder.set_transformations(Transformations::IDENTITY);
     let mut reader = decoder.read_info().map_err(broken)?;
     let (columns, rows) = (reader.info().width as usize, reader.info().height as usize);

@@ -12,8 +12,9 @@ mod geotiff;
 mod hgt;
 mod image;
 
+use std::borrow::Cow;
 use std::fs::File;
-use std::io::Read;
+use std::io::{BufRead, BufReader, Cursor, Read, Seek};
 use std::path::Path;
 
 use glam::DVec2;
@@ -25,7 +26,8 @@ use super::{CoordinateSystem, GeoReference, HeightField, MAX_SAMPLES, Surroundin
 const PLAUSIBLE: std::ops::RangeInclusive<f32> = -12_000.0..=30_000.0;
 
 /// What to read and how to understand it; the default reads a whole file as it describes itself.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct ReadOptions {
     /// Read only the samples inside this window.
     pub crop: Option<Crop>,
@@ -76,30 +78,82 @@ pub fn read_terrain(path: &Path, options: &ReadOptions) -> Result<(Terrain, Vec<
     let length = file.metadata().map_err(io)?.len();
     let mut start = Vec::new();
     file.by_ref().take(512).read_to_end(&mut start).map_err(io)?;
-    let source = Source { path, length, options };
-    let raster = if geotiff::recognises(&start) {
-        geotiff::read(&source)?
-    } else if image::recognises(&start) {
-        image::read(&source)?
-    } else if ascii_grid::recognises(&start) {
-        ascii_grid::read(&source)?
-    } else if hgt::recognises(length) {
-        hgt::read(&source)?
-    } else {
-        return Err(TerrainError::UnknownFormat { path: path.to_owned() });
-    };
-    raster.into_terrain(&source)
+    drop(file);
+    Source { path, length, bytes: None, options }.read(&start)
 }
+
+/// Reads a terrain from the bytes of a file, as [`read_terrain`] does from the file itself. `name` is its name: for messages,
+/// and because an `.hgt` file says by it where on earth it lies.
+///
+/// # Errors
+/// Those of [`read_terrain`].
+pub fn read_terrain_bytes(
+    bytes: &[u8],
+    name: &Path,
+    options: &ReadOptions,
+) -> Result<(Terrain, Vec<Warning>), TerrainError> {
+    let start = &bytes[..bytes.len().min(512)];
+    Source { path: name, length: bytes.len() as u64, bytes: Some(bytes), options }.read(start)
+}
+
+/// The bytes of a file, to be read from anywhere in it.
+trait ReadAnywhere: BufRead + Seek {}
+
+impl<R: BufRead + Seek> ReadAnywhere for R {}
+
+/// What a reader reads from.
+type Input<'a> = Box<dyn ReadAnywhere + 'a>;
 
 /// What every reader gets.
 struct Source<'a> {
     path: &'a Path,
     /// Bytes in the file.
     length: u64,
+    /// The bytes, where they are not in the file at `path`.
+    bytes: Option<&'a [u8]>,
     options: &'a ReadOptions,
 }
 
-impl Source<'_> {
+impl<'a> Source<'a> {
+    /// Reads what begins with `start`.
+    fn read(&self, start: &[u8]) -> Result<(Terrain, Vec<Warning>), TerrainError> {
+        let raster = if geotiff::recognises(start) {
+            geotiff::read(self)?
+        } else if image::recognises(start) {
+            image::read(self)?
+        } else if ascii_grid::recognises(start) {
+            ascii_grid::read(self)?
+        } else if hgt::recognises(self.length) {
+            hgt::read(self)?
+        } else {
+            return Err(TerrainError::UnknownFormat { path: self.path.to_owned() });
+        };
+        raster.into_terrain(self)
+    }
+
+    /// The bytes, to be read as they are needed: a window of a large file is not the whole file.
+    fn open(&self) -> Result<Input<'a>, TerrainError> {
+        match self.bytes {
+            Some(bytes) => Ok(Box::new(Cursor::new(bytes))),
+            None => {
+                let file =
+                    File::open(self.path).map_err(|source| TerrainError::Io { path: self.path.to_owned(), source })?;
+                Ok(Box::new(BufReader::new(file)))
+            }
+        }
+    }
+
+    /// All bytes at once.
+    fn all(&self) -> Result<Cow<'a, [u8]>, TerrainError> {
+        match self.bytes {
+            Some(bytes) => Ok(Cow::Borrowed(bytes)),
+            None => {
+                let bytes = std::fs::read(self.path);
+                bytes.map(Cow::Owned).map_err(|source| TerrainError::Io { path: self.path.to_owned(), source })
+            }
+        }
+    }
+
     fn malformed(&self, place: impl Into<String>, problem: impl ToString, remedy: impl Into<String>) -> TerrainError {
         TerrainError::Malformed {
             path: self.path.to_owned(),

@@ -1,12 +1,9 @@
 //! The GeoKeys of a GeoTIFF: what its coordinates and heights mean [OGC 19-008r4, 7.3 and annex B].
 
-use std::fs::File;
-use std::io::BufReader;
-
 use tiff::decoder::Decoder;
 use tiff::tags::Tag;
 
-use super::super::Source;
+use super::super::{Input, Source};
 use crate::terrain::{CoordinateSystem, TerrainError, Warning};
 
 const MODEL_TYPE: u16 = 1024;
@@ -35,7 +32,7 @@ pub(super) struct GeoKeys {
 }
 
 impl GeoKeys {
-    pub(super) fn read(source: &Source, decoder: &mut Decoder<BufReader<File>>) -> Result<Self, TerrainError> {
+    pub(super) fn read(source: &Source, decoder: &mut Decoder<Input>) -> Result<Self, TerrainError> {
         let directory: Vec<u16> = decoder
             .find_tag_unsigned_vec(Tag::GeoKeyDirectoryTag)
             .map_err(|error| source.malformed("GeoKeyDirectory", error, super::FETCH))?

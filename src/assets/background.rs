@@ -1,0 +1,169 @@
+//! Work beside the frames, on threads that belong to it.
+//!
+//! Not on Bevy's task pools, whose few threads a bake would hold for seconds while other loads wait, and not in rayon's global
+//! pool, in which the frames' own work would queue up behind it. The threads are as many as the cores but one; they are
+//! started with the first work and shared by all of it. Work that nobody waits for any more does not begin, and can ask
+//! whether it is still wanted.
+
+use std::{
+    any::Any,
+    future::Future,
+    panic::{AssertUnwindSafe, catch_unwind},
+    pin::Pin,
+    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak},
+    task::{Context, Poll, Waker},
+};
+
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use super::threads::spare_cores;
+
+/// Stack of a thread. One that waits for a part of its work may begin other work meanwhile, on the same stack.
+const STACK: usize = 16 << 20;
+
+/// Why there is no result.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum BackgroundError {
+    /// The system gives no threads.
+    #[error("there are no threads for work beside the frames: {0}; close other programs")]
+    NoThreads(String),
+    /// The work broke off.
+    #[error("an error in the program: {0}")]
+    BrokeOff(String),
+}
+
+/// Work under way. As a [`Future`] it can be awaited, and [`finished`](Self::finished) can be asked. Dropped, it is given up.
+#[derive(Debug)]
+pub struct Background<T>(Arc<Shared<T>>);
+
+#[derive(Debug)]
+struct Shared<T>(Mutex<State<T>>);
+
+#[derive(Debug)]
+struct State<T> {
+    result: Option<Result<T, BackgroundError>>,
+    waker: Option<Waker>,
+}
+
+impl<T> Shared<T> {
+    fn lock(&self) -> MutexGuard<'_, State<T>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn finish(&self, result: Result<T, BackgroundError>) {
+        let waker = {
+            let mut state = self.lock();
+            state.result = Some(result);
+            state.waker.take()
+        };
+        if let Some(waker) = waker {
+            waker.wake();
+        }
+    }
+}
+
+/// Whether anybody waits for a piece of work.
+pub struct Wanted<'a>(&'a (dyn Fn() -> bool + Sync));
+
+impl Wanted<'_> {
+    /// Whether anybody still waits.
+    pub fn is_wanted(&self) -> bool {
+        (self.0)()
+    }
+}
+
+/// Begins `work`.
+pub fn start<T: Send + 'static>(work: impl FnOnce(&Wanted) -> T + Send + 'static) -> Background<T> {
+    let shared = Arc::new(Shared(Mutex::new(State { result: None, waker: None })));
+    let line: Weak<Shared<T>> = Arc::downgrade(&shared);
+    match pool() {
+        Ok(pool) => pool.spawn(move || {
+            let wanted = || line.strong_count() > 0;
+            if !wanted() {
+                return;
+            }
+            // A panic would end the process; here it is the failure of one piece of work.
+            let result = catch_unwind(AssertUnwindSafe(|| work(&Wanted(&wanted))));
+            if let Some(shared) = line.upgrade() {
+                shared.finish(result.map_err(|panic| BackgroundError::BrokeOff(message(&*panic))));
+            }
+        }),
+        Err(error) => shared.finish(Err(error)),
+    }
+    Background(shared)
+}
+
+impl<T> Background<T> {
+    /// The result, once; `None` while the work goes on, and after the result was taken.
+    pub fn finished(&self) -> Option<Result<T, BackgroundError>> {
+        self.0.lock().result.take()
+    }
+}
+
+impl<T> Future for Background<T> {
+    type Output = Result<T, BackgroundError>;
+
+    fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
+        let mut state = self.0.lock();
+        match state.result.take() {
+            Some(result) => Poll::Ready(result),
+            None => {
+                state.waker = Some(context.waker().clone());
+                Poll::Pending
+            }
+        }
+    }
+}
+
+fn pool() -> Result<&'static ThreadPool, BackgroundError> {
+    static POOL: OnceLock<Result<ThreadPool, BackgroundError>> = OnceLock::new();
+    let pool = POOL.get_or_init(|| {
+        let name = |index| format!("canopy background {index}");
+        let pool = ThreadPoolBuilder::new().num_threads(spare_cores()).stack_size(STACK).thread_name(name).build();
+        pool.map_err(|error| BackgroundError::NoThreads(error.to_string()))
+    });
+    pool.as_ref().map_err(Clone::clone)
+}
+
+fn message(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().copied();
+    let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    text.unwrap_or("(see above)").to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::channel;
+
+    use bevy::tasks::block_on;
+
+    use super::*;
+
+    #[test]
+    fn work_is_done_and_awaited() {
+        assert_eq!(block_on(start(|wanted| (wanted.is_wanted(), 6 * 7))), Ok((true, 42)));
+    }
+
+    #[test]
+    fn a_panic_is_an_error_of_the_work_alone() {
+        let broken = block_on(start(|_| -> u32 { panic!("index out of bounds") }));
+        assert_eq!(broken, Err(BackgroundError::BrokeOff("index out of bounds".to_owned())));
+        assert_eq!(block_on(start(|_| 1)), Ok(1));
+    }
+
+    #[test]
+    fn work_learns_that_nobody_waits() {
+        let (begun, at_work) = channel();
+        let (go_on, dropped) = channel::<()>();
+        let (told, answer) = channel();
+        let work = start(move |wanted| {
+            let _ = begun.send(wanted.is_wanted());
+            let _ = dropped.recv();
+            let _ = told.send(wanted.is_wanted());
+        });
+        assert_eq!(at_work.recv(), Ok(true));
+        drop(work);
+        let _ = go_on.send(());
+        assert_eq!(answer.recv(), Ok(false));
+    }
+}

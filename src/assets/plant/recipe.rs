@@ -1,0 +1,108 @@
+//! What a plant is made of, read and not yet made.
+
+use std::path::{Path, PathBuf};
+
+use super::{Growth, PlantAsset, PlantSettings, StageError};
+use crate::{
+    assets::background::Wanted,
+    plant::{
+        Plant,
+        gltf::{ExternalFiles, GltfOptions, load_plant_bytes},
+        grow::{GrowParameters, grow},
+    },
+    scene::{Lighting, Species},
+};
+
+/// A plant before it is made.
+#[derive(Debug)]
+pub struct Recipe {
+    pub name: String,
+    pub individuals: Vec<Individual>,
+    pub settings: PlantSettings,
+    pub growth: Growth,
+    pub warnings: Vec<String>,
+}
+
+/// One individual before it is made.
+#[derive(Debug)]
+pub enum Individual {
+    /// By rule.
+    Grown {
+        parameters: Box<GrowParameters>,
+        /// Where the rules come from, for messages.
+        from: PathBuf,
+        seed: u64,
+        triangles: usize,
+    },
+    /// The bytes of a glTF file.
+    Gltf { path: PathBuf, bytes: Vec<u8>, files: ExternalFiles, options: GltfOptions },
+}
+
+impl Individual {
+    fn make(&self) -> Result<(Plant, Vec<String>), StageError> {
+        match self {
+            Self::Grown { parameters, from, seed, triangles } => {
+                let plant = grow(parameters, *seed, *triangles)
+                    .map_err(|source| StageError::Grow { path: from.clone(), source })?;
+                Ok((plant, Vec::new()))
+            }
+            Self::Gltf { path, bytes, files, options } => {
+                let (plant, warnings) = load_plant_bytes(bytes, path, files, options)?;
+                Ok((plant, warnings.iter().map(ToString::to_string).collect()))
+            }
+        }
+    }
+}
+
+impl Recipe {
+    /// The plant of one glTF file.
+    pub fn gltf(path: &Path, bytes: Vec<u8>, files: ExternalFiles, settings: &PlantSettings) -> Self {
+        let name = path.file_stem().map_or_else(|| "plant".into(), |stem| stem.to_string_lossy().into_owned());
+        Self {
+            name,
+            individuals: vec![Individual::Gltf {
+                path: path.to_owned(),
+                bytes,
+                files,
+                options: settings.gltf_options(),
+            }],
+            settings: settings.clone(),
+            growth: Growth::default(),
+            warnings: Vec::new(),
+        }
+    }
+
+    /// The plants of a species, `individuals`, whose own light and gloss take the place of those of `settings`.
+    pub fn species(species: &Species, individuals: Vec<Individual>, settings: &PlantSettings) -> Self {
+        let mut settings = PlantSettings { gloss: species.gloss.in_range(), ..settings.clone() };
+        if let Some(lighting) = &species.lighting {
+            settings.bake.lighting = lighting.settings();
+            settings.sun = lighting.sun();
+        }
+        let mut warnings = Vec::new();
+        if matches!(&species.lighting, Some(Lighting::Expressive(expressive)) if expressive.together) {
+            let what =
+                "`together` has no effect: the trees of a plant asset are lit one by one; use it in a scene file";
+            warnings.push(what.to_owned());
+        }
+        let growth = Growth {
+            heights: Some(species.height),
+            elevation: species.elevation,
+            slope_limit: species.slope_limit,
+            trunk_radius: species.trunk_radius,
+        };
+        Self { name: species.name.clone(), individuals, settings, growth, warnings }
+    }
+
+    /// Makes and bakes the plant.
+    pub fn bake(self, wanted: &Wanted) -> Result<PlantAsset, StageError> {
+        let plants = self.individuals.iter().map(Individual::make).collect::<Result<_, _>>()?;
+        let mut asset = PlantAsset::baked(self.name, plants, &self.settings, &|| wanted.is_wanted());
+        if asset.individuals.len() < self.individuals.len() {
+            return Err(StageError::Cancelled);
+        }
+        asset.growth = self.growth;
+        asset.warnings.splice(0..0, self.warnings);
+        Ok(asset)
+    }
+}

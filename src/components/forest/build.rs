@@ -1,0 +1,205 @@
+//! From a component and loaded assets to what the renderer draws.
+
+use std::{collections::HashSet, sync::Arc};
+
+use super::{Forest3d, ForestError, ForestTrees};
+use crate::{
+    assets::{PlantAsset, StageError, background::Wanted, plants::PlantPlan, stage, trees::build_stand},
+    bake::{BakedPlant, lighting::SunLight},
+    progress::Progress,
+    scatter::{
+        CoverMap, PackedStand, PlantSize, ScatterError, Stand, cover_map,
+        packed::{DEFAULT_CELL_SIZE, MAX_VARIANTS},
+    },
+    scene::{Anchor, GroundFlat, GrownPlants, Scene, Species, Trees},
+    terrain::{HeightField, Surroundings, Terrain},
+};
+
+/// Width in metres of the level ground: far more than trees are drawn at.
+const LEVEL_WIDTH: f64 = 400_000.0;
+/// Share by which trees of a plant without a range of heights are lower or taller than it.
+const HEIGHT_VARIATION: f64 = 0.15;
+/// The range of heights that a scene allows, metres.
+const HEIGHTS: (f64, f64) = (0.1, 150.0);
+
+/// What a forest is built of.
+pub struct Ingredients {
+    pub forest: Forest3d,
+    /// One for each species.
+    pub plants: Vec<PlantAsset>,
+    /// The ground; `None` is level.
+    pub terrain: Option<Arc<Terrain>>,
+}
+
+/// A forest, built.
+pub struct Built {
+    pub stand: Arc<PackedStand>,
+    pub plants: Arc<Vec<BakedPlant>>,
+    pub suns: Arc<[SunLight]>,
+    /// Share of the terrain under crowns; `None` on level ground, and without trees.
+    pub cover: Option<Arc<CoverMap>>,
+    /// What the program's author ought to know.
+    pub warnings: Vec<String>,
+}
+
+/// Keeps the warnings of a build, and asks whether it is still wanted.
+struct Listener<'a> {
+    warnings: Vec<String>,
+    wanted: &'a Wanted<'a>,
+}
+
+impl Progress for Listener<'_> {
+    fn begin(&mut self, _what: &str, _steps: u64) {}
+
+    fn advance(&mut self, _steps: u64) {}
+
+    fn end(&mut self) {}
+
+    fn warn(&mut self, message: &str) {
+        self.warnings.push(message.to_owned());
+    }
+
+    fn note(&mut self, _message: &str) {}
+
+    fn is_cancelled(&self) -> bool {
+        !self.wanted.is_wanted()
+    }
+}
+
+impl Ingredients {
+    /// Builds the forest.
+    pub fn build(self, wanted: &Wanted) -> Result<Built, ForestError> {
+        let mut listener = Listener { warnings: Vec::new(), wanted };
+        let mut plan = PlantPlan::default();
+        let (mut plants, mut suns) = (Vec::new(), Vec::new());
+        for asset in &self.plants {
+            if asset.individuals.is_empty() {
+                return Err(ForestError::EmptyPlant(asset.name.clone()));
+            }
+            let first = plants.len();
+            plants.extend_from_slice(&asset.individuals);
+            suns.resize(plants.len(), asset.sun);
+            if plants.len() > MAX_VARIANTS {
+                let count = self.plants.iter().map(|asset| asset.individuals.len()).sum();
+                return Err(StageError::TooManyPlants { count, limit: MAX_VARIANTS }.into());
+            }
+            plan.variants.push(first as u16..plants.len() as u16);
+        }
+        let sizes: Vec<PlantSize> = plants.iter().map(BakedPlant::size).collect();
+        let stand = match &self.forest.trees {
+            ForestTrees::Given(trees) => Stand { trees: trees.clone() },
+            ForestTrees::Scattered(_) | ForestTrees::Inventory(_) => {
+                let scene = self.scene();
+                scene.validate().map_err(StageError::from)?;
+                let terrain = match &self.terrain {
+                    Some(terrain) => Arc::clone(terrain),
+                    None => level_ground()?,
+                };
+                build_stand(&scene, &plan, &sizes, &terrain, &mut listener)?
+            }
+        };
+        let packed = PackedStand::new(&stand, DEFAULT_CELL_SIZE, &sizes).map_err(StageError::from)?;
+        let has_cover = self.terrain.is_some() && !stand.trees.is_empty();
+        let cover = has_cover.then(|| cover(&packed, &plants)).transpose().map_err(StageError::from)?;
+        if stand.trees.is_empty() {
+            listener.warn("the forest has no trees: its rules, area or positions leave no place for any");
+        }
+        Ok(Built {
+            stand: Arc::new(packed),
+            plants: Arc::new(plants),
+            suns: suns.into(),
+            cover: cover.map(Arc::new),
+            warnings: listener.warnings,
+        })
+    }
+
+    /// The forest as a scene, whose rules for trees it shares.
+    fn scene(&self) -> Scene {
+        let trees = match self.forest.trees.clone() {
+            ForestTrees::Scattered(mut rules) => {
+                if self.terrain.is_none() {
+                    rules.area.get_or_insert_with(Forest3d::level_area);
+                }
+                Trees::Scattered(rules)
+            }
+            ForestTrees::Inventory(mut inventory) => {
+                // Level ground has no corner to measure from.
+                if self.terrain.is_none() && inventory.anchor == Anchor::SouthWest {
+                    inventory.anchor = Anchor::TerrainCentre;
+                }
+                Trees::Inventory(inventory)
+            }
+            ForestTrees::Given(_) => Trees::None,
+        };
+        Scene {
+            name: "forest".to_owned(),
+            seed: self.forest.seed,
+            species: self.species(),
+            trees,
+            ..Scene::new(GroundFlat::default())
+        }
+    }
+
+    fn species(&self) -> Vec<Species> {
+        let mut names = HashSet::new();
+        self.forest
+            .species
+            .iter()
+            .zip(&self.plants)
+            .map(|(species, asset)| {
+                let name = species.name.as_ref().unwrap_or(&asset.name);
+                Species {
+                    weight: species.weight,
+                    height: species.heights.or(asset.growth.heights).unwrap_or_else(|| own_heights(asset)),
+                    elevation: asset.growth.elevation,
+                    slope_limit: asset.growth.slope_limit,
+                    trunk_radius: asset.growth.trunk_radius,
+                    // Only the plants' sizes count, which are known.
+                    ..Species::new(unique(name, &mut names), GrownPlants::default())
+                }
+            })
+            .collect()
+    }
+}
+
+/// `name`, or what comes next to it that is not among `names` yet: one plant may be two species of a forest.
+fn unique(name: &str, names: &mut HashSet<String>) -> String {
+    let name = if name.trim().is_empty() { "plant" } else { name };
+    let mut candidate = name.to_owned();
+    let mut number = 2;
+    while !names.insert(candidate.clone()) {
+        candidate = format!("{name} {number}");
+        number += 1;
+    }
+    candidate
+}
+
+/// The heights of a plant's individuals, and a little lower and taller.
+fn own_heights(asset: &PlantAsset) -> (f64, f64) {
+    let heights = || asset.individuals.iter().map(|plant| f64::from(plant.size().height));
+    let (low, high) = (heights().fold(f64::INFINITY, f64::min), heights().fold(0.0, f64::max));
+    let low = (low * (1.0 - HEIGHT_VARIATION)).clamp(HEIGHTS.0, HEIGHTS.1);
+    (low, (high * (1.0 + HEIGHT_VARIATION)).clamp(low, HEIGHTS.1))
+}
+
+fn level_ground() -> Result<Arc<Terrain>, StageError> {
+    let field = HeightField::new(2, 2, glam::DVec2::splat(LEVEL_WIDTH), vec![0.0; 4])?;
+    Ok(Arc::new(Terrain::new(field, None, Surroundings::default())))
+}
+
+fn cover(stand: &PackedStand, plants: &[BakedPlant]) -> Result<CoverMap, ScatterError> {
+    let crowns: Vec<PlantSize> = plants.iter().map(stage::crown).collect();
+    Ok(cover_map(stand, &crowns, stage::COVER_TEXEL, None)?.smoothed())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_species_are_unique() {
+        let mut names = HashSet::new();
+        let given = ["oak", "oak", " ", "oak", "oak 2"].map(|name| unique(name, &mut names));
+        assert_eq!(given, ["oak", "oak 2", "plant", "oak 3", "oak 2 2"]);
+    }
+}

@@ -1,0 +1,234 @@
+//! Follows the forests of a world: builds what is new or has changed, beside the frames.
+
+use std::collections::HashSet;
+
+use bevy::{
+    asset::{AssetEvent, AssetId, AssetLoadFailedEvent, AssetServer, Assets, LoadState, UntypedAssetId},
+    ecs::{
+        change_detection::DetectChanges,
+        component::Component,
+        entity::Entity,
+        lifecycle::RemovedComponents,
+        message::MessageReader,
+        system::{Commands, Query, Res, SystemParam},
+        world::Ref,
+    },
+    render::renderer::RenderDevice,
+    transform::components::GlobalTransform,
+};
+use glam::DVec3;
+use tracing::{error, warn};
+
+use super::{
+    Forest3d, ForestError, ForestFailed, ForestReady, ForestSettings,
+    build::{Built, Ingredients},
+};
+use crate::{
+    assets::{
+        PlantAsset, StageError, TerrainMap,
+        background::{self, Background},
+        stage::check_trees,
+    },
+    components::{Terrain3d, cover::ForestCover},
+    render::components::{CanopyOrigin, Forest},
+};
+
+/// What is under way for a forest.
+#[derive(Component, Default)]
+pub struct ForestWork {
+    /// What was asked for is not being built yet: something is still missing.
+    waits: bool,
+    job: Option<Job>,
+}
+
+struct Job {
+    work: Background<Result<Built, ForestError>>,
+    /// The terrain that it is built for.
+    ground: Option<Entity>,
+}
+
+/// What happened to assets and terrains since the last frame.
+#[derive(SystemParam)]
+pub struct Changes<'w, 's> {
+    plants: MessageReader<'w, 's, AssetEvent<PlantAsset>>,
+    maps: MessageReader<'w, 's, AssetEvent<TerrainMap>>,
+    broken_plants: MessageReader<'w, 's, AssetLoadFailedEvent<PlantAsset>>,
+    broken_maps: MessageReader<'w, 's, AssetLoadFailedEvent<TerrainMap>>,
+    removed_terrains: RemovedComponents<'w, 's, Terrain3d>,
+    removed_forests: RemovedComponents<'w, 's, Forest3d>,
+}
+
+impl Changes<'_, '_> {
+    fn changed_plants(&mut self) -> HashSet<AssetId<PlantAsset>> {
+        let events = self.plants.read().filter_map(|event| match event {
+            AssetEvent::Added { id } | AssetEvent::Modified { id } => Some(*id),
+            _ => None,
+        });
+        events.chain(self.broken_plants.read().map(|failure| failure.id)).collect()
+    }
+
+    fn changed_maps(&mut self) -> HashSet<AssetId<TerrainMap>> {
+        let events = self.maps.read().filter_map(|event| match event {
+            AssetEvent::Added { id } | AssetEvent::Modified { id } => Some(*id),
+            _ => None,
+        });
+        events.chain(self.broken_maps.read().map(|failure| failure.id)).collect()
+    }
+}
+
+/// What forests are built of.
+#[derive(SystemParam)]
+pub struct Sources<'w, 's> {
+    plants: Res<'w, Assets<PlantAsset>>,
+    maps: Res<'w, Assets<TerrainMap>>,
+    server: Option<Res<'w, AssetServer>>,
+    terrains: Query<'w, 's, (Entity, Ref<'static, Terrain3d>)>,
+}
+
+impl Sources<'_, '_> {
+    /// Why an asset cannot be loaded, where it cannot.
+    fn failure(&self, id: impl Into<UntypedAssetId>) -> Option<String> {
+        match self.server.as_ref()?.get_load_state(id)? {
+            LoadState::Failed(error) => Some(error.to_string()),
+            LoadState::NotLoaded | LoadState::Loading | LoadState::Loaded => None,
+        }
+    }
+
+    /// What `forest` is built of; `None` while something is still being loaded.
+    fn gather(&self, forest: &Forest3d) -> Result<Option<Ingredients>, ForestError> {
+        if forest.species.is_empty() {
+            return Err(ForestError::NoSpecies);
+        }
+        let ground = forest.ground.map(|ground| self.terrains.get(ground).map_err(|_| ForestError::NoTerrain(ground)));
+        let ground = ground.transpose()?.map(|(_, terrain)| terrain.0.id());
+        // What has failed is said at once, whatever else is still on its way.
+        if let Some(error) = forest.species.iter().find_map(|species| self.failure(species.plant.id())) {
+            return Err(ForestError::Plant(error));
+        }
+        if let Some(error) = ground.and_then(|map| self.failure(map)) {
+            return Err(ForestError::Terrain(error));
+        }
+        let plants: Option<Vec<PlantAsset>> =
+            forest.species.iter().map(|species| self.plants.get(species.plant.id()).cloned()).collect();
+        let terrain = match ground {
+            None => Some(None),
+            Some(map) => self.maps.get(map).map(|map| Some(map.terrain.clone())),
+        };
+        let (Some(plants), Some(terrain)) = (plants, terrain) else { return Ok(None) };
+        Ok(Some(Ingredients { forest: forest.clone(), plants, terrain }))
+    }
+}
+
+/// Builds forests and gives their entities what the renderer draws.
+pub fn tend_forests(
+    mut commands: Commands,
+    mut forests: Query<(
+        Entity,
+        Ref<Forest3d>,
+        Ref<ForestSettings>,
+        &GlobalTransform,
+        &mut ForestWork,
+        Option<&mut Forest>,
+    )>,
+    mut changes: Changes,
+    sources: Sources,
+    origin: Option<Res<CanopyOrigin>>,
+    device: Option<Res<RenderDevice>>,
+) {
+    for entity in changes.removed_forests.read().filter(|entity| !forests.contains(*entity)) {
+        if let Ok(mut entity) = commands.get_entity(entity) {
+            entity.try_remove::<(Forest, ForestCover, ForestWork)>();
+        }
+    }
+    let (plants, maps) = (changes.changed_plants(), changes.changed_maps());
+    let mut grounds: HashSet<Entity> = changes.removed_terrains.read().collect();
+    let moved = |terrain: &Ref<Terrain3d>| terrain.is_changed() || maps.contains(&terrain.0.id());
+    grounds.extend(sources.terrains.iter().filter(|(_, terrain)| moved(terrain)).map(|(entity, _)| entity));
+    let base = origin.map_or(DVec3::ZERO, |origin| origin.0);
+
+    for (entity, wanted, settings, transform, mut work, shown) in &mut forests {
+        let place = match wanted.ground {
+            Some(_) => DVec3::ZERO,
+            None => base + transform.translation().as_dvec3(),
+        };
+        let stale = wanted.is_changed()
+            || wanted.ground.is_some_and(|ground| grounds.contains(&ground))
+            || plants.iter().any(|plant| wanted.has(*plant));
+        if stale {
+            *work = ForestWork { waits: true, job: None };
+        }
+        if work.waits {
+            match sources.gather(&wanted) {
+                Ok(None) => {}
+                Ok(Some(ingredients)) => {
+                    let job = background::start(move |wanted| ingredients.build(wanted));
+                    *work = ForestWork { waits: false, job: Some(Job { work: job, ground: wanted.ground }) };
+                }
+                Err(error) => {
+                    work.waits = false;
+                    fail(&mut commands, entity, error);
+                }
+            }
+        }
+        if let Some(mut shown) = shown {
+            // Each of these marks the forest as changed, so only where it is.
+            if shown.origin != place {
+                shown.origin = place;
+            }
+            if shown.levels != settings.levels || shown.view_distance != settings.view_distance {
+                shown.levels = settings.levels.clone();
+                shown.view_distance = settings.view_distance;
+            }
+        }
+        let Some((result, ground)) = work.job.as_ref().and_then(|job| Some((job.work.finished()?, job.ground))) else {
+            continue;
+        };
+        work.job = None;
+        let built = result.map_err(|error| StageError::Background(error.to_string()).into()).flatten();
+        let built = built.and_then(|built| {
+            device.as_ref().map_or(Ok(()), |device| check_trees(built.stand.trees.len(), device))?;
+            Ok(built)
+        });
+        match built {
+            Ok(built) => show(&mut commands, entity, built, &settings, place, ground),
+            Err(error) => fail(&mut commands, entity, error),
+        }
+    }
+}
+
+fn show(
+    commands: &mut Commands,
+    entity: Entity,
+    built: Built,
+    settings: &ForestSettings,
+    origin: DVec3,
+    ground: Option<Entity>,
+) {
+    for warning in &built.warnings {
+        warn!("the forest {entity}: {warning}");
+    }
+    let trees = built.stand.trees.len();
+    let mut target = commands.entity(entity);
+    match (built.cover, ground) {
+        (Some(map), Some(ground)) => target.try_insert(ForestCover { ground, map }),
+        _ => target.try_remove::<ForestCover>(),
+    };
+    if trees > 0 {
+        target.try_insert(Forest {
+            stand: built.stand,
+            plants: built.plants,
+            suns: built.suns,
+            origin,
+            levels: settings.levels.clone(),
+            view_distance: settings.view_distance,
+        });
+    } else {
+        target.try_remove::<Forest>();
+    }
+    commands.trigger(ForestReady { entity, trees });
+}
+
+fn fail(commands: &mut Commands, entity: Entity, error: ForestError) {
+    error!("the forest {entity} cannot be built: {error}");
+    commands.trigger(ForestFailed { entity, error });
+}
