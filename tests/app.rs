@@ -237,7 +237,7 @@ fn a_small_tree_is_darkened_by_its_tall_neighbour() {
     assert!(near < 0.95 * alone, "{near} beside its neighbour, {alone} alone");
     assert_eq!(build(close, "Expressive()").plants.len(), 2, "instances of two plants otherwise");
 
-    let crowd: String = (0..1024).map(|row| format!("{},{},12,tree\n", row % 32 * 9, row / 32 * 9)).collect();
-    let error = lit_stand(folder.path(), &crowd, light).err().expect("63 is the most beside the conifer");
+    let crowd: String = (0..1024).map(|row| format!("{},{},12,tree\n", row % 32 * 3, row / 32 * 3)).collect();
+    let error = lit_stand(folder.path(), &crowd, light).err().expect("1023 is the most beside the conifer");
     assert_says(&error.to_string(), &["1024 trees", "1023", "together"]);
 }

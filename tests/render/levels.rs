@@ -40,7 +40,7 @@ fn statistics(renderer: &mut Renderer) -> Vec<LevelStatistics> {
 fn a_program_adds_a_level_of_its_own() {
     let gpu = gpu();
     // Distances from the camera: two full models, three boxes.
-    let near = [DVec2::new(-6.0, 40.0), DVec2::new(6.0, 35.0)];
+    let near = [DVec2::new(-12.0, 40.0), DVec2::new(14.0, 35.0)];
     let far = [DVec2::new(-20.0, -10.0), DVec2::new(0.0, -15.0), DVec2::new(20.0, -10.0)];
     let built = trees_at(&[near.as_slice(), &far].concat(), 1);
     let stage = &built.stage;
