@@ -133,7 +133,7 @@ fn main() -> anyhow::Result<()> {
         plant.plant.name,
         plant.plant.height(),
         look.near,
-        plant.cross.planes.len(),
+        plant.cross().map_or(0, |cross| cross.planes.len()),
         look.size.0,
         look.size.1,
         look.cascades,

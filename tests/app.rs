@@ -48,7 +48,7 @@ fn the_demo_is_wooded_like_a_forest() {
     assert!((5_500.0..7_000.0).contains(&extent.x) && (5_500.0..7_000.0).contains(&extent.y), "{extent}");
     // Stems per hectare of the cells that lie on the terrain: at least 250 where trees stand, that is, in the cells
     // that are neither meadow nor its rim.
-    let hectares = stage.stand.cell_size * stage.stand.cell_size * 1e-4;
+    let hectares = stage.stand.grid.size * stage.stand.grid.size * 1e-4;
     let mut density: Vec<f64> = stage.stand.cells.iter().map(|cell| f64::from(cell.count) / hectares).collect();
     density.sort_by(f64::total_cmp);
     assert!(density[density.len() / 2] >= 250.0, "the median is {}", density[density.len() / 2]);
@@ -57,7 +57,7 @@ fn the_demo_is_wooded_like_a_forest() {
     assert!(noted >= 250.0, "{noted} stems per hectare of wooded ground");
     // Trunks reach into the ground: no foot stands above it.
     for tree in stage.stand.trees.iter().step_by(997) {
-        let foot = tree.position(stage.stand.cell_size);
+        let foot = tree.position(&stage.stand.grid);
         let ground = stage.terrain.height(foot.x, foot.z);
         assert!(foot.y <= ground + 0.02 && foot.y > ground - 3.0, "a foot at {foot}, the ground at {ground}");
     }
@@ -225,7 +225,7 @@ fn a_small_tree_is_darkened_by_its_tall_neighbour() {
     let light = "Expressive(together: true, radius: 3)";
     // Mean k_a over the foliage of the tree at `place` of the table.
     let ambient = |stage: &Stage, place: f64| {
-        let tree = stage.stand.trees.iter().find(|tree| (tree.position(stage.stand.cell_size).x - place).abs() < 0.1);
+        let tree = stage.stand.trees.iter().find(|tree| (tree.position(&stage.stand.grid).x - place).abs() < 0.1);
         let plant = &stage.plants[usize::from(tree.expect("a tree there").variant())];
         let foliage = plant.plant.parts.iter().position(|part| part.kind == PartKind::Foliage).expect("foliage");
         let values = plant.lighting.ambient(foliage);
@@ -237,7 +237,7 @@ fn a_small_tree_is_darkened_by_its_tall_neighbour() {
     assert!(near < 0.95 * alone, "{near} beside its neighbour, {alone} alone");
     assert_eq!(build(close, "Expressive()").plants.len(), 2, "instances of two plants otherwise");
 
-    let crowd: String = (0..64).map(|row| format!("{},{},12,tree\n", row % 8 * 9, row / 8 * 9)).collect();
+    let crowd: String = (0..1024).map(|row| format!("{},{},12,tree\n", row % 32 * 9, row / 32 * 9)).collect();
     let error = lit_stand(folder.path(), &crowd, light).err().expect("63 is the most beside the conifer");
-    assert_says(&error.to_string(), &["64 trees", "63", "together"]);
+    assert_says(&error.to_string(), &["1024 trees", "1023", "together"]);
 }

@@ -9,7 +9,8 @@ use canopy::bake::levels::rasterize::{View, projected_area};
 use canopy::bake::levels::shadow_proxy::{shadow_proxy, simplify_foliage};
 use canopy::bake::lighting::implicit::{ImplicitSettings, NoSurface};
 use canopy::bake::lighting::{BakedLighting, ExpressiveLighting, LightingSettings};
-use canopy::bake::{BakeError, BakeSettings, BakeSource, BakedPlant, bake_plant};
+use canopy::bake::{BakeError, BakeSettings, BakeSource, BakedLevel, BakedPlant, bake_plant};
+use canopy::lod::Representation;
 use canopy::math::octahedral;
 use canopy::plant::{PartKind, Plant, PlantMaterial, PlantMesh, PlantPart};
 use glam::{Mat3, Quat, Vec2, Vec3};
@@ -120,7 +121,7 @@ fn small_settings() -> BakeSettings {
 }
 
 fn same(a: &BakedPlant, b: &BakedPlant) -> bool {
-    a.lighting == b.lighting && a.shadow_proxy == b.shadow_proxy && a.cross == b.cross
+    a.lighting == b.lighting && a.levels == b.levels
 }
 
 fn decode_octahedral(code: [u8; 2]) -> Vec3 {
@@ -291,6 +292,30 @@ fn the_cache_gives_back_what_was_baked() {
 }
 
 #[test]
+fn what_is_not_listed_is_not_baked() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = Cache::new(folder.path());
+    let plant = Arc::new(tree(500, 8));
+    let bake = |representations| {
+        bake_plant(Arc::clone(&plant), &BakeSettings { representations, ..small_settings() }, Some(&cache))
+    };
+    let (all, _) = bake(BakeSettings::default().representations);
+    assert!(all.cross().is_some() && all.shadow_proxy().is_some() && all.levels.len() == 2);
+    const MODEL: &[Representation] = &[Representation::MODEL, Representation::named("cloud")];
+    for from_cache in [false, true] {
+        let (models, source) = bake(MODEL);
+        assert_eq!(matches!(source, BakeSource::Cache), from_cache, "{source:?}");
+        assert!(models.cross().is_none() && models.shadow_proxy() == all.shadow_proxy());
+    }
+    assert!(bake(&[]).0.levels.is_empty());
+    // A level goes into the place of its kind.
+    let (mut none, _) = bake(&[]);
+    let cross = BakedLevel::Cross(all.cross().unwrap().clone());
+    none.set_level(cross.clone());
+    assert_eq!(none.clone().with_level(cross).levels, none.levels);
+}
+
+#[test]
 fn a_damaged_cache_file_is_replaced() {
     let folder = tempfile::tempdir().unwrap();
     let cache = Cache::new(folder.path());
@@ -376,14 +401,15 @@ fn real_trees_keep_their_area() {
 fn real_tree(path: &Path) {
     let (plant, _) = canopy::plant::gltf::load_plant(path, &Default::default()).unwrap();
     let (baked, _) = bake_plant(Arc::new(plant), &BakeSettings::default(), None);
-    for (index, plane) in baked.cross.planes.iter().enumerate() {
+    let cross = baked.cross().unwrap();
+    for (index, plane) in cross.planes.iter().enumerate() {
         let view = View { center: plane.center, right: plane.u, up: plane.v, toward: plane.normal };
-        let shown = picture_area(&baked.cross, index, 0) / projected_area(&baked.plant, &view, 2048);
+        let shown = picture_area(cross, index, 0) / projected_area(&baked.plant, &view, 2048);
         assert!((shown - 1.0).abs() < 0.03, "{}: plane {index} shows {shown}", baked.plant.name);
     }
     let bounds = baked.plant.bounds().unwrap();
     let mut proxy = Plant::clone(&baked.plant);
-    proxy.parts.iter_mut().zip(baked.shadow_proxy.iter()).for_each(|(part, mesh)| part.mesh = mesh.clone());
+    proxy.parts.iter_mut().zip(baked.shadow_proxy().unwrap().iter()).for_each(|(part, mesh)| part.mesh = mesh.clone());
     for toward in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::new(0.5, 0.7, -0.5).normalize()] {
         let mut view = View::framing(bounds, toward);
         (view.right, view.up) = (1.3 * view.right, 1.3 * view.up);

@@ -1,44 +1,39 @@
-//! Scenes that are built beside a Bevy program: progress, failure, one in the place of the other, an early end. No device.
+//! Scenes that are built beside a Bevy program: progress, failure, one in the place of the other, several at once. No
+//! device.
 
 use std::{path::PathBuf, sync::Arc, thread};
 
-use bevy::prelude::*;
+use bevy::{ecs::hierarchy::ChildOf, prelude::*, transform::TransformPlugin};
 use canopy::{
-    assets::LoadedScene,
+    components::{ScenePlugin, SunPlugin},
     prelude::*,
-    render::{components::Forest, daylight::SkySettings},
-    scene::{GroundFlat, GrownPlants, Lighting, Quality, ScatteredTrees, Scene, SceneSource, Species},
+    scene::{GroundFlat, GrownPlants, Lighting, Quality, ScatteredTrees, Scene, Species},
 };
 use tempfile::TempDir;
 
 use crate::support::stage::{PLACE, quality};
 
-/// What was told, in its order.
+/// What was heard, in its order.
 #[derive(Resource, Default)]
-struct Told {
-    ready: Vec<(PathBuf, Arc<Stage>)>,
-    scenes: Vec<SceneSource>,
-    failed: Vec<String>,
-    progress: Vec<SceneProgress>,
+struct Heard {
+    ready: Vec<(Entity, Arc<Stage>)>,
+    failed: Vec<(Entity, String)>,
+    progress: Vec<(Entity, SceneProgress)>,
 }
 
-fn listen(
-    mut told: ResMut<Told>,
-    mut ready: MessageReader<SceneReady>,
-    mut failed: MessageReader<SceneFailed>,
-    progress: Res<SceneProgress>,
-    loaded: Option<Res<LoadedScene>>,
-) {
-    for scene in ready.read() {
-        // What is ready is there.
-        assert!(loaded.as_ref().is_some_and(|loaded| Arc::ptr_eq(&loaded.stage, &scene.stage)));
-        told.ready.push((scene.scene.file().unwrap_or("".as_ref()).to_owned(), scene.stage.clone()));
-        told.scenes.push(scene.scene.clone());
-    }
-    told.failed.extend(failed.read().map(ToString::to_string));
-    if progress.is_changed() {
-        told.progress.push(progress.clone());
-    }
+fn hear_ready(ready: On<SceneReady>, loaded: Query<&LoadedScene>, mut heard: ResMut<Heard>) {
+    // What is ready is there.
+    let shown = loaded.get(ready.entity).is_ok_and(|loaded| Arc::ptr_eq(&loaded.stage, &ready.stage));
+    assert!(shown, "told before it is shown");
+    heard.ready.push((ready.entity, ready.stage.clone()));
+}
+
+fn hear_failed(failed: On<SceneFailed>, mut heard: ResMut<Heard>) {
+    heard.failed.push((failed.entity, failed.to_string()));
+}
+
+fn watch(progress: Query<(Entity, &SceneProgress), Changed<SceneProgress>>, mut heard: ResMut<Heard>) {
+    heard.progress.extend(progress.iter().map(|(entity, progress)| (entity, progress.clone())));
 }
 
 /// An app and the folder of its scenes.
@@ -48,13 +43,13 @@ struct Program {
 }
 
 impl Program {
-    fn new(plugins: &[CanopyScenePlugin], folder: TempDir) -> Self {
+    fn new(folder: TempDir) -> Self {
         let mut app = App::new();
-        app.add_plugins(MinimalPlugins);
-        for plugin in plugins {
-            app.add_plugins(plugin.clone());
-        }
-        app.init_resource::<Told>().add_systems(Update, listen);
+        app.add_plugins((MinimalPlugins, TransformPlugin, ScenePlugin, SunPlugin))
+            .init_resource::<Heard>()
+            .add_observer(hear_ready)
+            .add_observer(hear_failed)
+            .add_systems(Update, watch);
         Self { app, folder }
     }
 
@@ -62,25 +57,32 @@ impl Program {
         self.folder.path().join(name)
     }
 
-    fn load(&mut self, name: &str) {
-        let wanted = LoadScene::new(self.path(name));
-        self.app.world_mut().write_message(wanted);
+    fn spawn(&mut self, name: &str) -> Entity {
+        let scene = CanopyScene::new(self.path(name));
+        self.app.world_mut().spawn(scene).id()
     }
 
-    fn told(&self) -> &Told {
+    fn replace(&mut self, entity: Entity, name: &str) {
+        let scene = CanopyScene::new(self.path(name));
+        self.app.world_mut().entity_mut(entity).insert(scene);
+    }
+
+    fn heard(&self) -> &Heard {
         self.app.world().resource()
     }
 
     /// Updates until `done`. A scene that is being built takes as long as it takes; when nothing is built any more, what is
-    /// told comes with the next update.
+    /// heard comes with the next updates.
     #[track_caller]
-    fn until(&mut self, done: impl Fn(&Told) -> bool) {
+    fn until(&mut self, done: impl Fn(&Heard) -> bool) {
         let mut idle = 0;
-        while !done(self.told()) {
-            assert!(idle < 3, "nothing is built any more: {:?}", self.told().progress.last());
+        while !done(self.heard()) {
+            assert!(idle < 4, "nothing is built any more: {:?}", self.heard().progress.last());
             self.app.update();
-            let state = self.app.world().resource::<SceneProgress>().state;
-            idle = if state == SceneState::Building { 0 } else { idle + 1 };
+            let world = self.app.world_mut();
+            let mut states = world.query::<&SceneProgress>();
+            let building = states.iter(world).any(|progress| progress.state == SceneState::Building);
+            idle = if building { 0 } else { idle + 1 };
             thread::yield_now();
         }
     }
@@ -88,6 +90,10 @@ impl Program {
     fn all<C: Component>(&mut self) -> Vec<Entity> {
         let world = self.app.world_mut();
         world.query_filtered::<Entity, With<C>>().iter(world).collect()
+    }
+
+    fn get<C: Component>(&self, entity: Entity) -> &C {
+        self.app.world().get(entity).expect("the component")
     }
 }
 
@@ -109,56 +115,49 @@ fn folder(files: &[(&str, &str)]) -> TempDir {
     folder
 }
 
-fn is_file(scene: &SceneSource, name: &str) -> bool {
-    scene.file().is_some_and(|file| file.ends_with(name))
-}
-
-/// The plugin with a scene of `folder`.
-fn first(folder: &TempDir, name: &str) -> CanopyScenePlugin {
-    CanopyScenePlugin::new(folder.path().join(name))
-}
-
 #[test]
 fn a_scene_is_built_beside_the_program_and_shown() {
-    let folder = folder(&[("grove.ron", &scene(3, 100.0))]);
+    let mut program = Program::new(folder(&[("grove.ron", &scene(3, 100.0))]));
     let overrides = Overrides { seed: Some(5), ..Overrides::default() };
-    let wanted = LoadScene { scene: folder.path().join("grove.ron").into(), overrides };
-    let mut program = Program::new(&[CanopyScenePlugin { first: Some(wanted) }], folder);
+    let wanted = CanopyScene { source: program.path("grove.ron").into(), overrides };
+    let entity = program.app.world_mut().spawn(wanted).id();
     program.app.update();
-    let building = program.told().progress.first().expect("progress in the first frame");
+    let (_, building) = program.heard().progress.first().expect("progress in the first frame");
     assert_eq!(building.state, SceneState::Building);
-    assert!(is_file(&building.scene, "grove.ron"));
-    program.until(|told| !told.ready.is_empty());
+    program.until(|heard| !heard.ready.is_empty());
 
-    let (path, stage) = program.told().ready[0].clone();
-    assert_eq!(path, program.path("grove.ron"));
-    assert_eq!(stage.scene.seed, 5);
-    let (grounds, forests) = (program.all::<Ground>(), program.all::<Forest>());
-    assert_eq!((grounds.len(), forests.len()), (1, 1));
-    let world = program.app.world();
-    let shown = world.resource::<LoadedScene>().shown;
-    assert_eq!((shown.ground, shown.forest), (grounds[0], Some(forests[0])));
-    assert!(world.get::<Forest>(forests[0]).is_some_and(|forest| Arc::ptr_eq(&forest.stand, &stage.stand)));
-    assert_eq!(world.resource::<SunShadowSettings>().map_size, 512);
-    assert_eq!(world.resource::<SkySettings>().instant, stage.scene.place.time.utc());
+    let (of, stage) = program.heard().ready[0].clone();
+    assert_eq!((of, stage.scene.seed), (entity, 5));
+    let (grounds, forests, suns) = (program.all::<Ground>(), program.all::<Forest>(), program.all::<Sun>());
+    assert_eq!((grounds.len(), forests.len(), suns.len()), (1, 1, 1));
+    let shown = program.get::<LoadedScene>(entity).shown;
+    assert_eq!((shown.ground, shown.forest, shown.sun), (grounds[0], Some(forests[0]), Some(suns[0])));
+    for child in [grounds[0], forests[0], suns[0]] {
+        assert_eq!(program.get::<ChildOf>(child).parent(), entity);
+    }
+    assert!(Arc::ptr_eq(&program.get::<Forest>(forests[0]).stand, &stage.stand));
+    assert_eq!(program.get::<SunShadowSettings>(suns[0]).map_size, 512);
+    assert_eq!(program.get::<Sun>(suns[0]).instant, stage.scene.place.time.utc());
+    program.app.update();
+    assert!(program.app.world().contains_resource::<Daylight>(), "the first light is waited for");
 
-    let progress = &program.told().progress;
-    let last = progress.last().expect("progress");
+    let progress = &program.heard().progress;
+    let (_, last) = progress.last().expect("progress");
     assert_eq!((last.state, last.step.as_str()), (SceneState::Ready, "Trees"));
     for word in ["terrain: ", "3 plants, ", " trees: "] {
         assert!(last.notes.iter().any(|note| note.contains(word)), "no `{word}` in {:?}", last.notes);
     }
     let at_plants: Vec<(u64, u64)> =
-        progress.iter().filter(|seen| seen.step == "Plants").map(|seen| (seen.done, seen.total)).collect();
+        progress.iter().filter(|(_, seen)| seen.step == "Plants").map(|(_, seen)| (seen.done, seen.total)).collect();
     assert!(!at_plants.is_empty() && at_plants.iter().all(|(done, total)| done <= total && *total == 3));
     assert!(at_plants.is_sorted(), "{at_plants:?}");
 
     // At rest nothing changes any more.
-    let seen = program.told().progress.len();
+    let seen = program.heard().progress.len();
     program.app.update();
     program.app.update();
-    assert_eq!((program.told().progress.len(), program.told().ready.len()), (seen, 1));
-    assert!(program.told().failed.is_empty());
+    assert_eq!((program.heard().progress.len(), program.heard().ready.len()), (seen, 1));
+    assert!(program.heard().failed.is_empty());
 }
 
 #[test]
@@ -173,96 +172,113 @@ fn a_scene_built_in_code_needs_no_file() {
     };
     let broken =
         Scene { trees: ScatteredTrees { min_distance: f64::NAN, ..ScatteredTrees::default() }.into(), ..scene.clone() };
-    let mut program = Program::new(&[CanopyScenePlugin::new(broken)], folder(&[]));
-    program.until(|told| !told.failed.is_empty());
-    let message = program.told().failed[0].clone();
+    let mut program = Program::new(folder(&[]));
+    let entity = program.app.world_mut().spawn(CanopyScene::new(broken)).id();
+    program.until(|heard| !heard.failed.is_empty());
+    let message = program.heard().failed[0].1.clone();
     for word in ["the scene `in code`: `trees.min_distance` is NaN", "write a value from 0 to 100 m"] {
         assert!(message.contains(word), "no `{word}` in {message}");
     }
-    program.app.world_mut().write_message(LoadScene::new(scene.clone()));
-    program.until(|told| !told.scenes.is_empty());
-    assert_eq!(program.told().scenes, [SceneSource::from(scene)]);
+    program.app.world_mut().entity_mut(entity).insert(CanopyScene::new(scene));
+    program.until(|heard| !heard.ready.is_empty());
     assert_eq!((program.all::<Ground>().len(), program.all::<Forest>().len()), (1, 1));
 }
 
 #[test]
-fn a_broken_scene_is_told_of_and_the_program_goes_on() {
+fn a_broken_scene_is_reported_and_the_program_goes_on() {
     let broken = scene(1, 100.0).replace("terrain: Flat(size: 100)", "\nterrain: Flat(size: -1)");
-    let folder = folder(&[("broken.ron", &broken), ("good.ron", &scene(1, 100.0))]);
-    let mut program = Program::new(&[first(&folder, "broken.ron")], folder);
-    program.until(|told| !told.failed.is_empty());
-    let message = program.told().failed[0].clone();
+    let mut program = Program::new(folder(&[("broken.ron", &broken), ("good.ron", &scene(1, 100.0))]));
+    let entity = program.spawn("broken.ron");
+    program.until(|heard| !heard.failed.is_empty());
+    let (of, message) = program.heard().failed[0].clone();
+    assert_eq!(of, entity);
     for word in ["broken.ron:2:", "terrain.size", "-1"] {
         assert!(message.contains(word), "no `{word}` in {message}");
     }
-    assert_eq!(program.told().progress.last().map(|seen| seen.state), Some(SceneState::Failed));
+    program.app.update();
+    assert_eq!(program.get::<SceneProgress>(entity).state, SceneState::Failed);
     assert!(program.all::<Ground>().is_empty());
 
-    program.load("good.ron");
-    program.until(|told| !told.ready.is_empty());
+    program.replace(entity, "good.ron");
+    program.until(|heard| !heard.ready.is_empty());
     let grounds = program.all::<Ground>();
     // What is shown stays when its successor is broken, or not there at all.
-    program.load("broken.ron");
-    program.until(|told| told.failed.len() == 2);
-    program.load("missing.ron");
-    program.until(|told| told.failed.len() == 3);
-    assert!(program.told().failed[2].contains("missing.ron"), "{}", program.told().failed[2]);
+    program.replace(entity, "broken.ron");
+    program.until(|heard| heard.failed.len() == 2);
+    program.replace(entity, "missing.ron");
+    program.until(|heard| heard.failed.len() == 3);
+    assert!(program.heard().failed[2].1.contains("missing.ron"), "{}", program.heard().failed[2].1);
     assert_eq!(program.all::<Ground>(), grounds);
-    assert!(is_file(&program.app.world().resource::<LoadedScene>().scene, "good.ron"));
+    assert_eq!(program.get::<LoadedScene>(entity).shown.ground, grounds[0]);
 }
 
 #[test]
 fn a_scene_takes_the_place_of_the_one_before() {
-    let folder = folder(&[("one.ron", &scene(1, 100.0)), ("two.ron", &scene(2, 150.0))]);
-    let mut program = Program::new(&[CanopyScenePlugin::default()], folder);
-    program.app.update();
-    assert_eq!(program.app.world().resource::<SceneProgress>().state, SceneState::Idle);
-    program.load("one.ron");
-    program.until(|told| told.ready.len() == 1);
+    let mut program = Program::new(folder(&[("one.ron", &scene(1, 100.0)), ("two.ron", &scene(2, 150.0))]));
+    let entity = program.spawn("one.ron");
+    program.until(|heard| heard.ready.len() == 1);
     let (ground, forest) = (program.all::<Ground>(), program.all::<Forest>());
 
-    program.load("two.ron");
+    program.replace(entity, "two.ron");
     // The old one is there until the new one is.
     program.app.update();
-    assert!(program.told().ready.len() == 2 || program.all::<Forest>() == forest);
-    program.until(|told| told.ready.len() == 2);
+    assert!(program.heard().ready.len() == 2 || program.all::<Forest>() == forest);
+    program.until(|heard| heard.ready.len() == 2);
     let (new_ground, new_forest) = (program.all::<Ground>(), program.all::<Forest>());
-    assert_eq!((new_ground.len(), new_forest.len()), (1, 1));
+    assert_eq!((new_ground.len(), new_forest.len(), program.all::<Sun>().len()), (1, 1, 1));
     assert!(new_ground != ground && new_forest != forest);
-    assert_eq!(program.app.world().get::<Forest>(new_forest[0]).map(|forest| forest.plants.len()), Some(2));
+    assert_eq!(program.get::<Forest>(new_forest[0]).plants.len(), 2);
 
     // A program may have despawned the forest on its own account.
     program.app.world_mut().despawn(new_forest[0]);
-    program.load("one.ron");
-    program.until(|told| told.ready.len() == 3);
+    program.replace(entity, "one.ron");
+    program.until(|heard| heard.ready.len() == 3);
     assert_eq!((program.all::<Ground>().len(), program.all::<Forest>().len()), (1, 1));
 }
 
 #[test]
-fn of_several_scenes_the_last_one_counts() {
-    let folder = folder(&[("one.ron", &scene(16, 100.0)), ("two.ron", &scene(2, 150.0))]);
-    // A second plugin is no panic, and its scene comes instead of the first one's.
-    let mut program = Program::new(&[first(&folder, "two.ron"), first(&folder, "one.ron")], folder);
+fn while_a_scene_is_built_the_last_wish_counts() {
+    let mut program = Program::new(folder(&[("one.ron", &scene(16, 100.0)), ("two.ron", &scene(2, 150.0))]));
+    let entity = program.spawn("one.ron");
     program.app.update();
-    assert!(is_file(&program.told().progress[0].scene, "one.ron"));
-    // Nor is a scene that is wanted while another is being built, nor two at once.
-    program.load("missing.ron");
-    program.load("two.ron");
-    program.until(|told| !told.ready.is_empty());
+    program.replace(entity, "missing.ron");
+    program.replace(entity, "two.ron");
+    program.until(|heard| !heard.ready.is_empty());
     for _ in 0..20 {
         program.app.update();
     }
-    let told = program.told();
-    assert_eq!((told.ready.len(), told.failed.len()), (1, 0));
-    assert!(told.ready[0].0.ends_with("two.ron"));
+    assert_eq!((program.heard().ready.len(), program.heard().failed.len()), (1, 0));
+    assert_eq!(program.heard().ready[0].1.plants.len(), 2);
 }
 
-/// That the end of the program waits for nothing is tested where the thread can be held: `src/app/load/job.rs`.
 #[test]
-fn a_program_may_end_while_a_scene_is_built() {
-    let folder = folder(&[("many.ron", &scene(16, 100.0))]);
-    let mut program = Program::new(&[first(&folder, "many.ron")], folder);
-    program.until(|told| told.progress.iter().any(|seen| seen.step == "Plants"));
-    assert!(program.told().ready.is_empty(), "too quick to be a test");
-    drop(program.app);
+fn several_scenes_share_a_world_and_go_with_their_entities() {
+    let mut program = Program::new(folder(&[("one.ron", &scene(1, 100.0)), ("two.ron", &scene(2, 150.0))]));
+    let (one, two) = (program.spawn("one.ron"), program.spawn("two.ron"));
+    program.app.world_mut().entity_mut(two).insert(Transform::from_xyz(500.0, 0.0, 0.0));
+    program.until(|heard| heard.ready.len() == 2);
+    program.app.update();
+    // One light for both.
+    assert_eq!((program.all::<Ground>().len(), program.all::<Forest>().len(), program.all::<Sun>().len()), (2, 2, 1));
+    let forest = program.get::<LoadedScene>(two).shown.forest.expect("a forest");
+    assert_eq!(program.get::<GlobalTransform>(forest).translation(), Vec3::new(500.0, 0.0, 0.0));
+
+    program.app.world_mut().despawn(two);
+    program.app.update();
+    assert_eq!((program.all::<Ground>().len(), program.all::<Forest>().len()), (1, 1));
+    // A scene that is taken from its entity goes, the entity stays.
+    program.app.world_mut().entity_mut(one).remove::<CanopyScene>();
+    program.app.update();
+    assert!(program.all::<Ground>().is_empty() && program.all::<Forest>().is_empty());
+    assert!(program.app.world().get_entity(one).is_ok() && program.app.world().get::<LoadedScene>(one).is_none());
+}
+
+#[test]
+fn a_scene_leaves_the_sun_of_the_program_alone() {
+    let mut program = Program::new(folder(&[("one.ron", &scene(1, 100.0))]));
+    let sun = program.app.world_mut().spawn(Sun::default()).id();
+    let entity = program.spawn("one.ron");
+    program.until(|heard| !heard.ready.is_empty());
+    assert_eq!(program.all::<Sun>(), [sun]);
+    assert_eq!(program.get::<LoadedScene>(entity).shown.sun, None);
 }

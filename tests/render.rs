@@ -1,6 +1,7 @@
 //! Pictures: small scenes drawn without a window, on whatever graphics driver there is (a software one will do).
 
 mod foliage;
+mod levels;
 mod pictures;
 mod plate;
 mod plugins;

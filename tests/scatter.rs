@@ -4,9 +4,9 @@ use std::collections::HashSet;
 use std::f64::consts::PI;
 use std::path::PathBuf;
 
-use canopy::scatter::packed::{DEFAULT_CELL_SIZE, MAX_VARIANTS};
+use canopy::scatter::packed::{CellGrid, DEFAULT_CELL_SIZE, MAX_CELLS, MAX_VARIANTS};
 use canopy::scatter::*;
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, IVec2};
 use proptest::prelude::*;
 
 use crate::support::data::data;
@@ -507,11 +507,14 @@ proptest! {
     #[test]
     fn packed_trees_are_within_their_error_bounds(
         x in -2_097_000.0f64..2_097_000.0, z in -2_097_000.0f64..2_097_000.0, y in -500.0f64..8848.0,
-        yaw in -20.0f32..20.0, scale in -4.0f32..=4.0, variant in 0u16..64, tint in -1.0f32..=1.0,
+        yaw in -20.0f32..20.0, scale in -4.0f32..=4.0, variant in 0u16..1024, tint in -1.0f32..=1.0,
+        aside in (-8191i32..=8191, -8191i32..=8191),
     ) {
         let original = Tree { position: DVec3::new(x, y, z), yaw, scale: scale.exp2(), variant, tint, index: 0 };
-        let packed = PackedTree::pack(&original, 0, 64.0).unwrap();
-        let place = packed.position(64.0);
+        let cells = IVec2::new((x / 64.0).floor() as i32, (z / 64.0).floor() as i32);
+        let grid = CellGrid { size: 64.0, base: cells + IVec2::from(aside) };
+        let packed = PackedTree::pack(&original, 0, &grid).unwrap();
+        let place = packed.position(&grid);
         let step = 64.0 / 131_070.0 + 1e-9;
         prop_assert!((place.x - x).abs() <= step && (place.z - z).abs() <= step, "{} for {}, {}", place, x, z);
         prop_assert!((place.y - y).abs() <= y.abs() / 16_777_216.0 + 1e-12);
@@ -521,7 +524,7 @@ proptest! {
         prop_assert!((MIN_SCALE..=MAX_SCALE).contains(&packed.scale()));
         prop_assert_eq!(packed.variant(), variant);
         prop_assert!((packed.tint() - tint).abs() <= 0.5 / 31.0 + 1e-6);
-        let (ix, iz) = packed.cell_index();
+        let (ix, iz) = packed.cell_index(&grid);
         prop_assert_eq!((f64::from(ix), f64::from(iz)), ((x / 64.0).floor(), (z / 64.0).floor()));
     }
 }
@@ -533,17 +536,25 @@ fn a_packed_tree_is_sixteen_bytes_with_the_documented_bits() {
         position: DVec3::new(-64.0, 7.5, 96.0),
         yaw: std::f32::consts::FRAC_PI_2,
         scale: 16.0,
-        variant: 63,
+        variant: 1023,
         tint: -1.0,
         index: 9,
     };
-    let packed = PackedTree::pack(&original, 0, 64.0).unwrap();
+    let grid = CellGrid::new(64.0);
+    let packed = PackedTree::pack(&original, 0, &grid).unwrap();
     // 96 m is the middle of cell 1: 32767.5 rounds away from zero.
     assert_eq!(packed.xz, 0x8000_0000);
-    assert_eq!(packed.cell, 0x0001_FFFF);
+    assert_eq!(packed.cell, 15 << 28 | 1 << 14 | 0x3FFF);
+    assert_eq!((packed.variant(), packed.cell_index(&grid)), (1023, (-1, 1)));
     assert_eq!(packed.look, 64 | 4095 << 8 | 63 << 20 | (0x40 - 31) << 26);
     assert_eq!(packed.tint(), -1.0);
-    assert_eq!(packed.position(64.0).x, -64.0);
+    assert_eq!(packed.position(&grid).x, -64.0);
+    // The same tree from a base far away, and from one that is too far.
+    let aside = CellGrid { base: IVec2::new(8000, -8000), ..grid };
+    let moved = PackedTree::pack(&original, 0, &aside).unwrap();
+    assert_eq!((moved.position(&aside), moved.variant()), (packed.position(&grid), 1023));
+    let far = CellGrid { base: IVec2::new(8192, 0), ..grid };
+    assert!(matches!(PackedTree::pack(&original, 0, &far), Err(ScatterError::Unpackable { what: "x", .. })));
 }
 
 #[test]
@@ -576,6 +587,30 @@ fn what_does_not_fit_is_refused_with_its_tree() {
 }
 
 #[test]
+fn a_stand_may_lie_anywhere_and_is_at_most_16384_cells_wide() {
+    let bounds = [PlantSize { radius: 2.0, height: 10.0 }];
+    let pack = |places: &[f64], size: f64| {
+        let trees = places.iter().map(|&place| tree(place, 0.0, -place)).collect();
+        PackedStand::new(&Stand { trees }, size, &bounds)
+    };
+    // The widest stands at both ends of what coordinates can be.
+    let width = f64::from(MAX_CELLS) * 64.0;
+    for first in [-2_097_151.0, -0.5 * width, 2_097_151.0 - width + 64.0] {
+        let last = first + width - 64.0;
+        let packed = pack(&[first, last, first + 0.3 * width], 64.0).unwrap();
+        let mut found: Vec<f64> = packed.trees.iter().map(|tree| tree.position(&packed.grid).x).collect();
+        found.sort_by(f64::total_cmp);
+        for (found, wanted) in found.iter().zip([first, first + 0.3 * width, last]) {
+            assert!((found - wanted).abs() < 5e-4, "{found} for {wanted}");
+        }
+    }
+    let error = pack(&[0.0, width + 1.0], 64.0).unwrap_err();
+    let ScatterError::TooWide { axis: "X", least, .. } = error else { panic!("{error}") };
+    assert!(error.to_string().contains("4096 m") && error.to_string().contains(&format!("cells of {least} m")));
+    assert!(pack(&[0.0, width + 1.0], least).is_ok(), "the remedy works");
+}
+
+#[test]
 fn cells_partition_the_trees_and_hold_their_crowns() {
     let sizes = SizeRule::Scale { min: 0.3, max: 3.0 };
     let species = vec![SpeciesRule { variants: 0..2, size: sizes, ..Default::default() }];
@@ -593,9 +628,9 @@ fn cells_partition_the_trees_and_hold_their_crowns() {
         let range = cell.first as usize..next as usize;
         assert!(packed.indices[range.clone()].windows(2).all(|pair| pair[0] < pair[1]));
         for packed_tree in &packed.trees[range] {
-            assert_eq!(packed_tree.cell_index(), (cell.ix, cell.iz));
+            assert_eq!(packed_tree.cell_index(&packed.grid), (cell.ix, cell.iz));
             let bound = bounds[usize::from(packed_tree.variant())];
-            let foot = packed_tree.position(50.0);
+            let foot = packed_tree.position(&packed.grid);
             let reach = f64::from(bound.radius * packed_tree.scale()) - 1e-4;
             let top = f64::from(bound.height * packed_tree.scale()) - 1e-4;
             assert!((foot - DVec3::new(reach, 0.0, reach)).cmpge(cell.min).all());
@@ -607,7 +642,7 @@ fn cells_partition_the_trees_and_hold_their_crowns() {
     // Each packed tree is the stand's tree of its index.
     let by_index: std::collections::HashMap<u32, &Tree> = stand.trees.iter().map(|t| (t.index, t)).collect();
     for (packed_tree, index) in packed.trees.iter().zip(&packed.indices) {
-        assert!(packed_tree.position(50.0).distance(by_index[index].position) < 2e-3);
+        assert!(packed_tree.position(&packed.grid).distance(by_index[index].position) < 2e-3);
     }
     // Morton order: a step in the list is a short way on the ground far more often than not.
     let near = packed

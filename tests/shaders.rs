@@ -13,7 +13,10 @@ use canopy::{
         bindings::uniforms::{
             CascadeUniform, CascadeViewUniform, FrameUniform, LightUniform, NOISE_PERIOD, ShadowUniform,
         },
-        forest::{ForestViewUniform, PartUniform, PlaneUniform, PlantVertex, TransferUniform, VariantUniform},
+        forest::{
+            CrossVariantUniform, ForestViewUniform, PartUniform, PlaneUniform, PlantVertex, TransferUniform,
+            VariantUniform,
+        },
         shaders::{ShaderFile, sources},
         terrain::{GpuTile, GpuTileVertex},
     },
@@ -227,20 +230,15 @@ fn gpu_structs_are_what_the_shaders_think() {
         layouts,
         "Variant",
         VariantUniform {
-            planes,
             height,
             crown_radius,
-            first_layer,
-            first_light_layer,
-            transmission,
             radiance_transfer,
-            isotropic_fraction,
             specular_reflectance,
             roughness,
             realigned,
             indirect_sun_zenith,
-            indirect_sun_color,
             indirect_sun_mean,
+            indirect_sun_color,
             ambient_term,
             lobe_gain,
             lobe_limit,
@@ -259,6 +257,11 @@ fn gpu_structs_are_what_the_shaders_think() {
             lobe_gain,
             lobe_limit
         }
+    );
+    twin!(
+        layouts,
+        "CrossVariant",
+        CrossVariantUniform { planes, transmission, first_layer, isotropic_fraction, first_light_layer }
     );
     twin!(
         layouts,
@@ -289,6 +292,7 @@ fn every_bound_struct_has_its_twin_tested() {
         "CascadeView",
         "ForestView",
         "Variant",
+        "CrossVariant",
         "Part",
         "Transfer",
         "Tree",

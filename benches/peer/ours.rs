@@ -5,7 +5,7 @@ use std::sync::Arc;
 use anyhow::Context;
 use canopy::{
     app::Renderer,
-    bake::BakedPlant,
+    bake::{BakedLevel, BakedPlant},
     components::Sun,
     lod::{FadeBand, Levels},
     render::components::{Forest, Ground, SunShadowSettings},
@@ -70,8 +70,8 @@ impl Ours {
     }
 
     /// Sets the time; the light follows within the frame.
-    pub fn light(&mut self, sky: &Sun) {
-        self.0.set_sun(sky.clone());
+    pub fn light(&mut self, sun: &Sun) {
+        self.0.set_sun(sun.clone());
     }
 
     /// Draws a frame and waits for the device.
@@ -88,5 +88,5 @@ impl Ours {
 
 fn full_casters(plant: &BakedPlant) -> BakedPlant {
     let shadow_proxy = plant.plant.parts.iter().map(|part| part.mesh.clone()).collect();
-    BakedPlant { shadow_proxy: Arc::new(shadow_proxy), ..plant.clone() }
+    plant.clone().with_level(BakedLevel::ShadowProxy(Arc::new(shadow_proxy)))
 }

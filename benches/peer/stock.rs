@@ -207,11 +207,11 @@ struct Level {
 
 fn spawn_trees(app: &mut App, field: &Field) {
     let levels = levels(app, field);
-    let cell_size = field.stand.cell_size;
+    let grid = field.stand.grid;
     for level in levels {
         let trees = field.stand.trees.iter().map(|tree| {
             let transform = Transform {
-                translation: tree.position(cell_size).as_vec3(),
+                translation: tree.position(&grid).as_vec3(),
                 rotation: Quat::from_rotation_y(tree.yaw()),
                 scale: Vec3::splat(tree.scale()),
             };
@@ -244,8 +244,9 @@ fn levels(app: &mut App, field: &Field) -> Vec<Level> {
         levels.push(Level { mesh, material, range: (!look.is_full()).then(|| near.clone()) });
     }
     if !look.is_full() {
-        let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(cross_mesh(&field.plant.cross));
-        let atlas = atlas(&field.plant.cross.textures.color);
+        let Some(cross) = field.plant.cross() else { return levels };
+        let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(cross_mesh(cross));
+        let atlas = atlas(&cross.textures.color);
         let texture = add_texture(app, &atlas, ImageAddressMode::ClampToEdge);
         let material = add_material(app, foliage(StandardMaterial { base_color_texture: Some(texture), ..matt() }));
         levels.push(Level { mesh, material, range: Some(far) });

@@ -1,5 +1,6 @@
 // Crossed billboards [Franzke 2005, 4.3]: two upright planes and a level one, eighteen pulled vertices a tree.
 #import canopy::constants::{CROSS_VERTICES, PLANES, SPREAD_LEVELS, LIGHT_SCALE, WHOLE, FADE_SPAN, GONE}
+#import canopy::cross_variant::cross_variants
 #import canopy::frame::{frame, light}
 #import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, leaf_visibility}
 #import canopy::lighting::{Surface, shade, even_sky, leaf_transmission}
@@ -58,7 +59,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     let tree = unpack_tree(trees[visible[index / CROSS_VERTICES]]);
     let plane_index = (index % CROSS_VERTICES) / 6u;
     let corner = corners[index % 6u];
-    let plane = variants[tree.variant].planes[plane_index];
+    let plane = cross_variants[tree.variant].planes[plane_index];
     let height = max(variants[tree.variant].height * tree.scale, 0.01);
 
     let center = plant_vertex_position(tree, plane.center.xyz).relative;
@@ -79,7 +80,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
         out.clip = vec4(0.0, 0.0, 0.5, 1.0);
     }
     out.uv = vec2(0.5 + 0.5 * corner.x, 0.5 - 0.5 * corner.y);
-    out.layer = variants[tree.variant].first_layer + plane_index;
+    out.layer = cross_variants[tree.variant].first_layer + plane_index;
     out.right = rotate(plane.u.xyz, tree.yaw) / max(length(plane.u.xyz), 1e-6);
     out.up = rotate(plane.v.xyz, tree.yaw) / max(length(plane.v.xyz), 1e-6);
     // Seen from behind, the crown's other half stands before the viewer: mirrored across the plane.
@@ -124,7 +125,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.albedo = mix(texel.rgb, tint_foliage(texel.rgb, look.tint), foliage);
     surface.normal = normal;
     let reflectance = variants[variant].specular_reflectance;
-    surface.transmission = leaf_transmission(texel.rgb, variants[variant].transmission, reflectance) * foliage;
+    surface.transmission = leaf_transmission(texel.rgb, cross_variants[variant].transmission, reflectance) * foliage;
     surface.viewer = -normalize(in.relative);
     surface.isotropic_fraction = isotropic_fraction(variant, level) * foliage;
     surface.specular_reflectance = reflectance * foliage;
@@ -137,7 +138,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let stand = stand_light(ground.surrounding_cover, 1.0 - look.relative_height);
     var visibility = terrain_visibility(ground, look.height);
 #ifdef TRANSFER
-    let light_layer = variants[variant].first_light_layer + in.layer % PLANES;
+    let light_layer = cross_variants[variant].first_light_layer + in.layer % PLANES;
     let stored = textureSampleLevel(light_textures, texture_sampler, in.uv, light_layer, level) * LIGHT_SCALE;
     let side = in.right * stored.x + in.up * stored.y + in.front * stored.z;
     // The second band is not relative to the mean here.
@@ -190,7 +191,7 @@ fn isotropic_fraction(variant: u32, level: f32) -> f32 {
     let at = clamp(level, 0.0, f32(SPREAD_LEVELS - 1u));
     let finer = u32(at);
     let coarser = min(finer + 1u, SPREAD_LEVELS - 1u);
-    let fraction = &variants[variant].isotropic_fraction;
+    let fraction = &cross_variants[variant].isotropic_fraction;
     return mix((*fraction)[finer / 4u][finer % 4u], (*fraction)[coarser / 4u][coarser % 4u], fract(at));
 }
 

@@ -2,8 +2,9 @@
 #define_import_path canopy::instance
 
 #import canopy::constants::{PLACE_STEPS, YAW_BITS, YAWS, SCALE_SHIFT, SCALE_BITS, SCALE_STEPS, SCALE_OCTAVES, LEAST_SCALE_LOG2}
-#import canopy::constants::{VARIANT_SHIFT, VARIANT_BITS, TINT_SHIFT, TINT_BITS, TINT_STEPS}
-#import canopy::constants::{PLANES, SPREAD_VECTORS, WHOLE, FADE_SPAN}
+#import canopy::constants::{CELL_BITS, VARIANT_LOW_SHIFT, VARIANT_LOW_BITS, VARIANT_HIGH_SHIFT, VARIANT_HIGH_BITS}
+#import canopy::constants::{TINT_SHIFT, TINT_BITS, TINT_STEPS}
+#import canopy::constants::{WHOLE, FADE_SPAN}
 
 struct Tree {
     xz: u32,
@@ -14,6 +15,7 @@ struct Tree {
 
 // Where positions are relative to: the camera for the view, a box's centre for a cascade.
 struct ForestView {
+    // Counted from the stand's base cell, as those of the trees.
     anchor_cell: vec2<i32>,
     // Metres of the anchor inside its cell (x, z).
     anchor_offset: vec2<f32>,
@@ -27,27 +29,13 @@ struct ForestView {
     tint: vec4<f32>,
 }
 
-struct Plane {
-    center: vec4<f32>,
-    u: vec4<f32>,
-    v: vec4<f32>,
-    normal: vec4<f32>,
-}
-
+// What is known of each plant, whatever it is drawn as.
 struct Variant {
-    planes: array<Plane, PLANES>,
     // Metres.
     height: f32,
     crown_radius: f32,
-    // First layer of its textures, and of its lighting textures.
-    first_layer: u32,
-    first_light_layer: u32,
-    // Factor for light through its leaves, as in `Surface`.
-    transmission: vec3<f32>,
     // 1 where it is lit by radiance transfer: its ambient visibility is traced, and holds what leaves scatter.
     radiance_transfer: u32,
-    // Fraction of a texel's leaf area with isotropic normals, 0..1, mip by mip.
-    isotropic_fraction: array<vec4<f32>, SPREAD_VECTORS>,
     // Gloss of its leaves.
     specular_reflectance: f32,
     roughness: f32,
@@ -56,8 +44,8 @@ struct Variant {
     // Indirect light of the key light (indirect_sun in transfer.wgsl) in the mean over its leaves: the component of the second
     // band towards the zenith, the first coefficient, and its colour.
     indirect_sun_zenith: f32,
-    indirect_sun_color: vec3<f32>,
     indirect_sun_mean: f32,
+    indirect_sun_color: vec3<f32>,
     // 1 where its ambient visibility is the ambient term of a density field, else 0.
     ambient_term: u32,
     // As in `Surface`.
@@ -84,7 +72,8 @@ struct Instance {
 @group(1) @binding(3) var<storage, read> variants: array<Variant>;
 
 fn unpack_tree(tree: Tree) -> Instance {
-    let cell = vec2(extractBits(bitcast<i32>(tree.cell), 0u, 16u), extractBits(bitcast<i32>(tree.cell), 16u, 16u));
+    let packed_cell = bitcast<i32>(tree.cell);
+    let cell = vec2(extractBits(packed_cell, 0u, CELL_BITS), extractBits(packed_cell, CELL_BITS, CELL_BITS));
     let offset = vec2(f32(tree.xz & 0xffffu), f32(tree.xz >> 16u)) * (view.cell_size / PLACE_STEPS);
     let xz = vec2<f32>(cell - view.anchor_cell) * view.cell_size + (offset - view.anchor_offset);
     let yaw_code = extractBits(tree.look, 0u, YAW_BITS);
@@ -96,7 +85,8 @@ fn unpack_tree(tree: Tree) -> Instance {
     instance.position = vec3(xz.x, tree.y - view.anchor_y, xz.y);
     instance.yaw = vec2(cos(yaw), sin(yaw));
     instance.scale = exp2(f32(scale_code) * (SCALE_OCTAVES / SCALE_STEPS) + LEAST_SCALE_LOG2);
-    instance.variant = extractBits(tree.look, VARIANT_SHIFT, VARIANT_BITS);
+    let variant_high = extractBits(tree.cell, VARIANT_HIGH_SHIFT, VARIANT_HIGH_BITS);
+    instance.variant = extractBits(tree.look, VARIANT_LOW_SHIFT, VARIANT_LOW_BITS) | (variant_high << VARIANT_LOW_BITS);
     instance.tint = max(f32(tint_code) / TINT_STEPS, -1.0);
     return instance;
 }

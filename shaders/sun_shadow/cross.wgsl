@@ -1,7 +1,8 @@
 // Depth from the key light: far trees as one upright texture that faces the light's azimuth, so that the
 // shadow's area does not depend on it, and the level one for a high light.
 #import canopy::constants::CASTER_VERTICES
-#import canopy::instance::{trees, visible, variants, unpack_tree, rotate, rotated_vertex_position}
+#import canopy::cross_variant::cross_variants
+#import canopy::instance::{trees, visible, unpack_tree, rotate, rotated_vertex_position}
 #import canopy::caster::{cascade, clamp_caster}
 
 @group(2) @binding(0) var color_textures: texture_2d_array<f32>;
@@ -21,7 +22,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     let upright = (index % CASTER_VERTICES) < 6u;
     let corner = corners[index % 6u];
     let plane_index = select(2u, 0u, upright);
-    let plane = variants[tree.variant].planes[plane_index];
+    let plane = cross_variants[tree.variant].planes[plane_index];
     var u = rotate(plane.u.xyz, tree.yaw);
     let v = rotate(plane.v.xyz, tree.yaw);
     let center = rotate(plane.center.xyz, tree.yaw);
@@ -34,7 +35,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     var out: Varying;
     out.clip = clamp_caster(rotated_vertex_position(tree, center + corner.x * u + corner.y * v).relative);
     out.uv = vec2(0.5 + 0.5 * corner.x, 0.5 - 0.5 * corner.y);
-    out.layer = variants[tree.variant].first_layer + plane_index;
+    out.layer = cross_variants[tree.variant].first_layer + plane_index;
     return out;
 }
 

@@ -101,7 +101,14 @@ impl Stage {
         let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let limit = usize::try_from(bytes).unwrap_or(usize::MAX) / size_of::<PackedTree>();
         let count = self.stand.trees.len();
-        if count > limit { Err(StageError::TooManyTrees { count, limit }) } else { Ok(()) }
+        if count > limit {
+            return Err(StageError::TooManyTrees { count, limit });
+        }
+        // The crosses of all plants share a texture array.
+        let planes = self.plants.iter().filter_map(BakedPlant::cross).map(|cross| cross.planes.len());
+        let (most, layers) = (planes.clone().max().unwrap_or(1).max(1), limits.max_texture_array_layers as usize);
+        let (count, limit) = (planes.count(), layers / most);
+        if count > limit { Err(StageError::TooManyPlants { count, limit }) } else { Ok(()) }
     }
 
     /// The forest of the scene, or `None` without trees.

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::{StageError, plants::PlantPlan, plants::bake_settings};
 use crate::{
     bake::{
-        BakedPlant,
+        BakedLevel, BakedPlant,
         levels::cross::bake_cross,
         lighting::{
             BakedLighting, ExpressiveLighting, LightingSettings,
@@ -85,11 +85,8 @@ pub fn light_together(
                 bake.report.no_surface,
                 settings.own_normal,
             ));
-            BakedPlant {
-                cross: Arc::new(bake_cross(&instance.plant, &lighting, &cross)),
-                lighting: Arc::new(lighting),
-                ..instance.clone()
-            }
+            let cross = BakedLevel::Cross(Arc::new(bake_cross(&instance.plant, &lighting, &cross)));
+            BakedPlant { lighting: Arc::new(lighting), ..instance.clone() }.with_level(cross)
         })
         .collect();
     let vertices: usize = lit.iter().flat_map(|p| &p.plant.parts).map(|part| part.mesh.positions.len()).sum();

@@ -4,8 +4,12 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::levels::cross::{Cross, CrossSettings};
+use super::levels::{
+    self, BakedLevel,
+    cross::{Cross, CrossSettings},
+};
 use super::lighting::{BakedLighting, LightingSettings};
+use crate::lod::Representation;
 use crate::plant::{Plant, PlantMesh};
 use crate::scatter::PlantSize;
 
@@ -17,13 +21,42 @@ pub struct BakedPlant {
     pub plant: Arc<Plant>,
     /// What lights the foliage.
     pub lighting: Arc<BakedLighting>,
-    /// A lighter model (parts in the plant's order) with the same projected area, which casts the near shadow.
-    pub shadow_proxy: Arc<Vec<PlantMesh>>,
-    /// Crossed billboards.
-    pub cross: Arc<Cross>,
+    /// What is baked for its representations, at most once each.
+    pub levels: Vec<BakedLevel>,
 }
 
 impl BakedPlant {
+    /// A lighter model that casts the near shadow, if it was baked.
+    pub fn shadow_proxy(&self) -> Option<&Arc<Vec<PlantMesh>>> {
+        self.levels.iter().find_map(|level| match level {
+            BakedLevel::ShadowProxy(proxy) => Some(proxy),
+            _ => None,
+        })
+    }
+
+    /// Crossed billboards, if they were baked.
+    pub fn cross(&self) -> Option<&Arc<Cross>> {
+        self.levels.iter().find_map(|level| match level {
+            BakedLevel::Cross(cross) => Some(cross),
+            _ => None,
+        })
+    }
+
+    /// Puts `level` in the place of the one of the same representation, if there is one.
+    pub fn set_level(&mut self, level: BakedLevel) {
+        match self.levels.iter_mut().find(|known| known.representation() == level.representation()) {
+            Some(known) => *known = level,
+            None => self.levels.push(level),
+        }
+    }
+
+    /// The same plant with `level` in the place of the one of the same representation.
+    #[must_use]
+    pub fn with_level(mut self, level: BakedLevel) -> Self {
+        self.set_level(level);
+        self
+    }
+
     /// Its [`plant_size`].
     pub fn size(&self) -> PlantSize {
         plant_size(&self.plant)
@@ -38,6 +71,9 @@ pub fn plant_size(plant: &Plant) -> PlantSize {
 /// How a plant is baked. Values out of range are moved into it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BakeSettings {
+    /// The representations that are baked for; all that need a bake unless a program draws fewer of them. Set in code.
+    #[serde(skip_deserializing, default = "all_baked")]
+    pub representations: &'static [Representation],
     /// Which light the foliage gets.
     pub lighting: LightingSettings,
     /// Crossed billboards.
@@ -46,9 +82,18 @@ pub struct BakeSettings {
     pub shadow_share: f32,
 }
 
+fn all_baked() -> &'static [Representation] {
+    levels::BAKED
+}
+
 impl Default for BakeSettings {
     fn default() -> Self {
-        Self { lighting: LightingSettings::default(), cross: CrossSettings::default(), shadow_share: 0.2 }
+        Self {
+            representations: levels::BAKED,
+            lighting: LightingSettings::default(),
+            cross: CrossSettings::default(),
+            shadow_share: 0.2,
+        }
     }
 }
 
@@ -56,6 +101,11 @@ impl BakeSettings {
     /// The settings with every value moved into its range; what is not finite becomes the default.
     pub fn in_range(self) -> Self {
         let share = if self.shadow_share.is_finite() { self.shadow_share } else { Self::default().shadow_share };
-        Self { lighting: self.lighting.in_range(), cross: self.cross.in_range(), shadow_share: share.clamp(0.0, 1.0) }
+        Self {
+            representations: self.representations,
+            lighting: self.lighting.in_range(),
+            cross: self.cross.in_range(),
+            shadow_share: share.clamp(0.0, 1.0),
+        }
     }
 }

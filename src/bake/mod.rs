@@ -23,11 +23,12 @@ use std::sync::Arc;
 
 use crate::plant::Plant;
 use cache::{Cache, CacheKey};
-use levels::{cross::bake_cross, shadow_proxy::shadow_proxy};
+use levels::bake_levels;
 use lighting::BakedLighting;
 
 pub use baked::{BakeSettings, BakedPlant, plant_size};
 pub use error::BakeError;
+pub use levels::BakedLevel;
 
 /// Where a baked plant came from.
 #[derive(Debug)]
@@ -55,10 +56,7 @@ pub fn bake_plant(plant: Arc<Plant>, settings: &BakeSettings, cache: Option<&Cac
 }
 
 fn bake_fresh(plant: Arc<Plant>, settings: &BakeSettings) -> BakedPlant {
-    let triangles: usize = plant.parts.iter().map(|part| part.mesh.triangles.len()).sum();
-    let target = (triangles as f64 * f64::from(settings.shadow_share)).round() as usize;
     let lighting = Arc::new(BakedLighting::bake(&plant, &settings.lighting));
-    let cross = Arc::new(bake_cross(&plant, &lighting, &settings.cross));
-    let shadow_proxy = Arc::new(shadow_proxy(&plant, target));
-    BakedPlant { plant, lighting, shadow_proxy, cross }
+    let levels = bake_levels(&plant, &lighting, settings);
+    BakedPlant { plant, lighting, levels }
 }

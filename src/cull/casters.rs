@@ -50,15 +50,44 @@ pub fn cull_cascade(
     groupings: &[Grouping],
     seen: Option<&SeenShadows>,
 ) -> DrawLists {
-    let mut lists = ListBuilder::new(groupings, sizes.len());
     let center = cascade.center - origin;
     let reach = cascade.reach();
     let casts = |min: DVec3, max: DVec3| {
         let (middle, radius) = (0.5 * (min + max), 0.5 * (max - min).length());
         reach.includes(min, max) && seen.is_none_or(|seen| seen.includes(middle, radius, cascade.direction))
     };
+    gather(stand, sizes, center, cascade.direction, casting, groupings, |min, max| casts(min + origin, max + origin))
+}
+
+/// Casters of a light whose view is bounded by `frustum`, which is relative to `anchor` (in the stand's own metres) and
+/// unbounded along the light. `casting` counts from the anchor; the rest is as for [`cull_cascade`].
+pub fn cull_light_view(
+    stand: &PackedStand,
+    sizes: &[PlantSize],
+    anchor: DVec3,
+    frustum: &Frustum,
+    direction: DVec3,
+    casting: &[Range<f64>],
+    groupings: &[Grouping],
+) -> DrawLists {
+    gather(stand, sizes, anchor, direction, casting, groupings, |min, max| {
+        frustum.sees_box((min - anchor).as_vec3(), (max - anchor).as_vec3())
+    })
+}
+
+/// Trees whose boxes (in the stand's own metres) cast, by their distance from `center` and sorted from the light outwards.
+fn gather(
+    stand: &PackedStand,
+    sizes: &[PlantSize],
+    center: DVec3,
+    direction: DVec3,
+    casting: &[Range<f64>],
+    groupings: &[Grouping],
+    casts: impl Fn(DVec3, DVec3) -> bool,
+) -> DrawLists {
+    let mut lists = ListBuilder::new(groupings, sizes.len());
     for cell in &stand.cells {
-        if !casts(cell.min + origin, cell.max + origin) {
+        if !casts(cell.min, cell.max) {
             continue;
         }
         for tree in cell.first..cell.first + cell.count {
@@ -66,17 +95,17 @@ pub fn cull_cascade(
             let variant = packed.variant() as usize;
             let Some(size) = sizes.get(variant) else { continue };
             let scale = f64::from(packed.scale());
-            let foot = packed.position(stand.cell_size);
+            let foot = packed.position(&stand.grid);
             let (radius, height) = (f64::from(size.radius) * scale, f64::from(size.height) * scale);
             let (min, max) = (foot - DVec3::new(radius, 0.0, radius), foot + DVec3::new(radius, height, radius));
-            if !casts(min + origin, max + origin) {
+            if !casts(min, max) {
                 continue;
             }
             let offset = foot - center;
             let distance = offset.x.hypot(offset.z);
             let Some(level) = casting.iter().position(|range| range.contains(&distance)) else { continue };
             if let Some(list) = lists.list(level, variant) {
-                list.push(((foot + DVec3::Y * height).dot(cascade.direction), tree));
+                list.push(((foot + DVec3::Y * height).dot(direction), tree));
             }
         }
     }

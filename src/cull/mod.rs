@@ -12,7 +12,7 @@ mod frustum;
 mod lists;
 mod view;
 
-pub use casters::{SeenShadows, cull_cascade};
+pub use casters::{SeenShadows, cull_cascade, cull_light_view};
 pub use frustum::Frustum;
 pub use lists::{DrawLists, Grouping};
 pub use view::cull_view;

@@ -56,7 +56,7 @@ pub fn cull_view(
         }
         for tree in trees {
             let Some(packed) = stand.trees.get(tree as usize) else { continue };
-            let relative = (packed.position(stand.cell_size) - camera).as_vec3();
+            let relative = (packed.position(&stand.grid) - camera).as_vec3();
             let distance = glam::Vec2::new(relative.x, relative.z).length();
             if distance > view_distance {
                 continue;

@@ -1,5 +1,7 @@
 //! The list of representations of a forest.
 
+use serde::Serialize;
+
 use super::{FadeBand, GONE, WHOLE};
 
 /// The most levels that a forest has.
@@ -7,7 +9,7 @@ pub const MAX_LEVELS: usize = 8;
 
 /// A way to draw a plant, by its name. The renderer has an implementation for each name that it knows
 /// (`render::forest::Representations`); a program can add its own.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 pub struct Representation(&'static str);
 
 impl Representation {

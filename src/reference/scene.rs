@@ -41,7 +41,7 @@ impl Instance {
     pub fn of_stand(stand: &PackedStand, origin: DVec3) -> Vec<Self> {
         let tree = |tree: &crate::scatter::PackedTree| Self {
             plant: tree.variant().into(),
-            position: origin + tree.position(stand.cell_size),
+            position: origin + tree.position(&stand.grid),
             yaw: tree.yaw(),
             scale: tree.scale(),
             tint: tree.tint().max(-1.0),

@@ -68,7 +68,7 @@ impl CanopyOrigin {
 pub struct Forest {
     /// Where the trees stand.
     pub stand: Arc<PackedStand>,
-    /// The plants, indexed by the trees' variant; at most 64.
+    /// The plants, indexed by the trees' variant; at most 1,024.
     pub plants: Arc<Vec<BakedPlant>>,
     /// How the sun lights each plant; [`SunLight::LeafShader`] where the list ends.
     pub suns: Arc<[SunLight]>,

@@ -13,6 +13,7 @@ use bevy::{
         resource::Resource,
         system::{Query, Res, ResMut},
     },
+    light::DirectionalLight,
     log::{error_once, warn_once},
     math::Affine3A,
     mesh::{Mesh, Mesh3d},
@@ -39,6 +40,8 @@ pub struct ExtractedScene {
     pub casters: Vec<(AssetId<Mesh>, Affine3A)>,
     /// How often each mesh was changed.
     pub mesh_revisions: HashMap<AssetId<Mesh>, u64>,
+    /// Whether a directional light of Bevy's has shadow maps, for ordinary meshes.
+    pub mesh_shadows: bool,
     /// Shadow settings.
     pub shadow: SunShadowSettings,
 }
@@ -57,6 +60,7 @@ pub fn extract_scene(
     mut changes: Extract<MessageReader<AssetEvent<Mesh>>>,
     daylight: Extract<Option<Res<Daylight>>>,
     shadows: Extract<Query<(Entity, &SunShadowSettings)>>,
+    lights: Extract<Query<&DirectionalLight>>,
 ) {
     scene.origin = origin.0;
     // The camera that is drawn: the order is that of `prepare_view`.
@@ -90,6 +94,7 @@ pub fn extract_scene(
     }
     scene.casters.clear();
     scene.casters.extend(meshes.into_iter().map(|(_, mesh, place)| (mesh.0.id(), place.affine())));
+    scene.mesh_shadows = lights.iter().any(|light| light.shadow_maps_enabled);
     let shadow = shadows.iter().min_by_key(|(entity, _)| *entity);
     scene.shadow = shadow.map(|(_, settings)| *settings).unwrap_or_default();
 }

@@ -6,6 +6,7 @@
 //! extract ── view (camera in f64) ── cull (lists of trees) ── bindings (group 0)
 //!              │
 //!              ├─ sun_shadow   only the cascades that changed        before Core3dSystems::MainPass
+//!              ├─ mesh_shadow  trees in Bevy's own shadow maps       after Bevy's casters
 //!              ├─ (Bevy's own opaque meshes)
 //!              ├─ forest       full models, crosses                  MainPass, after main_opaque_pass_3d
 //!              ├─ terrain      tiles                                 after forest
@@ -20,6 +21,7 @@ pub mod components;
 pub mod extract;
 pub mod forest;
 pub mod gpu;
+pub mod mesh_shadow;
 pub mod readback;
 pub mod report;
 pub mod sets;
@@ -75,6 +77,7 @@ impl Plugin for CanopyRenderPlugin {
             stand_light::StandLightPlugin,
             sky::SkyPassPlugin,
             sun_shadow::SunShadowPassPlugin,
+            mesh_shadow::MeshShadowPlugin,
             terrain::TerrainPassPlugin,
             forest::ForestPassPlugin,
         ));

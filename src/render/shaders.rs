@@ -64,6 +64,7 @@ shader_files! {
     Lighting = "common/lighting.wgsl",
     ForestInstance = "forest/instance.wgsl",
     ForestTransfer = "forest/transfer.wgsl",
+    ForestCrossVariant = "forest/cross_variant.wgsl",
     ForestModel = "forest/model.wgsl",
     ForestCross = "forest/cross.wgsl",
     SunShadowCaster = "sun_shadow/caster.wgsl",

@@ -155,7 +155,7 @@ impl Crowns for Stand {
 
 impl Crowns for PackedStand {
     fn crowns(&self) -> impl Iterator<Item = (DVec2, u16, f32)> {
-        self.trees.iter().map(|tree| (tree.position(self.cell_size).xz_plane(), tree.variant(), tree.scale()))
+        self.trees.iter().map(|tree| (tree.position(&self.grid).xz_plane(), tree.variant(), tree.scale()))
     }
 }
 

@@ -147,6 +147,21 @@ pub enum ScatterError {
         /// The possible range and the remedy.
         remedy: String,
     },
+    /// The trees of a stand lie farther apart than its cells can be counted.
+    #[error(
+        "the trees lie {width:.0} m apart along {axis}, which is too much for cells of {cell_size} m: take cells of {least} m \
+         or more (at most 4096 m), or split the stand"
+    )]
+    TooWide {
+        /// `X` or `Z`.
+        axis: &'static str,
+        /// Extent of the cells that hold trees, metres.
+        width: f64,
+        /// Side of a cell, metres.
+        cell_size: f64,
+        /// A side that is large enough, metres.
+        least: f64,
+    },
     /// The cell size of a packed stand or the texel of a cover map is out of range.
     #[error("{what} is {value} m: {remedy}")]
     Size {

@@ -36,7 +36,7 @@ pub use inventory::{
     Coordinates, Inventory, InventoryOptions, InventoryTree, LengthUnit, parse_inventory, read_inventory,
 };
 pub use inventory_stand::{InventorySpecies, InventoryStand, InventoryWarnings, stand_from_inventory};
-pub use packed::{Cell, PackedStand, PackedTree, PlantSize};
+pub use packed::{Cell, CellGrid, PackedStand, PackedTree, PlantSize};
 pub use placement::{Placement, PlacementReport, place};
 pub use rules::{ClearingNoise, PlacementRules, Sequence, SizeRule, SpeciesRule};
 pub use stand::{Area, Ground, MAX_COORDINATE_M, MAX_SCALE, MIN_SCALE, Stand, Tree};

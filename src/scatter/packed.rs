@@ -3,9 +3,13 @@
 //! ```text
 //! word 0  xz    u16 x | u16 z << 16         place inside the cell, 0..=65535 for 0..=cell size (WGSL unpack2x16unorm)
 //! word 1  y     f32                         metres above the datum
-//! word 2  cell  i16 ix | i16 iz << 16       cell (ix, iz) covers [ix s, (ix + 1) s) × [iz s, (iz + 1) s)
-//! word 3  look  yaw 8 | scale 12 | variant 6 | tint 6    from the lowest bit up
+//! word 2  cell  i14 ix | i14 iz << 14 | upper 4 bits of the variant << 28
+//! word 3  look  yaw 8 | scale 12 | lower 6 bits of the variant | tint 6    from the lowest bit up
 //! ```
+//!
+//! Cells are counted from the base cell of the stand's [`CellGrid`]: cell (ix, iz) of the grid covers
+//! [(base + ix) s, (base + ix + 1) s) along X and the same along Z. A stand may so lie anywhere, and is at most
+//! 2¹⁴ cells wide (1,048 km at 64 m).
 //!
 //! An f32 position would have steps of 0.125 m at 2,000 km and needs 12 bytes; cells give the same step everywhere, and
 //! the camera-relative position is `(cell - camera_cell) * s + place`, in which the large numbers cancel as integers.
@@ -16,13 +20,13 @@
 //! | y | f32 | 2⁻²⁴ of itself (0.24 mm at 4,096 m) |
 //! | yaw | 256 steps a turn | π/256 rad (0.7°) |
 //! | scale | 4096 steps from 1/16 to 16, even in the logarithm | 0.068 % |
-//! | variant | 0..=63 | 0 |
+//! | variant | 0..=1023 | 0 |
 //! | tint | -31..=31 | 1/62 |
 
 use std::f32::consts::TAU;
 
 use bytemuck::{Pod, Zeroable};
-use glam::DVec3;
+use glam::{DVec3, IVec2};
 use rayon::prelude::*;
 
 use super::ScatterError;
@@ -32,7 +36,10 @@ use super::stand::{MAX_SCALE, MIN_SCALE, Stand, Tree};
 pub const DEFAULT_CELL_SIZE: f64 = 64.0;
 
 /// The most plant variants a packed stand can name.
-pub const MAX_VARIANTS: usize = 64;
+pub const MAX_VARIANTS: usize = 1 << (VARIANT_LOW_BITS + VARIANT_HIGH_BITS);
+
+/// The most cells that a stand may span along one axis.
+pub const MAX_CELLS: i32 = 1 << CELL_BITS;
 
 /// Largest height above or below the datum, metres: there f32 has steps of 8 mm.
 pub const MAX_HEIGHT_M: f64 = 100_000.0;
@@ -48,14 +55,20 @@ pub const YAW_BITS: u32 = 8;
 pub const SCALE_SHIFT: u32 = YAW_BITS;
 /// Bits of the scale.
 pub const SCALE_BITS: u32 = 12;
-/// First bit of the variant.
-pub const VARIANT_SHIFT: u32 = SCALE_SHIFT + SCALE_BITS;
-/// Bits of the variant.
-pub const VARIANT_BITS: u32 = 6;
+/// First of the variant's lower bits in [`PackedTree::look`].
+pub const VARIANT_LOW_SHIFT: u32 = SCALE_SHIFT + SCALE_BITS;
+/// Number of the variant's lower bits.
+pub const VARIANT_LOW_BITS: u32 = 6;
 /// First bit of the tint.
-pub const TINT_SHIFT: u32 = VARIANT_SHIFT + VARIANT_BITS;
+pub const TINT_SHIFT: u32 = VARIANT_LOW_SHIFT + VARIANT_LOW_BITS;
 /// Bits of the tint, two's complement: the uppermost.
 pub const TINT_BITS: u32 = 32 - TINT_SHIFT;
+/// Bits of a cell's column, the lowest of [`PackedTree::cell`], and of its row, which follow; two's complement.
+pub const CELL_BITS: u32 = 14;
+/// First of the variant's upper bits in [`PackedTree::cell`].
+pub const VARIANT_HIGH_SHIFT: u32 = 2 * CELL_BITS;
+/// Number of the variant's upper bits.
+pub const VARIANT_HIGH_BITS: u32 = 32 - VARIANT_HIGH_SHIFT;
 /// Steps of the scale, even in the logarithm.
 pub const SCALE_STEPS: f32 = ((1 << SCALE_BITS) - 1) as f32;
 /// Binary logarithm of the smallest scale.
@@ -70,6 +83,56 @@ const fn mask(bits: u32) -> u32 {
     (1 << bits) - 1
 }
 
+/// The grid of cells of a packed stand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CellGrid {
+    /// Side of a cell, metres.
+    pub size: f64,
+    /// The cell (column, row) from which packed trees count theirs.
+    pub base: IVec2,
+}
+
+impl CellGrid {
+    /// Cells of `size` metres counted from the one whose north-western corner is the origin.
+    pub fn new(size: f64) -> Self {
+        Self { size, base: IVec2::ZERO }
+    }
+
+    /// Column (or row) of the cell that holds the coordinate `value` in metres, counted from the origin, and where in it,
+    /// 0..=1. `None` beyond ±2¹⁵ cells.
+    fn locate(&self, value: f64) -> Option<(i32, f64)> {
+        let cell = (value / self.size).floor();
+        (f64::from(i16::MIN)..=f64::from(i16::MAX)).contains(&cell).then(|| (cell as i32, value / self.size - cell))
+    }
+
+    /// The grid whose base is the middle of the cells of `stand`. Trees without a cell do not count: packing refuses them.
+    ///
+    /// # Errors
+    /// [`ScatterError::TooWide`] for a stand of more than [`MAX_CELLS`] cells along an axis.
+    fn around(stand: &Stand, size: f64) -> Result<Self, ScatterError> {
+        let mut grid = Self::new(size);
+        let axes: [(&'static str, fn(&Tree) -> f64); 2] =
+            [("X", |tree| tree.position.x), ("Z", |tree| tree.position.z)];
+        for (axis, (what, coordinate)) in axes.into_iter().enumerate() {
+            let cells = stand.trees.par_iter().filter_map(|tree| grid.locate(coordinate(tree)).map(|(cell, _)| cell));
+            let ends = cells.map(|cell| (cell, cell)).reduce_with(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+            let Some((first, last)) = ends else { continue };
+            let cells = last - first + 1;
+            if cells > MAX_CELLS {
+                let least = (f64::from(cells + 1) * size / f64::from(MAX_CELLS)).ceil();
+                return Err(ScatterError::TooWide {
+                    axis: what,
+                    width: f64::from(cells) * size,
+                    cell_size: size,
+                    least,
+                });
+            }
+            grid.base[axis] = (first + last + 1).div_euclid(2);
+        }
+        Ok(grid)
+    }
+}
+
 /// One tree; see the module for its bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -78,31 +141,34 @@ pub struct PackedTree {
     pub xz: u32,
     /// Height of the foot above the datum, metres.
     pub y: f32,
-    /// The cell: ix in the lower 16 bits, iz in the upper, two's complement.
+    /// The cell, counted from the grid's base, and the upper bits of the variant.
     pub cell: u32,
-    /// Yaw, scale, variant, tint.
+    /// Yaw, scale, lower bits of the variant, tint.
     pub look: u32,
 }
 
 impl PackedTree {
-    /// Packs `tree`, the `place`-th of its stand, for cells of `cell_size` metres.
+    /// Packs `tree`, the `place`-th of its stand, for the cells of `grid`.
     ///
     /// # Errors
     /// [`ScatterError::Unpackable`] for a value outside of what the module's table can hold, or not a number.
-    pub fn pack(tree: &Tree, place: usize, cell_size: f64) -> Result<Self, ScatterError> {
+    pub fn pack(tree: &Tree, place: usize, grid: &CellGrid) -> Result<Self, ScatterError> {
         let fail =
             |what, value: f64, remedy: String| Err(ScatterError::Unpackable { tree: place, what, value, remedy });
         let DVec3 { x, y, z } = tree.position;
-        let axis = |value: f64| {
-            let cell = (value / cell_size).floor();
-            let inside = ((value / cell_size - cell) * f64::from(PLACE_STEPS)).round() as u32;
-            (f64::from(i16::MIN)..=f64::from(i16::MAX))
-                .contains(&cell)
-                .then_some((cell as i16, inside.min(PLACE_STEPS as u32)))
+        let axis = |value: f64, base: i32| {
+            let (cell, share) = grid.locate(value)?;
+            let inside = ((share * f64::from(PLACE_STEPS)).round() as u32).min(PLACE_STEPS as u32);
+            let cell = cell.checked_sub(base).filter(|cell| (-MAX_CELLS / 2..MAX_CELLS / 2).contains(cell))?;
+            Some((cell as u32 & mask(CELL_BITS), inside))
         };
-        let reach = || format!("stay within ±{} m or take larger cells", cell_size * f64::from(i16::MAX));
-        let Some((ix, place_x)) = axis(x) else { return fail("x", x, reach()) };
-        let Some((iz, place_z)) = axis(z) else { return fail("z", z, reach()) };
+        let reach = |base: i32| {
+            let (middle, half) = (f64::from(base) * grid.size, f64::from(MAX_CELLS / 2 - 1) * grid.size);
+            let (least, most) = (f64::from(i16::MIN) * grid.size, f64::from(i16::MAX) * grid.size);
+            format!("stay within {} to {} m or take larger cells", least.max(middle - half), most.min(middle + half))
+        };
+        let Some((ix, place_x)) = axis(x, grid.base.x) else { return fail("x", x, reach(grid.base.x)) };
+        let Some((iz, place_z)) = axis(z, grid.base.y) else { return fail("z", z, reach(grid.base.y)) };
         if !(-MAX_HEIGHT_M..=MAX_HEIGHT_M).contains(&y) {
             return fail("y", y, format!("heights are within ±{MAX_HEIGHT_M} m of the datum"));
         }
@@ -121,26 +187,29 @@ impl PackedTree {
         let yaw = ((tree.yaw / TAU).rem_euclid(1.0) * (1 << YAW_BITS) as f32).round() as u32;
         let scale = ((tree.scale.log2() - LEAST_SCALE_LOG2) / SCALE_OCTAVES * SCALE_STEPS).round() as u32;
         let tint = (tree.tint * TINT_STEPS).round() as i32 as u32;
+        let variant = u32::from(tree.variant);
         Ok(Self {
             xz: place_x | place_z << 16,
             y: y as f32,
-            cell: u32::from(ix as u16) | u32::from(iz as u16) << 16,
+            cell: ix | iz << CELL_BITS | variant >> VARIANT_LOW_BITS << VARIANT_HIGH_SHIFT,
             look: yaw & mask(YAW_BITS)
                 | (scale & mask(SCALE_BITS)) << SCALE_SHIFT
-                | u32::from(tree.variant) << VARIANT_SHIFT
+                | (variant & mask(VARIANT_LOW_BITS)) << VARIANT_LOW_SHIFT
                 | tint << TINT_SHIFT,
         })
     }
 
-    /// The cell (ix, iz).
-    pub fn cell_index(&self) -> (i16, i16) {
-        (self.cell as u16 as i16, (self.cell >> 16) as u16 as i16)
+    /// The cell (column, row), counted from the origin.
+    pub fn cell_index(&self, grid: &CellGrid) -> (i32, i32) {
+        // Two's complement: the arithmetic shift extends the sign.
+        let signed = |first: u32| (self.cell << (32 - CELL_BITS - first)) as i32 >> (32 - CELL_BITS);
+        (grid.base.x.wrapping_add(signed(0)), grid.base.y.wrapping_add(signed(CELL_BITS)))
     }
 
     /// Scene-local position of the foot, metres.
-    pub fn position(&self, cell_size: f64) -> DVec3 {
-        let (ix, iz) = self.cell_index();
-        let axis = |cell: i16, place: u32| (f64::from(cell) + f64::from(place) / f64::from(PLACE_STEPS)) * cell_size;
+    pub fn position(&self, grid: &CellGrid) -> DVec3 {
+        let (ix, iz) = self.cell_index(grid);
+        let axis = |cell: i32, place: u32| (f64::from(cell) + f64::from(place) / f64::from(PLACE_STEPS)) * grid.size;
         DVec3::new(axis(ix, self.xz & 0xFFFF), self.y.into(), axis(iz, self.xz >> 16))
     }
 
@@ -156,7 +225,8 @@ impl PackedTree {
 
     /// Which plant stands here.
     pub fn variant(&self) -> u16 {
-        (self.look >> VARIANT_SHIFT & mask(VARIANT_BITS)) as u16
+        let high = self.cell >> VARIANT_HIGH_SHIFT;
+        (self.look >> VARIANT_LOW_SHIFT & mask(VARIANT_LOW_BITS) | high << VARIANT_LOW_BITS) as u16
     }
 
     /// Deviation in colour, -1 to 1.
@@ -189,9 +259,9 @@ impl PlantSize {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
     /// Column: X of its western edge over the cell size.
-    pub ix: i16,
+    pub ix: i32,
     /// Row: Z of its northern edge over the cell size.
-    pub iz: i16,
+    pub iz: i32,
     /// Its first tree in [`PackedStand::trees`].
     pub first: u32,
     /// Number of its trees, > 0.
@@ -213,8 +283,8 @@ pub struct PackedStand {
     pub indices: Vec<u32>,
     /// The cells that hold trees.
     pub cells: Vec<Cell>,
-    /// Side of a cell, metres.
-    pub cell_size: f64,
+    /// Where the cells lie.
+    pub grid: CellGrid,
 }
 
 impl PackedStand {
@@ -223,7 +293,8 @@ impl PackedStand {
     /// # Errors
     /// [`ScatterError::Size`] for the cell size, [`ScatterError::TooManyVariants`] and [`ScatterError::PlantSize`] for
     /// the bounds, [`ScatterError::UnknownVariant`] and [`ScatterError::Unpackable`] for the first tree that cannot be
-    /// packed, [`ScatterError::TooManyTrees`] beyond 2³² - 1 trees.
+    /// packed, [`ScatterError::TooWide`] for trees that lie too far apart for the cells, [`ScatterError::TooManyTrees`]
+    /// beyond 2³² - 1 trees.
     pub fn new(stand: &Stand, cell_size: f64, bounds: &[PlantSize]) -> Result<Self, ScatterError> {
         if !(1.0..=4096.0).contains(&cell_size) {
             let remedy = format!("give 1 to 4096 m, such as {DEFAULT_CELL_SIZE}");
@@ -233,12 +304,13 @@ impl PackedStand {
         if u32::try_from(stand.trees.len()).is_err() {
             return Err(ScatterError::TooManyTrees { count: stand.trees.len() as f64, limit: u32::MAX });
         }
+        let grid = CellGrid::around(stand, cell_size)?;
         let pack = |(place, tree): (usize, &Tree)| {
             if usize::from(tree.variant) >= bounds.len() {
                 return Err(ScatterError::UnknownVariant { tree: place, variant: tree.variant, count: bounds.len() });
             }
-            let packed = PackedTree::pack(tree, place, cell_size)?;
-            let (ix, iz) = packed.cell_index();
+            let packed = PackedTree::pack(tree, place, &grid)?;
+            let (ix, iz) = packed.cell_index(&grid);
             Ok((u64::from(morton(ix, iz)) << 32 | place as u64, packed))
         };
         let packed: Result<Vec<(u64, PackedTree)>, _> = stand.trees.par_iter().enumerate().map(pack).collect();
@@ -255,12 +327,12 @@ impl PackedStand {
 
         let mut starts = Vec::new();
         let mut first = 0;
-        for group in trees.chunk_by(|a, b| a.cell == b.cell) {
+        for group in trees.chunk_by(|a, b| a.cell_index(&grid) == b.cell_index(&grid)) {
             starts.push((first, group));
             first += group.len() as u32;
         }
-        let cells = starts.par_iter().map(|&(first, group)| cell(first, group, cell_size, bounds)).collect();
-        Ok(Self { trees, indices, cells, cell_size })
+        let cells = starts.par_iter().map(|&(first, group)| cell(first, group, &grid, bounds)).collect();
+        Ok(Self { trees, indices, cells, grid })
     }
 }
 
@@ -280,10 +352,10 @@ pub(super) fn check_bounds(bounds: &[PlantSize]) -> Result<(), ScatterError> {
 }
 
 /// The cell of `group`, which is not empty. Boxes hold the trees as they are drawn, after rounding.
-fn cell(first: u32, group: &[PackedTree], cell_size: f64, bounds: &[PlantSize]) -> Cell {
+fn cell(first: u32, group: &[PackedTree], grid: &CellGrid, bounds: &[PlantSize]) -> Cell {
     let (mut min, mut max, mut max_scale) = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0f32);
     for tree in group {
-        let foot = tree.position(cell_size);
+        let foot = tree.position(grid);
         let scale = f64::from(tree.scale());
         let bound = bounds[usize::from(tree.variant())];
         let (radius, height) = (f64::from(bound.radius) * scale, f64::from(bound.height) * scale);
@@ -291,13 +363,13 @@ fn cell(first: u32, group: &[PackedTree], cell_size: f64, bounds: &[PlantSize]) 
         max = max.max(foot + DVec3::new(radius, height, radius));
         max_scale = max_scale.max(tree.scale());
     }
-    let (ix, iz) = group[0].cell_index();
+    let (ix, iz) = group[0].cell_index(grid);
     Cell { ix, iz, first, count: group.len() as u32, min, max, max_scale }
 }
 
 /// The bits of both coordinates, counted from -32768, in turn.
-fn morton(ix: i16, iz: i16) -> u32 {
-    let spread = |value: i16| {
+fn morton(ix: i32, iz: i32) -> u32 {
+    let spread = |value: i32| {
         let mut bits = u32::from(value as u16 ^ 0x8000);
         bits = (bits | bits << 8) & 0x00FF_00FF;
         bits = (bits | bits << 4) & 0x0F0F_0F0F;

@@ -17,7 +17,7 @@ use crate::support::{
     stage::{BROADLEAF, PLACE, build, grove, instant, project, quality, trees_at, view},
 };
 
-fn over_the_grove(stage: &Stage) -> Viewpoint {
+pub fn over_the_grove(stage: &Stage) -> Viewpoint {
     view(stage, (-20.0, 7.0, 62.0), 14.0, -3.0)
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bevy::{
     asset::RenderAssetUsages,
-    camera::RenderTarget,
+    camera::{RenderTarget, visibility::RenderLayers},
     core_pipeline::prepass::MotionVectorPrepass,
     prelude::*,
     render::{RenderApp, render_resource::TextureFormat, view::Msaa},
@@ -13,7 +13,7 @@ use canopy::{
     app::{Picture, Renderer},
     assets::Stage,
     bake::{
-        BakeSettings, BakedPlant, bake_plant,
+        BakeSettings, BakedLevel, BakedPlant, bake_plant,
         levels::cross::CrossSettings,
         lighting::{LightingSettings, implicit::ImplicitSettings},
     },
@@ -28,7 +28,7 @@ use glam::{DVec2, DVec3};
 use super::{NOON, SIZE, again, draw, showing};
 use crate::support::{
     gpu::gpu,
-    image::{keep, luminance, mean_color},
+    image::{difference, keep, linear, luminance, mean_color},
     stage::{Built, PLACE, build, grove, instant, project, quality, trees_at, view},
 };
 
@@ -190,7 +190,8 @@ fn another_light_is_drawn_as_if_it_had_always_been_there() {
     };
     let lit = |plant: &BakedPlant| {
         let (baked, _) = bake_plant(plant.plant.clone(), &settings, None);
-        BakedPlant { lighting: baked.lighting, cross: baked.cross, ..plant.clone() }
+        let cross = baked.cross().expect("a cross").clone();
+        BakedPlant { lighting: baked.lighting, ..plant.clone() }.with_level(BakedLevel::Cross(cross))
     };
     let plants = Arc::new(stage.plants.iter().map(lit).collect::<Vec<_>>());
 
@@ -260,4 +261,100 @@ fn motion_vectors_are_refused() {
     let first = &picture.pixels[..3];
     let plain = |pixel: &[u8]| pixel.iter().zip(first).all(|(a, b)| a.abs_diff(*b) <= 3);
     assert!(picture.pixels.chunks(3).all(plain), "something was drawn");
+}
+
+/// The grove's trees alone, with `place` on the forest's entity.
+fn placed(stage: &Stage, place: impl Bundle) -> Picture {
+    let mut renderer = super::renderer(1);
+    renderer.set_instant(stage, instant(NOON));
+    renderer.set_view(&super::pictures::over_the_grove(stage));
+    let forest = stage.forest().expect("a forest");
+    renderer.app().world_mut().spawn((forest, place));
+    again(&mut renderer)
+}
+
+#[test]
+fn transform_visibility_and_render_layers_of_a_forest_take_effect() {
+    let _gpu = gpu();
+    let built = grove(1);
+    let stage = &built.stage;
+    let plain = placed(stage, ());
+    let bare = placed(stage, Visibility::Hidden);
+    assert!(plain.pixels != bare.pixels, "a control: trees are seen");
+    assert_eq!(placed(stage, RenderLayers::layer(3)).pixels, bare.pixels);
+    // Moved there by its origin and back by its transform, a forest stands where it did.
+    let away = DVec3::new(64.0, 0.0, -128.0);
+    let moved = Forest { origin: away, ..stage.forest().expect("a forest") };
+    let mut renderer = super::renderer(1);
+    renderer.set_instant(stage, instant(NOON));
+    renderer.set_view(&super::pictures::over_the_grove(stage));
+    renderer.app().world_mut().spawn((moved, Transform::from_translation(-away.as_vec3())));
+    assert_eq!(again(&mut renderer).pixels, plain.pixels);
+}
+
+#[test]
+fn a_scene_moves_with_its_ground() {
+    let _gpu = gpu();
+    let built = grove(1);
+    let stage = &built.stage;
+    // The ground's noise repeats after 1,024 m, so that the picture is the same there.
+    let seen = |offset: DVec3| {
+        let mut renderer = super::renderer(1);
+        renderer.set_instant(stage, instant(NOON));
+        let view = super::pictures::over_the_grove(stage);
+        renderer.set_view(&Viewpoint { position: view.position + offset, ..view });
+        let place = Transform::from_translation(offset.as_vec3());
+        renderer.app().world_mut().spawn((stage.forest().expect("a forest"), place));
+        renderer.app().world_mut().spawn((stage.ground(), place));
+        // The cascades' grid lies in the scene: where it falls, shadows differ by parts of a texel.
+        renderer.set_shadow(SunShadowSettings { cascades: 0, ..stage.shadow() });
+        again(&mut renderer)
+    };
+    let (here, there) = (seen(DVec3::ZERO), seen(DVec3::new(2048.0, 0.0, -1024.0)));
+    keep(&there, "moved-scene");
+    let error = difference(&there, &here);
+    assert!(error < 0.005, "{error}");
+}
+
+#[test]
+fn an_ordinary_mesh_receives_the_shadow_of_trees() {
+    let gpu = gpu();
+    let built = trees_at(&[DVec2::ZERO], 1);
+    let stage = &built.stage;
+    // A white plate over the ground, seen from straight above beside the tree.
+    let plate = |renderer: &mut Renderer| {
+        let world = renderer.app().world_mut();
+        let mesh = world.resource_mut::<Assets<Mesh>>().add(Plane3d::default().mesh().size(60.0, 60.0).build());
+        let white = world.resource_mut::<Assets<StandardMaterial>>().add(Color::WHITE);
+        let height = stage.terrain.height(0.0, 0.0) as f32 + 0.5;
+        world.spawn((Mesh3d(mesh), MeshMaterial3d(white), Transform::from_xyz(0.0, height, 0.0)));
+    };
+    let seen = |trees: bool, maps: bool| {
+        let mut renderer = super::renderer(1);
+        renderer.set_instant(stage, instant(NOON));
+        renderer.set_view(&view(stage, (0.0, 45.0, 0.0), 0.0, -90.0));
+        renderer.set_shadow(stage.shadow());
+        if trees {
+            renderer.app().world_mut().spawn(stage.forest().expect("a forest"));
+        }
+        plate(&mut renderer);
+        let world = renderer.app().world_mut();
+        for mut light in world.query::<&mut DirectionalLight>().iter_mut(world) {
+            light.shadow_maps_enabled = maps;
+        }
+        again(&mut renderer)
+    };
+    let (shaded, open) = (seen(true, true), seen(true, false));
+    keep(&shaded, "shaded-plate");
+    // Where the plate lies far from the tree both are alike; in the tree's shadow the plate is darker.
+    let darker = |a: &Picture, b: &Picture| {
+        let dark = |(a, b): (&[u8], &[u8])| luminance(linear(a)) < 0.7 * luminance(linear(b));
+        a.pixels.chunks(3).zip(b.pixels.chunks(3)).filter(|(a, b)| dark((a, b))).count()
+    };
+    let in_shadow = darker(&shaded, &open);
+    assert!(in_shadow > 40, "{in_shadow} pixels in the tree's shadow");
+    assert!(in_shadow < (SIZE.0 * SIZE.1 / 4) as usize, "{in_shadow} pixels are more than a tree shades");
+    // Controls: without a tree nothing is shaded, and nothing is where the light has no maps.
+    assert_eq!(darker(&seen(false, true), &seen(false, false)), 0);
+    assert_eq!(gpu.messages(), Vec::<String>::new());
 }

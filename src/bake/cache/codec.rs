@@ -11,20 +11,21 @@
 //!       84        payload: lighting, list of levels
 //! ```
 //!
-//! A new level of detail is a new variant of `Level`, at the end.
+//! A new level of detail is a new variant of [`BakedLevel`], at the end.
 
 use std::borrow::Cow;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use super::CacheKey;
 use crate::bake::baked::BakedPlant;
-use crate::bake::levels::cross::Cross;
+use crate::bake::levels::{BAKED, BakedLevel};
 use crate::bake::lighting::BakedLighting;
-use crate::plant::{Plant, PlantMesh};
+use crate::plant::Plant;
 
 /// Version of the format *and* of the bakes: to be raised whenever either gives other bytes for the same input.
-pub(super) const VERSION: u32 = 11;
+pub(super) const VERSION: u32 = 12;
 
 const MAGIC: [u8; 8] = *b"CANOPYBK";
 const HEAD: usize = 52;
@@ -34,24 +35,12 @@ const PAYLOAD: usize = HEAD + 32;
 #[derive(Serialize, Deserialize)]
 struct Payload<'a> {
     lighting: Cow<'a, BakedLighting>,
-    levels: Vec<Level<'a>>,
-}
-
-/// What is kept of one level of detail.
-#[derive(Serialize, Deserialize)]
-enum Level<'a> {
-    /// Its model, which casts the near shadow.
-    ShadowProxy(Cow<'a, [PlantMesh]>),
-    /// Its crossed billboards.
-    Cross(Cow<'a, Cross>),
+    levels: Cow<'a, [BakedLevel]>,
 }
 
 /// The file of a baked plant; the plant itself is not in it. `None` where the payload cannot be written as bytes.
 pub(super) fn encode(baked: &BakedPlant, key: &[u8; 32]) -> Option<Vec<u8>> {
-    let payload = Payload {
-        lighting: Cow::Borrowed(&baked.lighting),
-        levels: vec![Level::ShadowProxy(Cow::Borrowed(&baked.shadow_proxy)), Level::Cross(Cow::Borrowed(&baked.cross))],
-    };
+    let payload = Payload { lighting: Cow::Borrowed(&baked.lighting), levels: Cow::Borrowed(&baked.levels) };
     postcard::to_stdvec(&payload).ok().map(|payload| sealed(&payload, key))
 }
 
@@ -69,12 +58,12 @@ fn sealed(payload: &[u8], key: &[u8; 32]) -> Vec<u8> {
 }
 
 /// Reads a file that should hold `plant` baked under `key`. `None` where anything at all is not as it must be.
-pub(super) fn decode(file: &[u8], key: &[u8; 32], plant: &Arc<Plant>) -> Option<BakedPlant> {
+pub(super) fn decode(file: &[u8], key: &CacheKey, plant: &Arc<Plant>) -> Option<BakedPlant> {
     let (head, rest) = file.split_at_checked(HEAD)?;
     let (sum, payload) = rest.split_at_checked(PAYLOAD - HEAD)?;
     let agrees = head[..8] == MAGIC
         && head[8..12] == VERSION.to_le_bytes()
-        && head[12..44] == *key
+        && head[12..44] == key.hash
         && head[44..] == (payload.len() as u64).to_le_bytes()
         && *sum == checksum(head, payload);
     if !agrees {
@@ -85,27 +74,15 @@ pub(super) fn decode(file: &[u8], key: &[u8; 32], plant: &Arc<Plant>) -> Option<
     if !rest.is_empty() || !lighting.fits(plant) {
         return None;
     }
-    let (mut shadow_proxy, mut cross) = (None, None);
-    for level in levels {
-        // A file that has a level twice was not written here.
-        let first = match level {
-            Level::ShadowProxy(meshes) => shadow_proxy.replace(meshes.into_owned()).is_none(),
-            Level::Cross(made) => cross.replace(made.into_owned()).is_none(),
-        };
-        if !first {
-            return None;
-        }
+    // A file that lacks a level, or has one twice, was not written here.
+    let has = |representation| levels.iter().filter(|level| level.representation() == representation).count();
+    let wanted = |representation| usize::from(key.representations.contains(&representation));
+    if BAKED.iter().any(|&representation| has(representation) != wanted(representation)) {
+        return None;
     }
-    let of_transfer = matches!(lighting, BakedLighting::Transfer(_));
-    let cross = cross.filter(|cross| cross.is_whole(of_transfer))?;
-    let fits = |meshes: &Vec<PlantMesh>| meshes.len() == plant.parts.len() && meshes.iter().all(PlantMesh::is_whole);
-    let shadow_proxy = shadow_proxy.filter(fits)?;
-    Some(BakedPlant {
-        plant: Arc::clone(plant),
-        lighting: Arc::new(lighting),
-        shadow_proxy: Arc::new(shadow_proxy),
-        cross: Arc::new(cross),
-    })
+    let levels = levels.into_owned();
+    let fits = levels.iter().all(|level| level.fits(plant, &lighting));
+    fits.then(|| BakedPlant { plant: Arc::clone(plant), lighting: Arc::new(lighting), levels })
 }
 
 fn checksum(head: &[u8], payload: &[u8]) -> [u8; 32] {
@@ -117,13 +94,14 @@ mod tests {
     use glam::{Vec2, Vec3};
 
     use super::*;
-    use crate::bake::levels::cross::{CrossPlane, CrossTextures};
+    use crate::bake::levels::cross::{Cross, CrossPlane, CrossTextures};
     use crate::bake::lighting::ExpressiveLighting;
     use crate::bake::lighting::TransferLighting;
     use crate::bake::lighting::implicit::NoSurface;
     use crate::bake::lighting::transfer::{TransferBake, TransferFormat, TransferPart, TransferSettings};
+    use crate::lod::Representation;
     use crate::math::MipChain;
-    use crate::plant::{PartKind, PlantMaterial, PlantPart};
+    use crate::plant::{PartKind, PlantMaterial, PlantMesh, PlantPart};
 
     fn small() -> BakedPlant {
         let mesh = PlantMesh {
@@ -142,17 +120,19 @@ mod tests {
                 ambient: vec![vec![0.0, 0.5, 1.0]],
                 no_surface: Some(NoSurface::Threshold { threshold: 2.0, greatest: 1.5 }),
             })),
-            shadow_proxy: Arc::new(vec![mesh]),
-            cross: Arc::new(Cross {
-                planes: vec![plane],
-                textures: CrossTextures { color: vec![chain.clone()], properties: vec![chain], light: Vec::new() },
-                transmission: Vec3::new(0.1, 0.2, 0.3),
-                spread: [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 1.0],
-            }),
+            levels: vec![
+                BakedLevel::ShadowProxy(Arc::new(vec![mesh])),
+                BakedLevel::Cross(Arc::new(Cross {
+                    planes: vec![plane],
+                    textures: CrossTextures { color: vec![chain.clone()], properties: vec![chain], light: Vec::new() },
+                    transmission: Vec3::new(0.1, 0.2, 0.3),
+                    spread: [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 1.0],
+                })),
+            ],
         }
     }
 
-    const KEY: [u8; 32] = [7; 32];
+    const KEY: CacheKey = CacheKey { hash: [7; 32], representations: BAKED };
 
     /// The same with radiance transfer.
     fn transferred() -> BakedPlant {
@@ -161,9 +141,9 @@ mod tests {
         let side: Vec<f32> = (0..3 * settings.coefficients()).map(|i| 0.2 - 0.001 * i as f32).collect();
         let part = TransferPart { front: side.clone(), back: side, scattered: vec![0.1; 12] };
         let packed = TransferBake { settings, parts: vec![part] }.pack(TransferFormat::Snorm8);
-        let mut cross = (*baked.cross).clone();
+        let mut cross = (**baked.cross().unwrap()).clone();
         cross.textures.light = cross.textures.color.clone();
-        baked.cross = Arc::new(cross);
+        baked.set_level(BakedLevel::Cross(Arc::new(cross)));
         baked.lighting = Arc::new(BakedLighting::Transfer(TransferLighting::new(packed)));
         baked
     }
@@ -175,7 +155,7 @@ mod tests {
     }
 
     fn written(baked: &BakedPlant) -> Vec<u8> {
-        encode(baked, &KEY).unwrap()
+        encode(baked, &KEY.hash).unwrap()
     }
 
     #[test]
@@ -183,8 +163,7 @@ mod tests {
         for baked in all() {
             let read = decode(&written(&baked), &KEY, &baked.plant).unwrap();
             assert_eq!(read.lighting, baked.lighting);
-            assert_eq!(read.shadow_proxy, baked.shadow_proxy);
-            assert_eq!(read.cross, baked.cross);
+            assert_eq!(read.levels, baked.levels);
         }
     }
 
@@ -203,7 +182,7 @@ mod tests {
             changed[at] ^= 0x10;
             assert!(decode(&changed, &KEY, &baked.plant).is_none(), "changed at {at}");
         }
-        assert!(decode(&file, &[8; 32], &baked.plant).is_none(), "another key");
+        assert!(decode(&file, &CacheKey { hash: [8; 32], ..KEY }, &baked.plant).is_none(), "another key");
     }
 
     /// A payload that was damaged before its checksum was made must not panic or ask for absurd memory either.
@@ -212,16 +191,17 @@ mod tests {
         for baked in all() {
             let file = written(&baked);
             let payload = &file[PAYLOAD..];
-            assert!(decode(&sealed(payload, &KEY), &KEY, &baked.plant).is_some());
+            assert!(decode(&sealed(payload, &KEY.hash), &KEY, &baked.plant).is_some());
             for at in 0..payload.len() {
-                assert!(decode(&sealed(&payload[..at], &KEY), &KEY, &baked.plant).is_none());
+                assert!(decode(&sealed(&payload[..at], &KEY.hash), &KEY, &baked.plant).is_none());
                 for wrong in [0xff, 0x80, 0x00] {
                     let mut changed = payload.to_vec();
                     changed[at] = wrong;
-                    if let Some(read) = decode(&sealed(&changed, &KEY), &KEY, &baked.plant) {
+                    if let Some(read) = decode(&sealed(&changed, &KEY.hash), &KEY, &baked.plant) {
                         assert!(read.lighting.ambient(0).iter().all(|k| k.is_finite()));
-                        assert!(read.shadow_proxy.iter().all(PlantMesh::is_whole));
-                        assert!(read.cross.is_whole(matches!(*read.lighting, BakedLighting::Transfer(_))));
+                        assert!(read.shadow_proxy().unwrap().iter().all(PlantMesh::is_whole));
+                        let of_transfer = matches!(*read.lighting, BakedLighting::Transfer(_));
+                        assert!(read.cross().unwrap().is_whole(of_transfer));
                     }
                 }
             }
@@ -231,16 +211,19 @@ mod tests {
     #[test]
     fn a_level_twice_or_missing_counts_as_a_damaged_file() {
         let baked = small();
-        let file = |levels: Vec<Level>| {
-            let payload = Payload { lighting: Cow::Borrowed(&baked.lighting), levels };
-            sealed(&postcard::to_stdvec(&payload).unwrap(), &KEY)
+        let file = |levels: Vec<BakedLevel>| {
+            let payload = Payload { lighting: Cow::Borrowed(&baked.lighting), levels: Cow::Owned(levels) };
+            sealed(&postcard::to_stdvec(&payload).unwrap(), &KEY.hash)
         };
-        let cross = || Level::Cross(Cow::Borrowed(&baked.cross));
-        let proxy = || Level::ShadowProxy(Cow::Borrowed(&baked.shadow_proxy));
+        let (proxy, cross) = (|| baked.levels[0].clone(), || baked.levels[1].clone());
         assert!(decode(&file(vec![cross(), proxy()]), &KEY, &baked.plant).is_some(), "in any order");
         for levels in [vec![], vec![cross()], vec![proxy()], vec![proxy(), cross(), proxy()]] {
             assert!(decode(&file(levels), &KEY, &baked.plant).is_none());
         }
+        // What is not asked for need not be there, and must not.
+        let crosses_alone = CacheKey { representations: &[Representation::CROSS], ..KEY };
+        assert!(decode(&file(vec![cross()]), &crosses_alone, &baked.plant).is_some());
+        assert!(decode(&file(vec![cross(), proxy()]), &crosses_alone, &baked.plant).is_none());
     }
 
     #[test]

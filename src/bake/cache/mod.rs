@@ -18,11 +18,16 @@ use std::sync::Arc;
 use super::baked::{BakeSettings, BakedPlant};
 use super::error::BakeError;
 use crate::files;
+use crate::lod::Representation;
 use crate::plant::Plant;
 
 /// What identifies a baked plant: a hash of all inputs of the bake.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct CacheKey([u8; 32]);
+pub struct CacheKey {
+    hash: [u8; 32],
+    /// The representations that it is baked for.
+    representations: &'static [Representation],
+}
 
 impl CacheKey {
     /// Hashes everything that a bake of `plant` with `settings` reads. Neither the plant's name nor its normal
@@ -32,16 +37,17 @@ impl CacheKey {
         hasher.update(&codec::VERSION.to_le_bytes());
         // Every field, every number to its last bit: no setting can be forgotten here. Numbers and enums can always be
         // written; if that ever changes, the key still tells settings apart.
+        let representations = settings.representations;
         let settings = postcard::to_stdvec(settings).unwrap_or_else(|_| format!("{settings:?}").into_bytes());
         hasher.update(&(settings.len() as u64).to_le_bytes());
         hasher.update(&settings);
         plant.feed_baked_content(&mut hasher);
-        Self(*hasher.finalize().as_bytes())
+        Self { hash: *hasher.finalize().as_bytes(), representations }
     }
 
     /// The key as 64 hexadecimal digits.
     pub fn to_hex(self) -> String {
-        blake3::Hash::from_bytes(self.0).to_hex().to_string()
+        blake3::Hash::from_bytes(self.hash).to_hex().to_string()
     }
 }
 
@@ -78,7 +84,7 @@ impl Cache {
     /// this version.
     pub fn load(&self, key: &CacheKey, plant: &Arc<Plant>) -> Option<BakedPlant> {
         let bytes = std::fs::read(self.file(key)).ok()?;
-        codec::decode(&bytes, &key.0, plant)
+        codec::decode(&bytes, key, plant)
     }
 
     /// Stores a baked plant under `key`.
@@ -91,7 +97,7 @@ impl Cache {
             .map_err(|source| BakeError::CacheFolder { path: self.folder.clone(), source })?;
         let write = || {
             let bytes =
-                codec::encode(baked, &key.0).ok_or_else(|| io::Error::other("it cannot be written as bytes"))?;
+                codec::encode(baked, &key.hash).ok_or_else(|| io::Error::other("it cannot be written as bytes"))?;
             files::write_whole(&path, |writer| writer.write_all(&bytes))
         };
         write().map_err(|source| BakeError::CacheWrite { path: path.clone(), source })
@@ -133,7 +139,7 @@ mod tests {
             change(&mut settings);
             BakeSettings { lighting: LightingSettings::Expressive(settings), ..base }
         };
-        let mut changed = [base; 9];
+        let mut changed = [base; 10];
         changed[0].lighting = LightingSettings::Local;
         changed[1] = expressive(&|settings| settings.radius = Some(0.1));
         changed[2] = expressive(&|settings| settings.radius = Some(0.1f32.next_up()));
@@ -143,10 +149,11 @@ mod tests {
         changed[6].cross.supersampling = 2;
         changed[7].cross.normal_smoothing = 0.01;
         changed[8].shadow_share = 0.5;
+        changed[9].representations = &[Representation::MODEL];
         let mut keys: Vec<String> =
             changed.iter().chain([&base]).map(|settings| CacheKey::new(&plant, settings).to_hex()).collect();
         keys.sort();
         keys.dedup();
-        assert_eq!(keys.len(), 10);
+        assert_eq!(keys.len(), 11);
     }
 }

@@ -1,11 +1,118 @@
-//! What a plant is drawn as, apart from its full model.
+//! What a plant is drawn as, apart from its full model: one module a representation, and the list of them.
 //!
 //! | module | makes | after |
 //! |---|---|---|
 //! | [`cross`] | crossed billboards with colour, normal, k_a | [Franzke 2005, 4.3] |
 //! | [`shadow_proxy`] | a lighter model with the same projected area | [Cook et al. 2007] |
 //! | [`rasterize`] | which triangle each sample of a picture sees: what both need | |
+//!
+//! A bake for another representation is a module here, a variant of [`BakedLevel`] (at the end: the cache counts them), and
+//! a line in the list of bakers.
 
 pub mod cross;
 pub mod rasterize;
 pub mod shadow_proxy;
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use self::cross::Cross;
+use super::{BakeSettings, lighting::BakedLighting};
+use crate::lod::Representation;
+use crate::plant::{Plant, PlantMesh};
+
+/// What is baked of a plant for one representation. Who draws plants sees by the pointers what of one has changed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum BakedLevel {
+    /// For [`Representation::MODEL`], a lighter model (parts in the plant's order) with the same projected area, which casts
+    /// the near shadow.
+    ShadowProxy(#[serde(with = "shared")] Arc<Vec<PlantMesh>>),
+    /// For [`Representation::CROSS`], crossed billboards.
+    Cross(#[serde(with = "shared")] Arc<Cross>),
+}
+
+impl BakedLevel {
+    /// The representation that it is for.
+    pub fn representation(&self) -> Representation {
+        match self {
+            Self::ShadowProxy(_) => Representation::MODEL,
+            Self::Cross(_) => Representation::CROSS,
+        }
+    }
+
+    /// Whether it can be one of `plant` under `lighting`, and all of its values are in their ranges.
+    pub fn fits(&self, plant: &Plant, lighting: &BakedLighting) -> bool {
+        match self {
+            Self::ShadowProxy(meshes) => meshes.len() == plant.parts.len() && meshes.iter().all(PlantMesh::is_whole),
+            Self::Cross(cross) => cross.is_whole(matches!(lighting, BakedLighting::Transfer(_))),
+        }
+    }
+}
+
+/// Shared content is written as what is shared.
+mod shared {
+    use std::sync::Arc;
+
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub fn serialize<T: Serialize, S: Serializer>(value: &Arc<T>, serializer: S) -> Result<S::Ok, S::Error> {
+        value.as_ref().serialize(serializer)
+    }
+
+    pub fn deserialize<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -> Result<Arc<T>, D::Error> {
+        T::deserialize(deserializer).map(Arc::new)
+    }
+}
+
+type Bake = fn(&Plant, &BakedLighting, &BakeSettings) -> BakedLevel;
+
+/// The representations that need a bake, and what bakes them.
+const BAKERS: [(Representation, Bake); 2] =
+    [(Representation::MODEL, bake_proxy), (Representation::CROSS, bake_crosses)];
+
+/// The representations that [`bake_levels`] knows.
+pub const BAKED: &[Representation] = &{
+    let mut all = [BAKERS[0].0; BAKERS.len()];
+    let mut index = 1;
+    while index < all.len() {
+        all[index] = BAKERS[index].0;
+        index += 1;
+    }
+    all
+};
+
+/// Bakes `plant` under `lighting` for the representations that `settings` list; one that needs no bake is passed over.
+pub fn bake_levels(plant: &Plant, lighting: &BakedLighting, settings: &BakeSettings) -> Vec<BakedLevel> {
+    let listed = |(representation, _): &&(Representation, Bake)| settings.representations.contains(representation);
+    BAKERS.iter().filter(listed).map(|(_, bake)| bake(plant, lighting, settings)).collect()
+}
+
+fn bake_proxy(plant: &Plant, _: &BakedLighting, settings: &BakeSettings) -> BakedLevel {
+    let triangles: usize = plant.parts.iter().map(|part| part.mesh.triangles.len()).sum();
+    let target = (triangles as f64 * f64::from(settings.shadow_share)).round() as usize;
+    BakedLevel::ShadowProxy(Arc::new(shadow_proxy::shadow_proxy(plant, target)))
+}
+
+fn bake_crosses(plant: &Plant, lighting: &BakedLighting, settings: &BakeSettings) -> BakedLevel {
+    BakedLevel::Cross(Arc::new(cross::bake_cross(plant, lighting, &settings.cross)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_baker_makes_the_level_of_its_representation() {
+        let (plant, settings) = (Plant::default(), BakeSettings::default());
+        let made = bake_levels(&plant, &BakedLighting::Local, &settings);
+        let names: Vec<_> = made.iter().map(BakedLevel::representation).collect();
+        assert_eq!(names, BAKERS.map(|(representation, _)| representation));
+        assert_eq!(names, BAKED);
+        assert!(made.iter().all(|level| level.fits(&plant, &BakedLighting::Local)));
+        const LIST: &[Representation] = &[Representation::CROSS, Representation::named("box")];
+        let one = BakeSettings { representations: LIST, ..settings };
+        let made = bake_levels(&plant, &BakedLighting::Local, &one);
+        assert_eq!(made.iter().map(BakedLevel::representation).collect::<Vec<_>>(), [Representation::CROSS]);
+    }
+}

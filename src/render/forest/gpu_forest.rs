@@ -1,6 +1,6 @@
 //! A forest on the device: made when the entity appears or changes, dropped when it is gone.
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use bevy::{
     ecs::{
@@ -72,6 +72,30 @@ impl GpuForest {
     /// The baked plants, by variant.
     pub fn plants(&self) -> &[BakedPlant] {
         &self.plants
+    }
+
+    /// Distances in metres from the middle of a shadow map at which each level casts into a map of `texel` metres a texel;
+    /// `near` are those of the first one.
+    ///
+    /// A tree casts in the first level whose range holds it: in the one in which the view shows it, but for levels that are
+    /// too fine for the map, in whose place the farthest one casts.
+    pub fn casting_distances(&self, near: Range<f64>, texel: f64) -> Vec<Range<f64>> {
+        let levels = &self.forest.levels;
+        let mut casting = vec![0.0..0.0; levels.len()];
+        let mut ends = near.end;
+        for (index, level) in self.levels() {
+            let start = if index == 0 { near.start } else { near.start.max(ends) };
+            ends =
+                if index == 0 { ends } else { levels.fade_out(index).map_or(ends, |fade| ends.max(fade.end.into())) };
+            if level.renderer.coarsest_shadow_texel().is_some_and(|coarsest| texel < coarsest) {
+                casting[index] = start..ends;
+            }
+        }
+        if let Some((last, _)) = self.levels().rev().find(|(_, level)| level.renderer.coarsest_shadow_texel().is_some())
+        {
+            casting[last] = 0.0..f64::INFINITY;
+        }
+        casting
     }
 
     fn new(forest: &Forest, generation: u64, known: &Representations, upload: &mut ForestUpload) -> Self {

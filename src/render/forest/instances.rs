@@ -26,10 +26,11 @@ pub struct LevelLook {
 pub fn forest_view(forest: &GpuForest, anchor: DVec3, level: Option<LevelLook>) -> ForestViewUniform {
     let look = level.unwrap_or_default();
     let local = anchor - forest.forest.origin;
-    let size = forest.forest.stand.cell_size;
+    let grid = forest.forest.stand.grid;
+    let size = grid.size;
     let cell = (local / size).floor();
     ForestViewUniform {
-        anchor_cell: IVec2::new(cell.x as i32, cell.z as i32).to_array(),
+        anchor_cell: IVec2::new(cell.x as i32, cell.z as i32).saturating_sub(grid.base).to_array(),
         anchor_offset: [(local.x - cell.x * size) as f32, (local.z - cell.z * size) as f32],
         anchor_y: local.y as f32,
         cell_size: size as f32,

@@ -4,8 +4,9 @@
 //! From [Franzke 2005] 4.3 (billboards, blending by alpha test). A tree costs 16 bytes of instance data. What is drawn is
 //! decided by [`cull`](crate::cull) before the frame; how it is drawn, by the [`representation`] of each level.
 //!
-//! Limits: at most 64 variants a forest; no motion vectors; one camera.
+//! Limits: at most 1,024 variants a forest, and as many with crosses as a texture array has room for, three layers each; no motion vectors; one camera.
 
+mod draw;
 mod gpu_forest;
 mod instance_layout;
 mod instances;
@@ -32,13 +33,16 @@ use super::{
     sets::{CanopyPasses, CanopyRenderSystems},
     shaders::CanopyShaders,
 };
+pub use draw::draw_levels;
 pub use gpu_forest::{ForestLevel, GpuForest, GpuForests};
 pub use instance_layout::instance_layout;
 pub use instances::{forest_view, instance_bind_group};
 pub use lists::{ForestStatistics, LevelStatistics};
 pub use pipelines::LevelPipelines;
 pub use representation::Representations;
-pub use uniforms::{ForestViewUniform, PartUniform, PlaneUniform, TransferUniform, VariantUniform};
+pub use uniforms::{
+    CrossVariantUniform, ForestViewUniform, PartUniform, PlaneUniform, TransferUniform, VariantUniform,
+};
 pub use vertex::PlantVertex;
 
 /// Draws [`Forest`](super::components::Forest)s.

@@ -12,6 +12,7 @@ use bevy::{
 };
 
 use super::{
+    draw::draw_levels,
     gpu_forest::GpuForests,
     lists::{PreparedForest, PreparedForests},
     pipelines::LevelPipelines,
@@ -54,14 +55,9 @@ pub fn forest_pass(
     pass.set_bind_group(0, group, &[]);
     for (entity, forest) in forests.iter() {
         let Some(lists) = prepared.get(entity) else { continue };
-        for (index, level) in forest.levels().filter(|(index, _)| lists.lists.count(*index) > 0) {
-            pass.set_bind_group(1, &lists.bind_group, &[PreparedForest::offset(index)]);
-            for features in level.gpu.features(level_target) {
-                let Some(pipeline) = pipelines.get(&*level.renderer, features, level_target, &cache) else { continue };
-                pass.set_render_pipeline(pipeline);
-                level.gpu.draw(&mut pass, features, level_target, lists.lists.ranges(index));
-            }
-        }
+        draw_levels(&mut pass, forest, &lists.lists, level_target, &pipelines, &cache, |pass, level| {
+            pass.set_bind_group(1, &lists.bind_group, &[PreparedForest::offset(level)]);
+        });
     }
     span.end(&mut pass);
 }

@@ -55,7 +55,7 @@ pub fn prepare_pipelines(
     mut pipelines: ResMut<LevelPipelines>,
 ) {
     let Some(view) = &frame.view else { return };
-    let shadow = (scene.shadow.cascades > 0).then_some(LevelTarget::ShadowMap);
+    let shadow = (scene.shadow.cascades > 0 || scene.mesh_shadows).then_some(LevelTarget::ShadowMap);
     for target in [LevelTarget::View(view.attachment)].into_iter().chain(shadow) {
         for level in forests.levels() {
             for features in level.gpu.features(target) {

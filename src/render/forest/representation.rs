@@ -20,6 +20,7 @@ use bevy::{
     ecs::resource::Resource,
     log::warn,
     render::{
+        RenderApp,
         render_phase::TrackedRenderPass,
         render_resource::{BindGroupLayoutDescriptor, DepthStencilState, RenderPipelineDescriptor},
     },
@@ -158,15 +159,22 @@ impl Representations {
 
 /// Adds representations of a program's own.
 pub trait RegisterRepresentation {
-    /// Makes `renderer` known, before the app runs; the order to Canopy's plugins does not matter.
+    /// Makes `renderer` known. The order to Canopy's plugins does not matter. Forests that were uploaded before keep the
+    /// renderers that they found.
     fn register_representation(&mut self, renderer: impl LevelRenderer) -> &mut Self;
 }
 
 impl RegisterRepresentation for App {
     fn register_representation(&mut self, renderer: impl LevelRenderer) -> &mut Self {
         let name = renderer.representation().name();
-        let mut known = self.world_mut().get_resource_or_init::<Representations>();
-        if !known.add(Arc::new(renderer)) {
+        let renderer = Arc::new(renderer);
+        // Once the plugins are finished, the render world has the list.
+        let render_world = self.get_sub_app_mut(RenderApp).map(|render_app| render_app.world_mut());
+        let new = match render_world.and_then(|world| world.get_resource_mut::<Representations>()) {
+            Some(mut known) => known.add(renderer),
+            None => self.world_mut().get_resource_or_init::<Representations>().add(renderer),
+        };
+        if !new {
             warn!("a representation called `{name}` is registered already: the second one is not used");
         }
         self

@@ -23,7 +23,7 @@ use crate::{
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct ForestViewUniform {
-    /// Cell of the anchor.
+    /// Cell of the anchor, counted from the base of the stand's grid.
     pub anchor_cell: [i32; 2],
     /// Metres of the anchor inside its cell.
     pub anchor_offset: [f32; 2],
@@ -41,7 +41,7 @@ pub struct ForestViewUniform {
     pub tint: [f32; 4],
 }
 
-/// `Plane` of `shaders/forest/instance.wgsl`.
+/// `Plane` of `shaders/forest/cross_variant.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct PlaneUniform {
@@ -66,22 +66,12 @@ pub const CROSS_CASTER_VERTICES: u32 = 12;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct VariantUniform {
-    /// Two upright planes and a level one.
-    pub planes: [PlaneUniform; PLANES],
     /// Metres.
     pub height: f32,
     /// Metres.
     pub crown_radius: f32,
-    /// First layer of its textures.
-    pub first_layer: u32,
-    /// First layer of its lighting textures, where it has some.
-    pub first_light_layer: u32,
-    /// Factor for light through its leaves ([`PlantMaterial::transmission`]), in the mean.
-    pub transmission: [f32; 3],
     /// 1 where it is lit by radiance transfer: its ambient visibility is traced, and holds what leaves scatter.
     pub radiance_transfer: u32,
-    /// Fraction of a texel's leaf area with isotropic normals, mip by mip.
-    pub isotropic_fraction: [[f32; 4]; SPREAD_LEVELS / 4],
     /// Specular reflectance of its leaves.
     pub specular_reflectance: f32,
     /// Root mean square slope of their facets.
@@ -90,10 +80,10 @@ pub struct VariantUniform {
     pub realigned: f32,
     /// Indirect light of the key light in the mean over its leaves: the second band's component towards the zenith.
     pub indirect_sun_zenith: f32,
-    /// Its colour.
-    pub indirect_sun_color: [f32; 3],
     /// Its first coefficient.
     pub indirect_sun_mean: f32,
+    /// Its colour.
+    pub indirect_sun_color: [f32; 3],
     /// 1 where its ambient visibility is the ambient term of a density field, else 0.
     pub ambient_term: u32,
     /// Strength of the lobe of its gloss that carries a share of 1 ([`lobe_gain`]).
@@ -101,7 +91,25 @@ pub struct VariantUniform {
     /// Greatest strength of the lobe where nothing else reflects or transmits (one over [`lobe_peak`]).
     pub lobe_limit: f32,
     /// WGSL rounds the size up to 16 bytes.
-    pub padding: u32,
+    pub padding: [u32; 2],
+}
+
+/// `CrossVariant` of `shaders/forest/cross_variant.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct CrossVariantUniform {
+    /// Two upright planes and a level one.
+    pub planes: [PlaneUniform; PLANES],
+    /// Factor for light through its leaves ([`PlantMaterial::transmission`]), in the mean.
+    pub transmission: [f32; 3],
+    /// First layer of its textures.
+    pub first_layer: u32,
+    /// Fraction of a texel's leaf area with isotropic normals, mip by mip.
+    pub isotropic_fraction: [[f32; 4]; SPREAD_LEVELS / 4],
+    /// First layer of its lighting textures, where it has some.
+    pub first_light_layer: u32,
+    /// WGSL rounds the size up to 16 bytes.
+    pub padding: [u32; 3],
 }
 
 /// `Part` of `shaders/forest/model.wgsl`.
@@ -180,41 +188,16 @@ pub fn scattered_tint(leaves: &LeafColors) -> Vec3 {
 
 /// What the shaders know of each plant.
 pub fn variants(plants: &[BakedPlant], sizes: &[PlantSize]) -> Vec<VariantUniform> {
-    let mut light_layer = 0;
-    plants
-        .iter()
-        .zip(sizes)
-        .enumerate()
-        .map(|(index, (plant, size))| {
-            let variant = variant(index, plant, size, light_layer);
-            light_layer += plant.cross.textures.light.len();
-            variant
-        })
-        .collect()
+    plants.iter().zip(sizes).map(|(plant, size)| variant(plant, size)).collect()
 }
 
-/// `light_layer`: the first of its lighting textures, if it has any.
-fn variant(index: usize, plant: &BakedPlant, size: &PlantSize, light_layer: usize) -> VariantUniform {
-    let mut planes = [PlaneUniform::default(); PLANES];
-    for (slot, plane) in planes.iter_mut().zip(&plant.cross.planes) {
-        *slot = PlaneUniform {
-            center: plane.center.extend(0.0).to_array(),
-            u: plane.u.extend(0.0).to_array(),
-            v: plane.v.extend(0.0).to_array(),
-            normal: plane.normal.extend(0.0).to_array(),
-        };
-    }
+fn variant(plant: &BakedPlant, size: &PlantSize) -> VariantUniform {
     let gloss = plant.plant.leaf_gloss();
     let (mean, zenith) = plant.lighting.scattered();
     VariantUniform {
-        planes,
         height: size.height,
         crown_radius: size.radius,
-        first_layer: (index * PLANES) as u32,
-        first_light_layer: light_layer as u32,
-        transmission: plant.cross.transmission.to_array(),
         radiance_transfer: u32::from(matches!(*plant.lighting, BakedLighting::Transfer(_))),
-        isotropic_fraction: bytemuck::cast(plant.cross.spread),
         specular_reflectance: gloss.reflectance,
         roughness: gloss.roughness,
         realigned: realigned(&plant.lighting),
@@ -224,8 +207,36 @@ fn variant(index: usize, plant: &BakedPlant, size: &PlantSize, light_layer: usiz
         ambient_term: u32::from(plant.lighting.has_ambient_term()),
         lobe_gain: lobe_gain(gloss.roughness),
         lobe_limit: lobe_peak(gloss.roughness).recip(),
-        padding: 0,
+        padding: [0; 2],
     }
+}
+
+/// What the shaders know of the crosses of each plant; of a plant without one, planes without extent.
+pub fn cross_variants(plants: &[BakedPlant]) -> Vec<CrossVariantUniform> {
+    let mut first_light_layer = 0;
+    let mut variants = Vec::with_capacity(plants.len());
+    for (index, plant) in plants.iter().enumerate() {
+        let mut variant = CrossVariantUniform {
+            first_layer: (index * PLANES) as u32,
+            first_light_layer,
+            ..CrossVariantUniform::default()
+        };
+        if let Some(cross) = plant.cross() {
+            for (slot, plane) in variant.planes.iter_mut().zip(&cross.planes) {
+                *slot = PlaneUniform {
+                    center: plane.center.extend(0.0).to_array(),
+                    u: plane.u.extend(0.0).to_array(),
+                    v: plane.v.extend(0.0).to_array(),
+                    normal: plane.normal.extend(0.0).to_array(),
+                };
+            }
+            variant.transmission = cross.transmission.to_array();
+            variant.isotropic_fraction = bytemuck::cast(cross.spread);
+            first_light_layer += cross.textures.light.len() as u32;
+        }
+        variants.push(variant);
+    }
+    variants
 }
 
 /// 1 where the foliage's normals point out of the crown.
@@ -272,7 +283,7 @@ mod tests {
         }
         // Crosses too: their texels' normals are those of leaves, of which the seen side counts.
         let normals = |plant: &BakedPlant| -> Vec<[u8; 2]> {
-            let textures = plant.cross.textures.properties.iter();
+            let textures = plant.cross().into_iter().flat_map(|cross| &cross.textures.properties);
             textures.flat_map(|chain| chain.levels[0].chunks_exact(4).map(|texel| [texel[0], texel[1]])).collect()
         };
         assert!(normals(&own) == normals(&local) && normals(&half) != normals(&local));

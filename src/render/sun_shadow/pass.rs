@@ -16,7 +16,7 @@ use bevy::{
 use super::{maps::ShadowMaps, meshes::MeshCasters};
 use crate::render::{
     components::CanopyCamera,
-    forest::{GpuForests, LevelPipelines, representation::LevelTarget},
+    forest::{GpuForests, LevelPipelines, draw_levels, representation::LevelTarget},
     gpu::UNIFORM_STRIDE,
 };
 
@@ -64,13 +64,7 @@ pub fn sun_shadow_pass(
         for cast in &work.forests {
             let Some(forest) = forests.get(cast.entity) else { continue };
             pass.set_bind_group(1, &cast.bind_group, &[offset]);
-            for (index, level) in forest.levels().filter(|(index, _)| cast.lists.count(*index) > 0) {
-                for features in level.gpu.features(TARGET) {
-                    let Some(pipeline) = pipelines.get(&*level.renderer, features, TARGET, &cache) else { continue };
-                    pass.set_render_pipeline(pipeline);
-                    level.gpu.draw(&mut pass, features, TARGET, cast.lists.ranges(index));
-                }
-            }
+            draw_levels(&mut pass, forest, &cast.lists, TARGET, &pipelines, &cache, |_, _| {});
         }
         let complete =
             mesh_group.as_ref().is_none_or(|group| casters.draw(&mut pass, group, &meshes, &allocator, &cache));

@@ -1,7 +1,5 @@
 //! Where the cascades of a frame lie, which of them must be drawn again, and with which casters.
 
-use std::ops::Range;
-
 use bevy::{
     ecs::system::{Res, ResMut},
     render::render_resource::{BindGroupEntries, BindingResource, BufferBinding},
@@ -24,7 +22,7 @@ use crate::{
             uniforms::{CascadeViewUniform, MAX_CASCADES},
         },
         extract::ExtractedScene,
-        forest::{GpuForest, GpuForests, forest_view, instance_bind_group},
+        forest::{GpuForests, forest_view, instance_bind_group},
         gpu::{self, Gpu, GrowingBuffer, UNIFORM_STRIDE},
         report::FrameReport,
         view::PreparedFrame,
@@ -79,7 +77,7 @@ pub fn prepare_shadows(
         // Near the camera, a finer map has the trees' own shadows already.
         let served = index.checked_sub(1).map_or(0.0, |finer| 0.7 * maps.cascades[finer].radius);
         let content = forests.iter().map(|(entity, forest)| {
-            let casting = casting_distances(forest, served..settings.proxy_distance, place.texel);
+            let casting = forest.casting_distances(served..settings.proxy_distance, place.texel);
             (entity, forest.generation, forest.forest.origin, casting)
         });
         let key = CascadeKey { place, forests: content.collect(), meshes: meshes.state() };
@@ -150,28 +148,6 @@ fn lowest_receiver(scene: &ExtractedScene, camera: DVec3, radius: f64) -> f64 {
         f64::from(ground.terrain.height_bounds(middle - radius, middle + radius).0) + origin.y
     });
     ground.unwrap_or(f64::NEG_INFINITY).max(camera.y - radius)
-}
-
-/// Distances from a cascade's centre in metres at which each level of `forest` casts into a map of `texel` metres a texel;
-/// `near` are those of the first one.
-///
-/// A tree casts in the first level whose range holds it: in the one in which the view shows it, but for levels that are too
-/// fine for the map, in whose place the farthest one casts.
-fn casting_distances(forest: &GpuForest, near: Range<f64>, texel: f64) -> Vec<Range<f64>> {
-    let levels = &forest.forest.levels;
-    let mut casting = vec![0.0..0.0; levels.len()];
-    let mut ends = near.end;
-    for (index, level) in forest.levels() {
-        let start = if index == 0 { near.start } else { near.start.max(ends) };
-        ends = if index == 0 { ends } else { levels.fade_out(index).map_or(ends, |fade| ends.max(fade.end.into())) };
-        if level.renderer.coarsest_shadow_texel().is_some_and(|coarsest| texel < coarsest) {
-            casting[index] = start..ends;
-        }
-    }
-    if let Some((last, _)) = forest.levels().rev().find(|(_, level)| level.renderer.coarsest_shadow_texel().is_some()) {
-        casting[last] = 0.0..f64::INFINITY;
-    }
-    casting
 }
 
 /// Shares the maps with the passes that read them.

@@ -5,13 +5,14 @@ use std::{ops::Range, sync::Arc};
 
 use bevy::{
     asset::Handle,
+    log::{error, error_once},
     render::{
         render_phase::TrackedRenderPass,
         render_resource::{
-            AddressMode, BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, FilterMode,
-            FragmentState, MipmapFilterMode, RenderPipelineDescriptor, SamplerBindingType, SamplerDescriptor,
-            ShaderStages, Texture, TextureFormat, TextureSampleType, VertexState,
-            binding_types::{sampler, texture_2d_array},
+            AddressMode, BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer,
+            BufferUsages, FilterMode, FragmentState, MipmapFilterMode, RenderPipelineDescriptor, SamplerBindingType,
+            SamplerDescriptor, ShaderStages, Texture, TextureFormat, TextureSampleType, VertexState,
+            binding_types::{sampler, storage_buffer_read_only_sized, texture_2d_array},
         },
     },
     shader::{Shader, ShaderDefVal},
@@ -27,7 +28,7 @@ use crate::{
         components::Forest,
         forest::{
             representation::{ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight},
-            uniforms::{CROSS_CASTER_VERTICES, CROSS_VERTICES, PLANES},
+            uniforms::{CROSS_CASTER_VERTICES, CROSS_VERTICES, PLANES, cross_variants},
         },
         gpu::{self, Gpu},
         shaders::{CanopyShaders, ShaderFile},
@@ -64,7 +65,7 @@ impl CrossLight {
 
     /// That of crosses of these plants.
     pub fn of(plants: &[BakedPlant]) -> Self {
-        let lit = plants.iter().filter(|plant| !plant.cross.textures.light.is_empty()).count();
+        let lit = plants.iter().filter(|plant| has_light(plant)).count();
         match lit {
             0 => Self::Plain,
             all if all == plants.len() => Self::Pictures,
@@ -73,14 +74,24 @@ impl CrossLight {
     }
 }
 
-/// Group 2: colours, properties, sampler.
+/// Whether a plant's crosses have lighting textures.
+fn has_light(plant: &BakedPlant) -> bool {
+    plant.cross().is_some_and(|cross| !cross.textures.light.is_empty())
+}
+
+/// Group 2: colours, properties, sampler, what is known of each plant's crosses.
 fn cross_layout() -> BindGroupLayoutDescriptor {
     let float = TextureSampleType::Float { filterable: true };
     BindGroupLayoutDescriptor::new(
         "canopy_cross",
         &BindGroupLayoutEntries::sequential(
             ShaderStages::FRAGMENT,
-            (texture_2d_array(float), texture_2d_array(float), sampler(SamplerBindingType::Filtering)),
+            (
+                texture_2d_array(float),
+                texture_2d_array(float),
+                sampler(SamplerBindingType::Filtering),
+                storage_buffer_read_only_sized(false, None).visibility(ShaderStages::VERTEX_FRAGMENT),
+            ),
         ),
     )
 }
@@ -117,13 +128,33 @@ impl LevelRenderer for CrossRenderer {
 
     fn upload(&self, forest: &Forest, upload: &mut ForestUpload) -> Box<dyn GpuLevel> {
         let plants = &forest.plants;
-        let (properties, bind_group) = upload_textures(plants, upload.gpu);
+        for plant in plants.iter().filter(|plant| plant.cross().is_none()) {
+            error_once!(
+                "the plant `{}` is not drawn as crossed billboards, as none were baked for it: list \
+                 `Representation::CROSS` in `BakeSettings::representations`",
+                plant.plant.name
+            );
+        }
+        let (layers, limit) = (plants.len() * PLANES, upload.gpu.device.limits().max_texture_array_layers as usize);
+        if layers > limit {
+            error!(
+                "a forest's {} plants need {layers} texture layers for their crossed billboards, but this device has at \
+                 most {limit}: they are not drawn so; use at most {} plants in a forest, or another list of levels",
+                plants.len(),
+                limit / PLANES
+            );
+            return Box::new(GpuCrosses { drawn: None });
+        }
+        let (properties, variants, bind_group) = upload_textures(plants, upload.gpu);
         let (light, light_textures) = (CrossLight::of(plants), upload_light(plants, upload.gpu));
-        Box::new(GpuCrosses { properties, bind_group, light, light_textures })
+        Box::new(GpuCrosses { drawn: Some(DrawnCrosses { properties, variants, bind_group, light, light_textures }) })
     }
 
     fn same_shape(&self, old: &BakedPlant, new: &BakedPlant) -> bool {
-        Arc::ptr_eq(&old.cross, &new.cross) || same_outline(&old.cross, &new.cross)
+        match (old.cross(), new.cross()) {
+            (Some(old), Some(new)) => Arc::ptr_eq(old, new) || same_outline(old, new),
+            (old, new) => old.is_none() && new.is_none(),
+        }
     }
 
     fn pipeline(&self, features: u32, target: LevelTarget) -> RenderPipelineDescriptor {
@@ -169,10 +200,16 @@ impl LevelRenderer for CrossRenderer {
     }
 }
 
-/// The crosses of a forest's plants.
+/// The crosses of a forest's plants; `None` where the device cannot hold them.
 struct GpuCrosses {
+    drawn: Option<DrawnCrosses>,
+}
+
+struct DrawnCrosses {
     /// Normals, k_a and foliage, three layers a variant.
     properties: Texture,
+    /// [`CrossVariantUniform`](crate::render::forest::CrossVariantUniform)s.
+    variants: Buffer,
     /// Group 2.
     bind_group: BindGroup,
     /// Which pipeline draws them.
@@ -183,11 +220,12 @@ struct GpuCrosses {
 
 impl GpuLevel for GpuCrosses {
     fn features(&self, target: LevelTarget) -> Vec<u32> {
-        match target {
-            LevelTarget::View(_) => {
-                vec![CrossLight::ALL.iter().position(|known| *known == self.light).unwrap_or(0) as u32]
+        match (&self.drawn, target) {
+            (None, _) => Vec::new(),
+            (Some(drawn), LevelTarget::View(_)) => {
+                vec![CrossLight::ALL.iter().position(|known| *known == drawn.light).unwrap_or(0) as u32]
             }
-            LevelTarget::ShadowMap => vec![0],
+            (Some(_), LevelTarget::ShadowMap) => vec![0],
         }
     }
 
@@ -196,39 +234,57 @@ impl GpuLevel for GpuCrosses {
     }
 
     fn draw<'a>(&'a self, pass: &mut TrackedRenderPass<'a>, _: u32, target: LevelTarget, ranges: &[Range<u32>]) {
+        let Some(drawn) = &self.drawn else { return };
         let Some(range) = ranges.first().filter(|range| !range.is_empty()) else { return };
-        pass.set_bind_group(2, &self.bind_group, &[]);
+        pass.set_bind_group(2, &drawn.bind_group, &[]);
         let vertices = match target {
             LevelTarget::View(_) => CROSS_VERTICES,
             LevelTarget::ShadowMap => CROSS_CASTER_VERTICES,
         };
-        if let (LevelTarget::View(_), Some(textures)) = (target, &self.light_textures) {
+        if let (LevelTarget::View(_), Some(textures)) = (target, &drawn.light_textures) {
             pass.set_bind_group(3, textures, &[]);
         }
         pass.draw(range.start * vertices..range.end * vertices, 0..1);
     }
 
     fn relight(&mut self, relight: &Relight, upload: &mut ForestUpload) {
-        let changed = |(old, new): &(&BakedPlant, &BakedPlant)| !Arc::ptr_eq(&old.cross, &new.cross);
+        let Some(drawn) = &mut self.drawn else { return };
+        let changed = |(old, new): &(&BakedPlant, &BakedPlant)| match (old.cross(), new.cross()) {
+            (Some(old), Some(new)) => !Arc::ptr_eq(old, new),
+            _ => false,
+        };
         let pairs = || relight.old.iter().zip(relight.new);
         for (index, (_, new)) in pairs().enumerate().filter(|(_, pair)| changed(pair)) {
-            for (plane, chain) in new.cross.textures.properties.iter().enumerate() {
-                gpu::write_layer(&upload.gpu.queue, &self.properties, (index * PLANES + plane) as u32, chain);
+            for (plane, chain) in new.cross().into_iter().flat_map(|cross| &cross.textures.properties).enumerate() {
+                gpu::write_layer(&upload.gpu.queue, &drawn.properties, (index * PLANES + plane) as u32, chain);
             }
         }
-        let has_light = |plant: &BakedPlant| !plant.cross.textures.light.is_empty();
+        upload.gpu.queue.write_buffer(&drawn.variants, 0, bytemuck::cast_slice(&cross_variants(relight.new)));
         if pairs().filter(changed).any(|(old, new)| has_light(old) || has_light(new)) {
             // Plants whose lighting textures come or go move the layers of the others.
-            self.light = CrossLight::of(relight.new);
-            self.light_textures = upload_light(relight.new, upload.gpu);
+            drawn.light = CrossLight::of(relight.new);
+            drawn.light_textures = upload_light(relight.new, upload.gpu);
         }
     }
 }
 
-/// The textures of all crosses: that of their properties, and both kinds in a bind group.
-fn upload_textures(plants: &[BakedPlant], gpu: &Gpu) -> (Texture, BindGroup) {
-    let colors: Vec<&MipChain> = plants.iter().flat_map(|plant| &plant.cross.textures.color).collect();
-    let properties: Vec<&MipChain> = plants.iter().flat_map(|plant| &plant.cross.textures.properties).collect();
+/// Three layers a plant of the textures that `of` takes from a cross. A plant without a cross has those of another one,
+/// which its planes without extent do not show.
+fn layers(plants: &[BakedPlant], of: fn(&Cross) -> &[MipChain]) -> Vec<&MipChain> {
+    let crosses = || plants.iter().filter_map(BakedPlant::cross);
+    let Some(blank) = crosses().find_map(|cross| of(cross).first()) else { return Vec::new() };
+    let mut all = Vec::with_capacity(plants.len() * PLANES);
+    for plant in plants {
+        let own = plant.cross().map_or(&[][..], |cross| of(cross));
+        all.extend((0..PLANES).map(|plane| own.get(plane).unwrap_or(blank)));
+    }
+    all
+}
+
+/// The textures of all crosses: that of their properties; what is known of each plant's crosses; the bind group of all.
+fn upload_textures(plants: &[BakedPlant], gpu: &Gpu) -> (Texture, Buffer, BindGroup) {
+    let colors = layers(plants, |cross| &cross.textures.color);
+    let properties = layers(plants, |cross| &cross.textures.properties);
     let upload = |label: &str, format: TextureFormat, layers: &[&MipChain]| {
         gpu::texture_array(&gpu.device, &gpu.queue, label, format, layers, gpu::SMALLEST_TESTED_MIP)
     };
@@ -243,17 +299,20 @@ fn upload_textures(plants: &[BakedPlant], gpu: &Gpu) -> (Texture, BindGroup) {
         mipmap_filter: MipmapFilterMode::Linear,
         ..Default::default()
     });
+    let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
+    let variants = gpu::buffer_with(&gpu.device, "canopy_cross_variants", usage, &cross_variants(plants));
     let bind_group = gpu.bind_group(
         "canopy_cross",
         &cross_layout(),
-        &BindGroupEntries::sequential((&colors, &properties, &sampler)),
+        &BindGroupEntries::sequential((&colors, &properties, &sampler, variants.as_entire_binding())),
     );
-    (texture, bind_group)
+    (texture, variants, bind_group)
 }
 
 /// The lighting textures, of those plants that have them.
 fn upload_light(plants: &[BakedPlant], gpu: &Gpu) -> Option<BindGroup> {
-    let layers: Vec<&MipChain> = plants.iter().flat_map(|plant| &plant.cross.textures.light).collect();
+    let layers: Vec<&MipChain> =
+        plants.iter().filter_map(BakedPlant::cross).flat_map(|cross| &cross.textures.light).collect();
     if layers.is_empty() {
         return None;
     }

@@ -18,7 +18,7 @@ mod tests {
     use super::*;
     use crate::{
         bake::{
-            BakeSettings, BakedPlant, bake_plant,
+            BakeSettings, BakedLevel, BakedPlant, bake_plant,
             lighting::{LightingSettings, implicit::ImplicitSettings},
         },
         plant::grow::{GrowParameters, grow},
@@ -34,14 +34,17 @@ mod tests {
         let baked = |lighting| bake_plant(plant.clone(), &BakeSettings { lighting, ..BakeSettings::default() }, None).0;
         let local = baked(LightingSettings::Local);
         let fresh = baked(LightingSettings::Expressive(ImplicitSettings::default()));
-        let (lighting, cross) = (fresh.lighting.clone(), fresh.cross.clone());
-        let lit = BakedPlant { lighting, cross, ..local.clone() };
-        assert!(local.cross != lit.cross && same_shape(&local, &lit));
+        let fresh_cross = fresh.cross().ok_or("no cross")?;
+        let lit = BakedPlant { lighting: fresh.lighting.clone(), ..local.clone() };
+        let lit = lit.with_level(BakedLevel::Cross(fresh_cross.clone()));
+        assert!(local.cross() != lit.cross() && same_shape(&local, &lit));
         // A fresh proxy casts another shadow, other colours have another outline.
         assert!(!same_shape(&local, &fresh));
-        let mut cross = (*lit.cross).clone();
+        let mut cross = (**fresh_cross).clone();
         cross.textures.color[0].levels[0][3] ^= 0x80;
-        assert!(!same_shape(&local, &BakedPlant { cross: Arc::new(cross), ..lit }));
+        assert!(!same_shape(&local, &lit.clone().with_level(BakedLevel::Cross(Arc::new(cross)))));
+        // Nor have a plant with a level and one without.
+        assert!(!same_shape(&local, &BakedPlant { levels: Vec::new(), ..local.clone() }));
         Ok(())
     }
 }

@@ -4,6 +4,7 @@ use std::{ops::Range, sync::Arc};
 
 use bevy::{
     asset::Handle,
+    log::error_once,
     render::{
         render_phase::TrackedRenderPass,
         render_resource::{
@@ -182,7 +183,11 @@ impl LevelRenderer for ModelRenderer {
     }
 
     fn same_shape(&self, old: &BakedPlant, new: &BakedPlant) -> bool {
-        Arc::ptr_eq(&old.plant, &new.plant) && Arc::ptr_eq(&old.shadow_proxy, &new.shadow_proxy)
+        let same_proxy = match (old.shadow_proxy(), new.shadow_proxy()) {
+            (Some(old), Some(new)) => Arc::ptr_eq(old, new),
+            (old, new) => old.is_none() && new.is_none(),
+        };
+        Arc::ptr_eq(&old.plant, &new.plant) && same_proxy
     }
 
     fn pipeline(&self, features: u32, target: LevelTarget) -> RenderPipelineDescriptor {
@@ -344,10 +349,18 @@ fn upload_parts(
 ) -> Vec<GpuPart> {
     let gpu = upload.gpu;
     let tint = scattered_tint(&plant.plant.leaf_colors());
+    let proxies = plant.shadow_proxy();
+    if proxies.is_none() {
+        error_once!(
+            "the plant `{}` casts no near shadow, as no shadow proxy was baked for it: list `Representation::MODEL` in \
+             `BakeSettings::representations`",
+            plant.plant.name
+        );
+    }
     let mut parts = Vec::new();
     for (index, part) in plant.plant.parts.iter().enumerate() {
         let empty = PlantMesh::default();
-        let proxy = plant.shadow_proxy.get(index).unwrap_or(&empty);
+        let proxy = proxies.and_then(|meshes| meshes.get(index)).unwrap_or(&empty);
         let material = &part.material;
         let coefficients = plant.lighting.transfer(index);
         let usage = BufferUsages::UNIFORM | BufferUsages::COPY_DST;

@@ -1,0 +1,99 @@
+//! A level of detail of one's own: beyond 40 m a tree is a box of its plant's size. `cargo run --release --example box_level`
+//!
+//! A level needs a shader, a [`LevelRenderer`] and a [`GpuLevel`]; lists, statistics and tints come with [`Forest::levels`].
+
+use bevy::{
+    prelude::*,
+    render::{render_phase::TrackedRenderPass, render_resource::RenderPipelineDescriptor},
+};
+use canopy::{bake::BakedPlant, cull::Grouping, prelude::*, render::forest::representation::*};
+
+/// Twelve triangles a tree; their 36 vertices are pulled from its entry in the list. Group 0 is the frame, group 1 the trees.
+const WGSL: &str = "
+#import canopy::frame::{frame, light}
+#import canopy::instance::{trees, visible, variants, unpack_tree, plant_vertex_position, rotate, tint_level}
+#import canopy::output::finish
+struct Varying {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) relative: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+}
+@vertex fn vertex(@builtin(vertex_index) index: u32) -> Varying {
+    var corners = array(vec2(-1., -1.), vec2(1., -1.), vec2(1., 1.), vec2(-1., -1.), vec2(1., 1.), vec2(-1., 1.));
+    let tree = unpack_tree(trees[visible[index / 36u]]);
+    let face = index % 36u / 6u;
+    let p = vec3(corners[index % 6u], select(-1., 1., face < 3u));
+    let n = vec3(0., 0., p.z);
+    let turn = face % 3u;
+    let corner = select(select(p, p.zxy, turn == 1u), p.yzx, turn == 2u);
+    let normal = select(select(n, n.zxy, turn == 1u), n.yzx, turn == 2u);
+    let half = vec3(variants[tree.variant].crown_radius, 0.5 * variants[tree.variant].height, 0.).xyx;
+    let position = plant_vertex_position(tree, corner * half + vec3(0., half.y, 0.));
+    return Varying(frame.clip_from_relative * vec4(position.relative, 1.), position.relative, rotate(normal, tree.yaw));
+}
+@fragment fn fragment(in: Varying) -> @location(0) vec4<f32> {
+    let lit = light.key_illuminance * (0.1 + 0.2 * saturate(dot(in.normal, light.key_direction)));
+    return finish(in.relative, tint_level(vec3(0.9, 0.02, 0.02) * lit), 1.0);
+}";
+
+/// The level.
+pub const BOX: Representation = Representation::named("box");
+
+/// Makes the level known; all forests show it beyond 40 m.
+pub struct BoxLevelPlugin;
+
+impl Plugin for BoxLevelPlugin {
+    fn build(&self, app: &mut App) {
+        let shader = app.world_mut().resource_mut::<Assets<Shader>>().add(Shader::from_wgsl(WGSL, "box_level.wgsl"));
+        app.register_representation(Boxes(shader)).add_systems(
+            Update,
+            |mut forests: Query<&mut Forest, Added<Forest>>| {
+                for mut forest in &mut forests {
+                    forest.levels = Levels::only(Representation::MODEL).then(FadeBand::new(40.0, 0.0), BOX);
+                }
+            },
+        );
+    }
+}
+
+struct Boxes(Handle<Shader>);
+
+#[rustfmt::skip]
+impl LevelRenderer for Boxes {
+    fn representation(&self) -> Representation { BOX }
+    fn label(&self) -> &'static str { "boxes" }
+    fn tint(&self) -> Vec3 { Vec3::new(1.0, 0.5, 0.0) }
+    fn grouping(&self) -> Grouping { Grouping::Together }
+    fn coarsest_shadow_texel(&self) -> Option<f64> { None }
+    fn upload(&self, _: &Forest, _: &mut ForestUpload) -> Box<dyn GpuLevel> { Box::new(GpuBoxes) }
+    fn same_shape(&self, _: &BakedPlant, _: &BakedPlant) -> bool { true }
+    fn pipeline(&self, _: u32, target: LevelTarget) -> RenderPipelineDescriptor {
+        let LevelTarget::View(format) = target else { return RenderPipelineDescriptor::default() };
+        let pipeline = format.pipeline(&self.0, Vec::new(), target.depth());
+        RenderPipelineDescriptor { label: Some("boxes".into()), layout: target.layouts([]), ..pipeline }
+    }
+}
+
+struct GpuBoxes;
+
+#[rustfmt::skip]
+impl GpuLevel for GpuBoxes {
+    fn features(&self, target: LevelTarget) -> Vec<u32> { if target == LevelTarget::ShadowMap { vec![] } else { vec![0] } }
+    fn triangles(&self, _variant: usize) -> usize { 12 }
+    fn draw<'a>(&'a self, pass: &mut TrackedRenderPass<'a>, _: u32, _: LevelTarget, ranges: &[std::ops::Range<u32>]) {
+        ranges.iter().for_each(|trees| pass.draw(36 * trees.start..36 * trees.end, 0..1));
+    }
+    fn relight(&mut self, _: &Relight, _: &mut ForestUpload) {}
+}
+
+fn main() {
+    let scene = CanopyScenePlugin::new("assets/scenes/inventory.ron");
+    App::new().add_plugins((DefaultPlugins, CanopyPlugins, scene, BoxLevelPlugin)).add_systems(Update, look).run();
+}
+
+fn look(mut commands: Commands, mut ready: MessageReader<SceneReady>) {
+    for SceneReady { stage, .. } in ready.read() {
+        let height = stage.terrain.height(0.0, 120.0) as f32 + 20.0;
+        commands.spawn((CanopyCamera, Transform::from_xyz(0.0, height, 120.0)));
+    }
+}

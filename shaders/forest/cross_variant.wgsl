@@ -1,0 +1,24 @@
+// What is known of each plant's crossed billboards, for the view and for the shadow maps.
+#define_import_path canopy::cross_variant
+
+#import canopy::constants::{PLANES, SPREAD_VECTORS}
+
+struct Plane {
+    center: vec4<f32>,
+    u: vec4<f32>,
+    v: vec4<f32>,
+    normal: vec4<f32>,
+}
+
+struct CrossVariant {
+    planes: array<Plane, PLANES>,
+    // Factor for light through its leaves, as in `Surface`.
+    transmission: vec3<f32>,
+    // First layer of its textures, and of its lighting textures.
+    first_layer: u32,
+    // Fraction of a texel's leaf area with isotropic normals, 0..1, mip by mip.
+    isotropic_fraction: array<vec4<f32>, SPREAD_VECTORS>,
+    first_light_layer: u32,
+}
+
+@group(2) @binding(3) var<storage, read> cross_variants: array<CrossVariant>;

@@ -1,0 +1,161 @@
+//! Which trees cast into which of Bevy's cascades.
+
+use bevy::{
+    ecs::{
+        entity::Entity,
+        resource::Resource,
+        system::{Query, Res, ResMut},
+    },
+    pbr::{LightEntity, ViewLightEntities},
+    platform::collections::HashMap,
+    render::{
+        render_resource::{BindGroup, BindGroupEntries, BindingResource, Buffer, BufferBinding},
+        view::ExtractedView,
+    },
+};
+use glam::{DVec3, Mat4, Vec3, Vec4Swizzles};
+
+use crate::{
+    cull::{DrawLists, Frustum, cull_light_view},
+    render::{
+        bindings::{caster_layout, uniforms::CascadeViewUniform},
+        extract::ExtractedScene,
+        forest::{GpuForests, forest_view, instance_bind_group},
+        gpu::{self, Gpu, GrowingBuffer, UNIFORM_STRIDE},
+        report::FrameReport,
+        view::PreparedFrame,
+    },
+};
+
+/// The most cascades that are served in a frame: four lights of four.
+const MAX_VIEWS: usize = 16;
+
+/// What is drawn of one forest into one map.
+pub struct CastForest {
+    /// Which forest.
+    pub entity: Entity,
+    /// Ranges of trees.
+    pub lists: DrawLists,
+    /// Group 1, without a dynamic offset of its own.
+    pub bind_group: BindGroup,
+}
+
+/// A map of Bevy's and its casters.
+pub struct CastView {
+    /// The light's view.
+    pub entity: Entity,
+    /// Casters, by forest.
+    pub forests: Vec<CastForest>,
+}
+
+/// Buffers of one forest in one map.
+struct CastBuffers {
+    uniform: Buffer,
+    visible: GrowingBuffer,
+}
+
+/// The maps of this frame.
+#[derive(Resource, Default)]
+pub struct MeshShadows {
+    /// Maps with casters, in the order of the dynamic offsets of group 0.
+    pub views: Vec<CastView>,
+    /// Group 0 of the casters.
+    pub bind_group: Option<BindGroup>,
+    uniforms: Option<Buffer>,
+    buffers: HashMap<(usize, Entity), CastBuffers>,
+}
+
+/// Gathers the casters of each map.
+pub fn prepare_mesh_shadows(
+    scene: Res<ExtractedScene>,
+    frame: Res<PreparedFrame>,
+    forests: Res<GpuForests>,
+    cameras: Query<&ViewLightEntities>,
+    lights: Query<(&LightEntity, &ExtractedView)>,
+    gpu: Gpu,
+    report: Res<FrameReport>,
+    mut shadows: ResMut<MeshShadows>,
+) {
+    let shadows = &mut *shadows;
+    shadows.views.clear();
+    shadows.bind_group = None;
+    shadows.buffers.retain(|(_, entity), _| forests.get(*entity).is_some());
+    let Some(view) = &frame.view else { return };
+    let why_none = if !scene.mesh_shadows {
+        Some("no directional light has shadow maps")
+    } else if forests.order.is_empty() {
+        Some("the world has no forest")
+    } else {
+        None
+    };
+    if let Some(why) = why_none {
+        report.skipped("mesh_shadow", why);
+        return;
+    }
+    let Ok(of_camera) = cameras.get(view.entity) else { return };
+    // Positions are relative to the camera, in f64 until then.
+    let anchor = view.camera;
+    let to_anchor = Mat4::from_translation((anchor - scene.origin).as_vec3());
+    let uniforms = shadows
+        .uniforms
+        .get_or_insert_with(|| gpu::uniform_slots(&gpu.device, "canopy_mesh_shadow_views", MAX_VIEWS as u64));
+    let mut trees = 0;
+    for entity in of_camera.lights.iter().copied() {
+        let Ok((LightEntity::Directional { .. }, light)) = lights.get(entity) else { continue };
+        let Some(clip_from_world) = light.clip_from_world else { continue };
+        let slot = shadows.views.len();
+        if slot == MAX_VIEWS {
+            break;
+        }
+        let clip_from_anchor = clip_from_world * to_anchor;
+        let direction = light.world_from_view.rotation() * Vec3::Z;
+        if !clip_from_anchor.is_finite() || !direction.is_normalized() {
+            continue;
+        }
+        let uniform = CascadeViewUniform {
+            clip_from_anchor: clip_from_anchor.to_cols_array_2d(),
+            direction: direction.to_array(),
+            padding: 0.0,
+        };
+        gpu.queue.write_buffer(uniforms, slot as u64 * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));
+        let width = 2.0 / clip_from_anchor.transpose().x_axis.xyz().length().max(1e-6);
+        let texel = f64::from(width) / f64::from(light.viewport.z.max(1));
+        let frustum = Frustum::new(&clip_from_anchor);
+        let mut cast = CastView { entity, forests: Vec::new() };
+        for (entity, forest) in forests.iter() {
+            let lists = cull_light_view(
+                &forest.forest.stand,
+                &forest.sizes,
+                anchor - forest.forest.origin,
+                &frustum,
+                DVec3::from(direction),
+                &forest.casting_distances(0.0..scene.shadow.proxy_distance, texel),
+                &forest.groupings,
+            );
+            if lists.visible.is_empty() {
+                continue;
+            }
+            trees += lists.visible.len();
+            let buffers = shadows.buffers.entry((slot, entity)).or_insert_with(|| CastBuffers {
+                uniform: gpu::uniform_slots(&gpu.device, "canopy_mesh_shadow_forest", 1),
+                visible: GrowingBuffer::new(&gpu.device, "canopy_mesh_shadow_casters"),
+            });
+            let uniform = forest_view(forest, anchor, None);
+            gpu.queue.write_buffer(&buffers.uniform, 0, bytemuck::bytes_of(&uniform));
+            buffers.visible.write(&gpu.device, &gpu.queue, &lists.visible);
+            let bind_group = instance_bind_group(&gpu, forest, &buffers.uniform, buffers.visible.buffer());
+            cast.forests.push(CastForest { entity, lists, bind_group });
+        }
+        shadows.views.push(cast);
+    }
+    shadows.bind_group = Some(gpu.bind_group(
+        "canopy_mesh_shadow_view",
+        &caster_layout(),
+        &BindGroupEntries::single(BindingResource::Buffer(BufferBinding {
+            buffer: uniforms,
+            offset: 0,
+            size: std::num::NonZeroU64::new(size_of::<CascadeViewUniform>() as u64),
+        })),
+    ));
+    report.ran("mesh_shadow", format!("{trees} trees in {} maps", shadows.views.len()));
+}

@@ -1,0 +1,160 @@
+//! A level of detail that a program adds: the example `box_level`.
+
+use std::sync::Arc;
+
+use bevy::{
+    prelude::*,
+    render::{RenderApp, renderer::RenderDevice},
+};
+use canopy::{
+    app::{Picture, Renderer},
+    bake::{BakedLevel, BakedPlant},
+    prelude::*,
+    render::forest::{ForestStatistics, LevelStatistics},
+};
+use glam::{DVec2, DVec3};
+
+use super::{NOON, SIZE, draw, renderer};
+use crate::support::{
+    gpu::gpu,
+    image::keep,
+    stage::{project, trees_at, view},
+};
+
+#[expect(dead_code, reason = "the example's own program opens a window")]
+#[path = "../../examples/box_level.rs"]
+mod box_level;
+
+use box_level::{BOX, BoxLevelPlugin};
+
+/// Whether a pixel is red as nothing in a forest is.
+fn is_red(pixel: &[u8]) -> bool {
+    f32::from(pixel[0]) > 2.0 * f32::from(pixel[1].max(pixel[2])) && pixel[0] > 60
+}
+
+fn statistics(renderer: &mut Renderer) -> Vec<LevelStatistics> {
+    renderer.app().sub_app(RenderApp).world().resource::<ForestStatistics>().levels.clone()
+}
+
+#[test]
+fn a_program_adds_a_level_of_its_own() {
+    let gpu = gpu();
+    // Distances from the camera: two full models, three boxes.
+    let near = [DVec2::new(-6.0, 40.0), DVec2::new(6.0, 35.0)];
+    let far = [DVec2::new(-20.0, -10.0), DVec2::new(0.0, -15.0), DVec2::new(20.0, -10.0)];
+    let built = trees_at(&[near.as_slice(), &far].concat(), 1);
+    let stage = &built.stage;
+    let from = view(stage, (0.0, 9.0, 60.0), 0.0, -5.0);
+    let at = |picture: &Picture, tree: DVec2| -> Vec<u8> {
+        let foot = stage.terrain.height(tree.x, tree.y);
+        let pixel = project(&from, SIZE, DVec3::new(tree.x, foot + 5.0, tree.y)).expect("before the camera");
+        let first = 3 * (pixel.y as u32 * SIZE.0 + pixel.x as u32) as usize;
+        picture.pixels[first..first + 3].to_vec()
+    };
+
+    let mut control = renderer(1);
+    control.show(stage);
+    let without = draw(&mut control, stage, &from, NOON);
+    assert!(!without.pixels.chunks(3).any(is_red), "a forest without boxes has their colour");
+    assert!(statistics(&mut control).iter().all(|level| level.representation != BOX));
+
+    let mut renderer = renderer(1);
+    // The renderer's app is finished already and takes no more plugins, but what this one does.
+    BoxLevelPlugin.build(renderer.app());
+    renderer.show(stage);
+    let picture = draw(&mut renderer, stage, &from, NOON);
+    keep(&picture, "boxes");
+    for tree in far {
+        assert!(is_red(&at(&picture, tree)), "the tree at {tree} is {:?}", at(&picture, tree));
+    }
+    for tree in near {
+        assert!(!is_red(&at(&picture, tree)), "the tree at {tree} is {:?}", at(&picture, tree));
+    }
+    let levels = statistics(&mut renderer);
+    let counts: Vec<_> = levels.iter().map(|level| (level.representation, level.label, level.trees)).collect();
+    assert_eq!(counts, [(Representation::MODEL, "full models", 2), (BOX, "boxes", 3)]);
+    assert_eq!(levels[1].triangles, 36);
+
+    // Another list of levels takes effect on the same entity.
+    let world = renderer.app().world_mut();
+    for mut forest in world.query::<&mut Forest>().iter_mut(world) {
+        forest.levels = Levels::only(Representation::MODEL);
+    }
+    let models = draw(&mut renderer, stage, &from, NOON);
+    assert!(!models.pixels.chunks(3).any(is_red) && models != without);
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+#[test]
+fn a_level_that_nothing_draws_is_named_and_the_others_are_drawn() {
+    let gpu = gpu();
+    let built = trees_at(&[DVec2::new(0.0, 40.0)], 1);
+    let stage = &built.stage;
+    let from = view(stage, (0.0, 9.0, 60.0), 0.0, -5.0);
+    let mut renderer = renderer(1);
+    renderer.show(stage);
+    let world = renderer.app().world_mut();
+    for mut forest in world.query::<&mut Forest>().iter_mut(world) {
+        let unknown = Representation::named("hologram");
+        forest.levels = Levels::only(Representation::MODEL).then(FadeBand::new(40.0, 0.0), unknown);
+    }
+    draw(&mut renderer, stage, &from, NOON);
+    let told = gpu.messages();
+    assert!(
+        told.len() == 1 && told[0].contains("`hologram`") && told[0].contains("register_representation"),
+        "{told:?}"
+    );
+    assert_eq!(statistics(&mut renderer).len(), 1);
+}
+
+#[test]
+fn plants_without_a_bake_are_not_drawn_and_named_once() {
+    let gpu = gpu();
+    let built = trees_at(&[DVec2::new(-4.0, -20.0), DVec2::new(4.0, -25.0)], 1);
+    let stage = &built.stage;
+    let from = view(stage, (0.0, 9.0, 60.0), 0.0, -5.0);
+    let picture = |levels: &[BakedLevel], view_distance: f32| {
+        let mut renderer = renderer(1);
+        renderer.show(stage);
+        let plants = stage.plants.iter().map(|plant| BakedPlant { levels: levels.to_vec(), ..plant.clone() });
+        let plants = Arc::new(plants.collect::<Vec<_>>());
+        let world = renderer.app().world_mut();
+        for mut forest in world.query::<&mut Forest>().iter_mut(world) {
+            forest.plants = plants.clone();
+            forest.levels = Levels::only(Representation::CROSS);
+            forest.view_distance = view_distance;
+        }
+        draw(&mut renderer, stage, &from, NOON)
+    };
+    let all = stage.plants[0].levels.clone();
+    assert!(picture(&all, 2000.0) != picture(&all, 0.0), "a control: with a bake there are trees");
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+    assert!(picture(&[], 2000.0) == picture(&[], 0.0), "something is drawn without a bake");
+    let told = gpu.messages();
+    assert!(told.len() == 1 && told[0].contains("`broadleaf") && told[0].contains("Representation::CROSS"), "{told:?}");
+}
+
+#[test]
+fn more_crosses_than_a_texture_array_holds_are_refused_with_the_number_that_fits() {
+    let gpu = gpu();
+    let built = trees_at(&[DVec2::new(0.0, 40.0)], 1);
+    let stage = &built.stage;
+    let from = view(stage, (0.0, 9.0, 60.0), 0.0, -5.0);
+    let mut renderer = renderer(1);
+    renderer.show(stage);
+    let limit = renderer.app().world().resource::<RenderDevice>().limits().max_texture_array_layers as usize;
+    let plants = Arc::new(vec![stage.plants[0].clone(); limit / 3 + 1]);
+    let world = renderer.app().world_mut();
+    for mut forest in world.query::<&mut Forest>().iter_mut(world) {
+        forest.plants = plants.clone();
+        forest.levels = Levels::only(Representation::CROSS);
+    }
+    draw(&mut renderer, stage, &from, NOON);
+    let told = gpu.messages();
+    let remedy = format!("at most {} plants", limit / 3);
+    assert!(told.len() == 1 && told[0].contains("texture layers") && told[0].contains(&remedy), "{told:?}");
+    // A scene is refused before it is shown.
+    let crowded = Stage { plants, ..built.stage };
+    let refused = crowded.check_device(renderer.app().world().resource::<RenderDevice>());
+    assert!(refused.is_err_and(|error| error.to_string().contains(&format!("at most {}", limit / 3))));
+}
