@@ -87,13 +87,14 @@ impl GpuLevel for GpuBoxes {
 }
 
 fn main() {
-    let scene = CanopyScenePlugin::new("assets/scenes/inventory.ron");
-    App::new().add_plugins((DefaultPlugins, CanopyPlugins, scene, BoxLevelPlugin)).add_systems(Update, look).run();
+    App::new().add_plugins((DefaultPlugins, CanopyPlugins, BoxLevelPlugin)).add_systems(Startup, set_up).run();
 }
 
-fn look(mut commands: Commands, mut ready: MessageReader<SceneReady>) {
-    for SceneReady { stage, .. } in ready.read() {
-        let height = stage.terrain.height(0.0, 120.0) as f32 + 20.0;
-        commands.spawn((CanopyCamera, Transform::from_xyz(0.0, height, 120.0)));
-    }
+fn set_up(mut commands: Commands) {
+    commands.spawn(CanopyScene::new("assets/scenes/inventory.ron")).observe(look);
+}
+
+fn look(ready: On<SceneReady>, mut commands: Commands) {
+    let height = ready.stage.terrain.height(0.0, 120.0) as f32 + 20.0;
+    commands.spawn((CanopyCamera, Transform::from_xyz(0.0, height, 120.0)));
 }
