@@ -238,16 +238,11 @@ fn gpu_structs_are_what_the_shaders_think() {
             realigned,
             indirect_sun_zenith,
             indirect_sun_mean,
+            indirect_sun_color,
             ambient_term,
             lobe_gain,
             lobe_limit,
-            indirect_sun_color,
         }
-    );
-    twin!(
-        layouts,
-        "CrossVariant",
-        CrossVariantUniform { planes, transmission, first_layer, isotropic_fraction, first_light_layer }
     );
     twin!(
         layouts,
@@ -262,6 +257,11 @@ fn gpu_structs_are_what_the_shaders_think() {
             lobe_gain,
             lobe_limit
         }
+    );
+    twin!(
+        layouts,
+        "CrossVariant",
+        CrossVariantUniform { planes, transmission, first_layer, isotropic_fraction, first_light_layer }
     );
     twin!(
         layouts,

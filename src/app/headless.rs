@@ -10,7 +10,7 @@ use std::{
 use bevy::{
     app::{App, PluginGroup, PluginsState},
     asset::{Assets, Handle, RenderAssetUsages},
-    camera::{Camera, Camera3d, RenderTarget},
+    camera::{Camera, RenderTarget},
     ecs::entity::Entity,
     image::Image,
     log::{Level, LogPlugin},
@@ -165,7 +165,6 @@ impl Renderer {
         let camera = app
             .world_mut()
             .spawn((
-                Camera3d::default(),
                 Camera { is_active: false, ..Camera::default() },
                 RenderTarget::from(target.clone()),
                 CanopyCamera,

@@ -29,7 +29,8 @@ pub const TONEMAPPING: Tonemapping = Tonemapping::BlenderFilmic;
 
 /// A camera that sees Canopy's sky, ground and forests. One camera at a time; a second one is refused with a message.
 ///
-/// Its exposure follows the light of the moment, its [`Tonemapping`] is [`TONEMAPPING`] unless the program gives another.
+/// Its exposure follows the light of the moment, its [`Tonemapping`] is [`TONEMAPPING`] unless the program gives another. It
+/// brings its [`Camera3d`] along; one that stands before it in a bundle brings Bevy's own default tone curve.
 #[derive(Component, Clone, Copy, Debug, Default, ExtractComponent, Reflect)]
 #[reflect(Component, Default)]
 #[require(Camera3d, Hdr, Exposure, Tonemapping = TONEMAPPING, ViewOptions)]

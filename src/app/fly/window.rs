@@ -4,7 +4,6 @@ use std::io::Write;
 
 use bevy::{
     app::AppExit,
-    camera::Camera3d,
     ecs::{
         change_detection::DetectChangesMut,
         message::{MessageReader, MessageWriter},
@@ -43,7 +42,6 @@ pub fn set_up(mut commands: Commands, session: Res<Session>) {
     stage.show(&mut commands);
     commands.spawn((stage.sun(session.clock.now().to_utc()), stage.shadow()));
     commands.spawn((
-        Camera3d::default(),
         CanopyCamera,
         Msaa::from_samples(stage.scene.quality.msaa),
         camera::projection(session.view().field_of_view),

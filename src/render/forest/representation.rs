@@ -10,7 +10,7 @@
 //!
 //! A new level is one file that bakes it (in `bake/levels`, if it needs a bake), one that implements both traits, one
 //! shader, and one line in `levels::built_in`. A program adds its own with [`RegisterRepresentation`];
-//! `examples/box_level.rs` is one of some eighty lines. What all levels share (lists of trees, thresholds, tints,
+//! `examples/box_level.rs` is one of under a hundred lines. What all levels share (lists of trees, thresholds, tints,
 //! statistics, reports) goes over the list and knows none of them.
 
 use std::{ops::Range, sync::Arc};
