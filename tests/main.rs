@@ -3,6 +3,7 @@
 mod app;
 mod bake;
 mod cli;
+mod front_door;
 mod grow;
 mod implicit;
 mod layering;

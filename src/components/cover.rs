@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use bevy::ecs::{
+    change_detection::DetectChanges,
     component::Component,
     entity::Entity,
     lifecycle::RemovedComponents,
-    query::{Added, Changed, With},
+    query::{Changed, With},
     system::Query,
 };
 use glam::DVec2;
@@ -29,10 +30,10 @@ pub fn cover_grounds(
     covers: Query<(Entity, &ForestCover)>,
     changed: Query<(), Changed<ForestCover>>,
     mut removed: RemovedComponents<ForestCover>,
-    new_grounds: Query<(), Added<Ground>>,
     mut grounds: Query<(Entity, &mut Ground), With<Terrain3d>>,
 ) {
-    if removed.read().count() == 0 && changed.is_empty() && new_grounds.is_empty() {
+    let new_ground = grounds.iter_mut().any(|(_, ground)| ground.is_added());
+    if removed.read().count() == 0 && changed.is_empty() && !new_ground {
         return;
     }
     for (entity, mut ground) in &mut grounds {

@@ -6,7 +6,10 @@ use bevy::{
     app::{App, Plugin},
     camera::{Camera3d, Exposure, Hdr, visibility::Visibility},
     core_pipeline::tonemapping::Tonemapping,
-    ecs::{component::Component, reflect::ReflectComponent, resource::Resource},
+    ecs::{
+        component::Component, lifecycle::HookContext, reflect::ReflectComponent, resource::Resource,
+        world::DeferredWorld,
+    },
     prelude::{ReflectDefault, ReflectResource},
     reflect::Reflect,
     render::extract_component::{ExtractComponent, ExtractComponentPlugin},
@@ -34,7 +37,17 @@ pub const TONEMAPPING: Tonemapping = Tonemapping::BlenderFilmic;
 #[derive(Component, Clone, Copy, Debug, Default, ExtractComponent, Reflect)]
 #[reflect(Component, Default)]
 #[require(Camera3d, Hdr, Exposure, Tonemapping = TONEMAPPING, ViewOptions)]
+#[component(on_add = set_tone_curve)]
 pub struct CanopyCamera;
+
+/// A `Camera3d` in the same bundle brings Bevy's default curve, which goes before what [`CanopyCamera`] requires.
+fn set_tone_curve(mut world: DeferredWorld, context: HookContext) {
+    if let Some(mut curve) = world.get_mut::<Tonemapping>(context.entity)
+        && *curve == Tonemapping::default()
+    {
+        *curve = TONEMAPPING;
+    }
+}
 
 /// The scene position, in f64 metres, of the Bevy world's origin.
 ///
@@ -148,5 +161,22 @@ impl Plugin for ComponentsPlugin {
         ))
         .register_type::<(CanopyCamera, CanopyOrigin, SunShadowSettings, ViewOptions, CastsCanopyShadow)>()
         .init_resource::<CanopyOrigin>();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::ecs::world::World;
+
+    use super::*;
+
+    #[test]
+    fn a_camera_has_the_tone_curve_of_the_screenshots_unless_the_program_chose_one() {
+        let mut world = World::new();
+        let alone = world.spawn(CanopyCamera).id();
+        let beside = world.spawn((Camera3d::default(), CanopyCamera)).id();
+        let chosen = world.spawn((Camera3d::default(), CanopyCamera, Tonemapping::AgX)).id();
+        let curves = [alone, beside, chosen].map(|camera| world.get::<Tonemapping>(camera).copied());
+        assert_eq!(curves, [Some(TONEMAPPING), Some(TONEMAPPING), Some(Tonemapping::AgX)]);
     }
 }

@@ -39,6 +39,19 @@ pub struct ForestWork {
     /// What was asked for is not being built yet: something is still missing.
     waits: bool,
     job: Option<Job>,
+    /// Why it could not be built the last time: what is known is not said again.
+    failure: Option<String>,
+}
+
+impl ForestWork {
+    fn fail(&mut self, commands: &mut Commands, entity: Entity, error: ForestError) {
+        let text = error.to_string();
+        if self.failure.as_ref() != Some(&text) {
+            error!("the forest {entity} cannot be built: {text}");
+            commands.trigger(ForestFailed { entity, error });
+        }
+        self.failure = Some(text);
+    }
 }
 
 struct Job {
@@ -155,18 +168,23 @@ pub fn tend_forests(
             || wanted.ground.is_some_and(|ground| grounds.contains(&ground))
             || plants.iter().any(|plant| wanted.has(*plant));
         if stale {
-            *work = ForestWork { waits: true, job: None };
+            work.waits = true;
+            work.job = None;
+        }
+        if wanted.is_changed() {
+            work.failure = None;
         }
         if work.waits {
             match sources.gather(&wanted) {
                 Ok(None) => {}
                 Ok(Some(ingredients)) => {
                     let job = background::start(move |wanted| ingredients.build(wanted));
-                    *work = ForestWork { waits: false, job: Some(Job { work: job, ground: wanted.ground }) };
+                    work.waits = false;
+                    work.job = Some(Job { work: job, ground: wanted.ground });
                 }
                 Err(error) => {
                     work.waits = false;
-                    fail(&mut commands, entity, error);
+                    work.fail(&mut commands, entity, error);
                 }
             }
         }
@@ -190,8 +208,11 @@ pub fn tend_forests(
             Ok(built)
         });
         match built {
-            Ok(built) => show(&mut commands, entity, built, &settings, place, ground),
-            Err(error) => fail(&mut commands, entity, error),
+            Ok(built) => {
+                work.failure = None;
+                show(&mut commands, entity, built, &settings, place, ground);
+            }
+            Err(error) => work.fail(&mut commands, entity, error),
         }
     }
 }
@@ -226,9 +247,4 @@ fn show(
         target.try_remove::<Forest>();
     }
     commands.trigger(ForestReady { entity, trees });
-}
-
-fn fail(commands: &mut Commands, entity: Entity, error: ForestError) {
-    error!("the forest {entity} cannot be built: {error}");
-    commands.trigger(ForestFailed { entity, error });
 }
