@@ -6,10 +6,10 @@ use bevy::prelude::*;
 use canopy::prelude::*;
 
 fn main() {
-    App::new().add_plugins((DefaultPlugins, CanopyPlugins, plugin)).run();
+    App::new().add_plugins((DefaultPlugins, CanopyPlugins, plugin)).add_observer(look).run();
 }
 
-/// All of the example but the window.
+/// The scene and its clock.
 pub fn plugin(app: &mut App) {
     app.add_systems(Startup, set_up);
 }
@@ -17,9 +17,9 @@ pub fn plugin(app: &mut App) {
 fn set_up(mut commands: Commands) -> Result {
     // The scene brings its own sun only where the world has none.
     let sun = Sun::at(48.0, 11.0, "2026-06-21T05:00+02:00")?.running(24.0 * 60.0 / 2.0);
-    // In one second of a frame the sun moves by three degrees: half a minute of its clock is lag enough.
+    // A day in two minutes: the sun moves by three degrees a second, and half a minute of its clock is no lag that one sees.
     commands.spawn((sun, SunRefresh::Background { lag: 30.0 }));
-    commands.spawn(CanopyScene::new("assets/scenes/inventory.ron")).observe(look);
+    commands.spawn(CanopyScene::new("assets/scenes/inventory.ron"));
     Ok(())
 }
 

@@ -12,10 +12,11 @@ fn main() {
 
 /// The forest and its light.
 pub fn plugin(app: &mut App) {
-    app.init_resource::<SkySettings>().add_systems(Startup, setup);
+    app.add_systems(Startup, setup);
 }
 
 fn setup(mut commands: Commands, assets: Res<AssetServer>) {
+    commands.spawn(Sun::default());
     let broadleaf: Handle<PlantAsset> = assets.load(PlantAsset::BROADLEAF);
     let conifer: Handle<PlantAsset> = assets.load(PlantAsset::CONIFER);
     let ground = commands.spawn(Terrain3d(assets.load("terrain/jacksboro_6km.tif"))).id();

@@ -4,10 +4,10 @@ use bevy::prelude::*;
 use canopy::prelude::*;
 
 fn main() {
-    App::new().add_plugins((DefaultPlugins, CanopyPlugins, plugin)).run();
+    App::new().add_plugins((DefaultPlugins, CanopyPlugins, plugin)).add_observer(look).run();
 }
 
-/// All of the example but the window.
+/// The scene, its sun and the meshes.
 pub fn plugin(app: &mut App) {
     app.add_systems(Startup, set_up);
 }
@@ -32,10 +32,13 @@ fn place(
             Mesh3d(cube.clone()),
             MeshMaterial3d(clay.clone()),
             Transform::from_xyz(x, ground(x.into(), z.into()) + 1.0, z),
-            // Casts onto trees and ground, as DirectionalLight's shadow maps know neither of them.
+            // Casts onto trees and ground; what trees cast onto it comes by the light's own shadow maps.
             CastsCanopyShadow,
         ));
     }
-    let eye = Vec3::new(0.0, ground(0.0, 26.0) + 3.0, 26.0);
+}
+
+fn look(ready: On<SceneReady>, mut commands: Commands) {
+    let eye = Vec3::new(0.0, ready.stage.terrain.height(0.0, 26.0) as f32 + 3.0, 26.0);
     commands.spawn((CanopyCamera, Transform::from_translation(eye).looking_at(Vec3::Y * 4.0, Vec3::Y)));
 }

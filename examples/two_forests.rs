@@ -14,10 +14,11 @@ fn main() {
 
 /// Both forests and their light.
 pub fn plugin(app: &mut App) {
-    app.init_resource::<SkySettings>().add_systems(Startup, setup);
+    app.add_systems(Startup, setup);
 }
 
 fn setup(mut commands: Commands, assets: Res<AssetServer>, mut maps: ResMut<Assets<TerrainMap>>) -> Result {
+    commands.spawn(Sun::default());
     let ground = commands.spawn(Terrain3d(maps.add(TerrainMap::flat(400.0)?))).id();
     let half = |center: f64| Area::centered(DVec2::new(center, 0.0), DVec2::new(160.0, 300.0));
     commands.spawn((

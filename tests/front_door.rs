@@ -12,7 +12,7 @@ use bevy::{
 };
 use canopy::{
     assets::CanopyAssetPlugin,
-    components::CanopyComponentsPlugin,
+    components::ForestPlugin,
     prelude::*,
     render::components::{Forest, Ground},
 };
@@ -48,7 +48,7 @@ impl Program {
             AssetPlugin { file_path, ..AssetPlugin::default() },
             TransformPlugin,
             CanopyAssetPlugin,
-            CanopyComponentsPlugin,
+            ForestPlugin,
         ));
         app.init_resource::<Heard>()
             .add_observer(|event: On<ForestReady>, mut heard: ResMut<Heard>| {

@@ -5,8 +5,8 @@ use bevy::{
     prelude::*,
 };
 use canopy::{
-    assets::{CanopyAssetPlugin, LoadedScene},
     bake::lighting::LightingSettings,
+    components::{ForestPlugin, ScenePlugin},
     plant::grow::GrowParameters,
     prelude::*,
     terrain::Terrain,
@@ -196,13 +196,14 @@ fn a_scene_is_loaded_by_handle_and_shown() {
         ("scenes/grove.canopy.ron", text.as_bytes()),
         ("scenes/trees.csv", b"x,y,height\n1,2,9\n5,6,11\n"),
     ]);
-    program.app.add_plugins(CanopyScenePlugin::default());
+    program.app.add_plugins(ScenePlugin);
     let handle = program.load::<SceneAsset>("scenes/grove.canopy.ron");
     let scene = program.loaded(&handle).expect("a scene").scene;
     assert_eq!(scene.file.as_deref(), Some(program.folder.path().join("scenes/grove.canopy.ron").as_path()));
-    program.app.world_mut().write_message(LoadScene::new(scene));
-    program.until(|world| world.contains_resource::<LoadedScene>());
-    assert_eq!(program.app.world().resource::<LoadedScene>().stage.stand.trees.len(), 2);
+    let entity = program.app.world_mut().spawn(CanopyScene::new(scene)).id();
+    program.until(|world| world.get::<LoadedScene>(entity).is_some());
+    let stage = program.app.world().get::<LoadedScene>(entity).map(|loaded| loaded.stage.clone());
+    assert_eq!(stage.map(|stage| stage.stand.trees.len()), Some(2));
 }
 
 #[test]
@@ -226,7 +227,7 @@ fn plugins_come_in_any_order_and_a_missing_one_is_no_panic() {
     assert!(app.world().contains_resource::<Assets<PlantAsset>>());
 
     let mut app = App::new();
-    app.add_plugins((MinimalPlugins, CanopyAssetPlugin, canopy::components::CanopyComponentsPlugin));
+    app.add_plugins((MinimalPlugins, CanopyAssetPlugin, ForestPlugin));
     app.finish();
     app.cleanup();
     app.update();

@@ -1,10 +1,16 @@
 //! The examples, drawn without a window.
 
-use bevy::{prelude::*, render::RenderApp};
+use std::time::Duration;
+
+use bevy::{prelude::*, render::RenderApp, time::TimeUpdateStrategy};
 use canopy::{
     app::Renderer,
+    components::DrawnSun,
     prelude::*,
-    render::forest::{ForestStatistics, GpuForests},
+    render::{
+        forest::{ForestStatistics, GpuForests},
+        report::{FrameReport, PassOutcome},
+    },
     scene::{Pose, Viewpoint},
 };
 
@@ -14,6 +20,14 @@ use crate::support::gpu::gpu;
 #[expect(dead_code, reason = "its window")]
 #[path = "../../examples/forest_in_code.rs"]
 mod forest_in_code;
+
+#[expect(dead_code, reason = "its window")]
+#[path = "../../examples/clock.rs"]
+mod clock;
+
+#[expect(dead_code, reason = "its window")]
+#[path = "../../examples/meshes.rs"]
+mod meshes;
 
 #[expect(dead_code, reason = "its window")]
 #[path = "../../examples/two_forests.rs"]
@@ -86,5 +100,58 @@ fn two_forests_are_both_drawn() {
     assert!(0 < one && one < both, "{one} of {both}");
     renderer.app().world_mut().despawn(ready[1].0);
     assert_eq!(drawn(&mut renderer, &view), 0);
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+/// Runs the example until its scene is shown.
+#[track_caller]
+fn run_scene(example: fn(&mut App)) -> Renderer {
+    let mut renderer = Renderer::new((192, 108), None, 1).expect("a renderer");
+    let app = renderer.app();
+    app.add_plugins(example);
+    app.add_observer(|failed: On<SceneFailed>| panic!("{}", *failed));
+    for _ in 0..PATIENCE {
+        app.update();
+        let world = app.world_mut();
+        if world.query::<&LoadedScene>().iter(world).next().is_some() {
+            return renderer;
+        }
+        std::thread::yield_now();
+    }
+    panic!("in vain");
+}
+
+#[test]
+fn a_clock_that_runs_moves_the_light_beside_the_frames() {
+    let gpu = gpu();
+    let mut renderer = run_scene(clock::plugin);
+    let app = renderer.app();
+    // A tenth of a second a frame: 72 seconds of the example's clock.
+    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(100)));
+    let drawn = |app: &App| app.world().resource::<DrawnSun>().0.instant;
+    let (start, mut frames) = (drawn(app), 0);
+    while drawn(app) == start && frames < PATIENCE {
+        app.update();
+        std::thread::yield_now();
+        frames += 1;
+    }
+    let world = app.world_mut();
+    let sun = world.query::<&Sun>().single(world).expect("one sun, the program's").instant;
+    assert!(start < drawn(app) && drawn(app) <= sun, "{start} {} {sun}", drawn(app));
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+#[test]
+fn ordinary_meshes_give_and_take_shadow() {
+    let gpu = gpu();
+    let mut renderer = run_scene(meshes::plugin);
+    let view = Pose { position: (0.0, 12.0, 26.0), yaw: 0.0, pitch: -25.0 }.viewpoint(0.0, 60.0);
+    assert_eq!(drawn(&mut renderer, &view), 1);
+    let world = renderer.app().world_mut();
+    assert_eq!(world.query_filtered::<(), (With<Mesh3d>, With<CastsCanopyShadow>)>().iter(world).count(), 2);
+    let outcomes = world.resource::<FrameReport>().outcomes();
+    let ran =
+        |pass: &str| outcomes.iter().any(|(name, outcome)| name == pass && matches!(outcome, PassOutcome::Ran(_)));
+    assert!(ran("mesh_shadow"), "{outcomes:?}");
     assert_eq!(gpu.messages(), Vec::<String>::new());
 }

@@ -175,7 +175,7 @@ fn level_ground_is_where_the_forest_is() {
     program.until_heard(|heard| heard.ready.len() == 1);
     let shown = program.forest(forest).expect("a forest");
     assert_eq!((shown.stand.trees.len(), shown.origin), (2, DVec3::new(100.0, 5.0, -50.0)));
-    assert!((shown.stand.trees[1].position(shown.stand.cell_size) - DVec3::new(30.0, 2.0, 0.0)).length() < 0.01);
+    assert!((shown.stand.trees[1].position(&shown.stand.grid) - DVec3::new(30.0, 2.0, 0.0)).length() < 0.01);
     let world = program.app.world_mut();
     world.entity_mut(forest).insert(Transform::from_xyz(1.0, 0.0, 0.0));
     world.insert_resource(CanopyOrigin(DVec3::new(1000.0, 0.0, 0.0)));
@@ -194,7 +194,7 @@ fn an_inventory_stands_where_its_rows_say() {
     let stand = program.forest(forest).map(|forest| forest.stand.clone()).expect("a forest");
     let near = |x: f64, z: f64| {
         let place = DVec3::new(x, 0.0, z);
-        stand.trees.iter().any(|tree| (tree.position(stand.cell_size) - place).length() < 0.2)
+        stand.trees.iter().any(|tree| (tree.position(&stand.grid) - place).length() < 0.2)
     };
     assert!(stand.trees.len() == 2 && near(10.0, -20.0) && near(-5.0, 0.0));
 }

@@ -10,7 +10,7 @@ use bevy::{
     },
 };
 
-use super::prepare::MeshShadows;
+use super::casters::MeshShadows;
 use crate::render::{
     components::CanopyCamera,
     forest::{GpuForests, LevelPipelines, draw_levels, representation::LevelTarget},

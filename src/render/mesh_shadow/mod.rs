@@ -7,8 +7,8 @@
 //! Cost: Bevy clears its maps in every frame, so the casters are culled and drawn in every frame: one depth pass a cascade.
 //! Limits: point and spot lights know no trees; the terrain casts onto no mesh.
 
+mod casters;
 mod draw;
-mod prepare;
 
 use bevy::{
     app::{App, Plugin},
@@ -27,8 +27,8 @@ impl Plugin for MeshShadowPlugin {
     fn build(&self, app: &mut App) {
         let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
         render_app
-            .init_gpu_resource::<prepare::MeshShadows>()
-            .add_systems(Render, prepare::prepare_mesh_shadows.in_set(CanopyRenderSystems::Cull))
+            .init_gpu_resource::<casters::MeshShadows>()
+            .add_systems(Render, casters::prepare_mesh_shadows.in_set(CanopyRenderSystems::Cull))
             .add_systems(
                 Core3d,
                 draw::draw_mesh_shadows.after(per_view_shadow_pass::<LATE_SHADOW_PASS>).before(Core3dSystems::MainPass),
