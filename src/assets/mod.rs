@@ -16,6 +16,7 @@ pub(crate) mod background;
 mod error;
 pub(crate) mod ground;
 mod load;
+pub(crate) mod load_error;
 mod plant;
 pub(crate) mod plants;
 mod plugin;
