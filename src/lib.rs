@@ -75,6 +75,7 @@ pub mod prelude {
         render::components::{
             CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, SunShadowSettings, ViewOptions,
         },
+        render::diagnostics::CanopyDiagnosticsPlugin,
         scene::{Overrides, Scene, SceneSource},
     };
 }

@@ -12,13 +12,16 @@ use bevy::{
 };
 use canopy::{
     assets::CanopyAssetPlugin,
-    components::ForestPlugin,
+    components::{ForestPlugin, ScenePlugin},
     prelude::*,
     render::components::{Forest, Ground},
 };
 use tempfile::TempDir;
 
-use crate::support::glb::TreeFile;
+use crate::support::{
+    glb::TreeFile,
+    gpu::{Gpu, gpu},
+};
 
 /// Updates that something may take: minutes, on the slowest machine.
 const PATIENCE: usize = 20_000_000;
@@ -36,10 +39,13 @@ struct Heard {
 struct Program {
     app: App,
     folder: TempDir,
+    /// What is logged here would be heard by a test of pictures.
+    _quiet: Gpu,
 }
 
 impl Program {
     fn new(files: &[(&str, &[u8])]) -> Self {
+        let quiet = gpu();
         let folder = tempfile::tempdir().expect("a temporary folder");
         let file_path = folder.path().display().to_string();
         let mut app = App::new();
@@ -49,6 +55,7 @@ impl Program {
             TransformPlugin,
             CanopyAssetPlugin,
             ForestPlugin,
+            ScenePlugin,
         ));
         app.init_resource::<Heard>()
             .add_observer(|event: On<ForestReady>, mut heard: ResMut<Heard>| {
@@ -63,7 +70,7 @@ impl Program {
             });
         app.finish();
         app.cleanup();
-        let program = Self { app, folder };
+        let program = Self { app, folder, _quiet: quiet };
         for (name, bytes) in files {
             program.write(name, bytes);
         }

@@ -5,6 +5,7 @@ use std::path::Path as FilePath;
 use canopy::app::parse_lighting;
 use canopy::bake::lighting::SunLight;
 use canopy::light::MoonSetting;
+use canopy::lod::{FadeBand, Levels, Representation};
 use canopy::plant::{Gloss, LeafKind};
 use canopy::scatter::{LengthUnit, Sequence};
 use canopy::scene::{
@@ -528,5 +529,30 @@ fn a_scene_in_code_lists_what_is_out_of_range_by_name() -> Outcome {
     let lines: Vec<String> = error.to_string().lines().map(str::to_owned).collect();
     assert!(lines[0].starts_with("the scene `oaks`: `place.latitude` is 100 degrees"), "{error}");
     assert_eq!(lines[1], "the scene `oaks`: `quality.msaa` is 3; write 1 (off) or 4");
+    Ok(())
+}
+
+#[test]
+fn the_levels_of_detail_are_a_list() -> Outcome {
+    let listed = |list: &str| FULL.replace("near_distance: 40,", &format!("near_distance: 40, levels: {list},"));
+    // Without a list, models give way to crosses behind the near distance.
+    let levels = parse(FULL)?.quality.lod_levels();
+    assert_eq!(levels, Levels::model_and_cross(FadeBand::new(40.0, 10.0)));
+    let quality = parse(&listed(r#"[(draw: "model", until: 90, fade: 5), (draw: "cross")]"#))?.quality;
+    assert_eq!(quality.lod_levels(), Levels::model_and_cross(FadeBand::new(90.0, 5.0)));
+    assert_eq!(quality.nearest_level_end(), 95.0);
+    let only = parse(&listed(r#"[(draw: "cross")]"#))?.quality.lod_levels();
+    assert_eq!(only, Levels::only(Representation::CROSS));
+
+    let wrong = listed(r#"[(draw: "modle", until: 90), (draw: "model", until: 50), (draw: "cross")]"#);
+    let message = parse(&wrong).err().ok_or("accepted")?.to_string();
+    for word in [
+        "`quality.levels[0].draw` is \"modle\"; write \"model\" or \"cross\"",
+        "`quality.levels[1].until` is 50 m, where the level before it ends at 110 m",
+    ] {
+        assert!(message.contains(word), "no `{word}` in {message}");
+    }
+    let place = format!("folder/full.ron:{}", place_of(&wrong, "\"modle\"", 0));
+    assert!(message.starts_with(&place), "no `{place}` in {message}");
     Ok(())
 }

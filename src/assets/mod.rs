@@ -15,6 +15,7 @@
 pub(crate) mod background;
 mod error;
 pub(crate) mod ground;
+pub(crate) mod load_error;
 mod plant;
 pub(crate) mod plants;
 mod plugin;

@@ -10,7 +10,6 @@ use super::{StageError, ground, plants, together, trees};
 use crate::{
     bake::{BakeSource, BakedPlant, bake_plant, cache::Cache, lighting::SunLight},
     light::sun::Observer,
-    lod::{FadeBand, Levels},
     progress::Progress,
     render::components::{Forest, Ground, SunShadowSettings},
     scatter::{CoverMap, PackedStand, PackedTree, PlantSize, cover_map, packed::DEFAULT_CELL_SIZE},
@@ -114,7 +113,7 @@ impl Stage {
             plants: self.plants.clone(),
             suns: self.suns.clone(),
             origin: DVec3::ZERO,
-            levels: Levels::model_and_cross(FadeBand::new(quality.near_distance as f32, quality.fade_band as f32)),
+            levels: quality.lod_levels(),
             view_distance: quality.view_distance as f32,
         })
     }
@@ -142,7 +141,7 @@ fn shadow(quality: &Quality) -> SunShadowSettings {
         cascades: quality.cascades as usize,
         distance: quality.shadow_distance,
         // A billboard's level plane would draw a line across the crowns of full models.
-        proxy_distance: quality.near_distance + quality.fade_band,
+        proxy_distance: quality.nearest_level_end(),
         ..SunShadowSettings::default()
     }
 }

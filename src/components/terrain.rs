@@ -21,7 +21,10 @@ use bevy::{
 };
 use tracing::error;
 
-use crate::{assets::TerrainMap, render::components::Ground};
+use crate::{
+    assets::{TerrainMap, load_error::load_error},
+    render::components::Ground,
+};
 
 /// Ground, as a [`TerrainMap`] has it. Once the map is loaded the entity gets the renderer's [`Ground`] and hears
 /// [`TerrainReady`]; another map, or one that was changed, takes the place of the one before when it is loaded.
@@ -86,8 +89,9 @@ pub fn show_terrains(
     }
     for failure in failures.read() {
         for (entity, ..) in terrains.iter().filter(|(_, terrain, ..)| terrain.0.id() == failure.id) {
-            error!("the terrain {entity} cannot be shown: {}", failure.error);
-            commands.trigger(TerrainFailed { entity, error: failure.error.to_string() });
+            let error = load_error(&failure.error);
+            error!("the terrain {entity} cannot be shown: {error}");
+            commands.trigger(TerrainFailed { entity, error });
         }
     }
     for (entity, terrain, settings, ground) in &terrains {

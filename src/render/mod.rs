@@ -18,6 +18,7 @@
 
 pub mod bindings;
 pub mod components;
+pub mod diagnostics;
 pub mod extract;
 pub mod forest;
 pub mod gpu;

@@ -3,6 +3,28 @@
 use serde::Deserialize;
 
 use super::check::Check;
+use crate::lod::{FadeBand, Levels, MAX_LEVELS, Representation};
+
+/// The representations that a scene file can name.
+const REPRESENTATIONS: [Representation; 2] = [Representation::MODEL, Representation::CROSS];
+
+/// One level of detail in a scene file: `(draw: "model", until: 60, fade: 20)`.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct QualityLevel {
+    /// Name of the representation: `"model"` or `"cross"`.
+    pub draw: String,
+    /// Distance in metres at which it begins to give way to the next level, 0 to 200000. Without effect in the last level.
+    #[serde(default)]
+    pub until: f64,
+    /// Width in metres of the band over which it does, 0.1 to 1000. Default 20.
+    #[serde(default = "default_fade")]
+    pub fade: f64,
+}
+
+fn default_fade() -> f64 {
+    20.0
+}
 
 /// Drawing quality.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -20,6 +42,9 @@ pub struct Quality {
     /// Width in metres of the band behind `near_distance` in which models fade into crosses, 0.1 to 1000.
     /// Wider: softer change, more trees drawn twice. Default 20.
     pub fade_band: f64,
+    /// The levels of detail from near to far, at most 8. Default: empty, which is `"model"` until `near_distance` and `"cross"`
+    /// behind it; a list replaces both values.
+    pub levels: Vec<QualityLevel>,
     /// Samples per pixel, 1 or 4. 4: smooth leaf edges, slower. Default 4.
     pub msaa: u32,
     /// Edge of a cross plane's picture in texels, 64 to 1024, rounded up to a power of two. Higher: sharper far trees, memory.
@@ -39,6 +64,7 @@ impl Default for Quality {
             shadow_distance: 800.0,
             near_distance: 60.0,
             fade_band: 20.0,
+            levels: Vec::new(),
             msaa: 4,
             cross_resolution: 256,
             view_distance: 20_000.0,
@@ -48,6 +74,31 @@ impl Default for Quality {
 }
 
 impl Quality {
+    /// The levels of detail that it asks for. Names that no scene file can have are left out.
+    pub fn lod_levels(&self) -> Levels {
+        let band = |level: &QualityLevel| FadeBand::new(level.until as f32, level.fade as f32);
+        let known = self.levels.iter().filter_map(|level| {
+            let representation = REPRESENTATIONS.into_iter().find(|known| known.name() == level.draw)?;
+            Some((representation, band(level)))
+        });
+        let mut levels: Option<(Levels, FadeBand)> = None;
+        for (representation, fade) in known {
+            levels = Some(match levels {
+                None => (Levels::only(representation), fade),
+                Some((nearer, before)) => (nearer.then(before, representation), fade),
+            });
+        }
+        levels.map_or_else(
+            || Levels::model_and_cross(FadeBand::new(self.near_distance as f32, self.fade_band as f32)),
+            |(levels, _)| levels,
+        )
+    }
+
+    /// Distance in metres at which the nearest level is gone.
+    pub fn nearest_level_end(&self) -> f64 {
+        self.lod_levels().fade_out(0).map_or(self.view_distance, |fade| fade.end.into())
+    }
+
     pub(super) fn check(&self, check: &mut Check) {
         if !self.shadow_map_size.is_power_of_two() || !(256..=8192).contains(&self.shadow_map_size) {
             check.problem(
@@ -60,6 +111,31 @@ impl Quality {
         check.number("quality.shadow_distance", self.shadow_distance, 10.0..=20_000.0, "m");
         check.number("quality.near_distance", self.near_distance, 0.0..=5_000.0, "m");
         check.number("quality.fade_band", self.fade_band, 0.1..=1_000.0, "m");
+        if self.levels.len() > MAX_LEVELS {
+            let count = self.levels.len();
+            check.problem("quality.levels", format!("has {count} levels"), format!("keep {MAX_LEVELS} at most"));
+        }
+        let mut nearer = 0.0;
+        for (index, level) in self.levels.iter().enumerate() {
+            let place = |field: &str| format!("quality.levels[{index}].{field}");
+            if !REPRESENTATIONS.iter().any(|known| known.name() == level.draw) {
+                let names = REPRESENTATIONS.map(|known| format!("\"{}\"", known.name())).join(" or ");
+                check.problem(&place("draw"), format!("is \"{}\"", level.draw), format!("write {names}"));
+            }
+            if index + 1 == self.levels.len() {
+                break;
+            }
+            check.number(&place("until"), level.until, 0.0..=200_000.0, "m");
+            check.number(&place("fade"), level.fade, 0.1..=1_000.0, "m");
+            if level.until < nearer {
+                check.problem(
+                    &place("until"),
+                    format!("is {} m, where the level before it ends at {nearer} m", level.until),
+                    "list the levels from near to far, and leave each room for its fade",
+                );
+            }
+            nearer = level.until + level.fade;
+        }
         if self.msaa != 1 && self.msaa != 4 {
             check.problem("quality.msaa", format!("is {}", self.msaa), "write 1 (off) or 4");
         }

@@ -45,7 +45,8 @@ struct Heard {
 fn run(example: fn(&mut App), forests: usize) -> Renderer {
     let mut renderer = Renderer::new((192, 108), None, 1).expect("a renderer");
     let app = renderer.app();
-    app.add_plugins(example);
+    // The renderer's app has its plugins; the example's is a function.
+    example(app);
     app.init_resource::<Heard>();
     app.add_observer(|event: On<ForestReady>, mut heard: ResMut<Heard>| heard.ready.push((event.entity, event.trees)));
     app.add_observer(|event: On<ForestFailed>, mut heard: ResMut<Heard>| heard.failed.push(event.error.to_string()));

@@ -3,9 +3,11 @@
 use std::sync::Arc;
 
 use bevy::{
+    app::Plugin,
     asset::RenderAssetUsages,
     camera::{RenderTarget, visibility::RenderLayers},
     core_pipeline::prepass::MotionVectorPrepass,
+    diagnostic::{Diagnostic, DiagnosticPath, DiagnosticsStore},
     prelude::*,
     render::{RenderApp, render_resource::TextureFormat, view::Msaa},
 };
@@ -19,7 +21,8 @@ use canopy::{
     },
     render::{
         components::{CanopyCamera, CastsCanopyShadow, Forest, SunShadowSettings},
-        forest::GpuForests,
+        diagnostics::CanopyDiagnosticsPlugin,
+        forest::{ForestStatistics, GpuForests},
     },
     scene::Viewpoint,
 };
@@ -357,4 +360,27 @@ fn an_ordinary_mesh_receives_the_shadow_of_trees() {
     // Controls: without a tree nothing is shaded, and nothing is where the light has no maps.
     assert_eq!(darker(&seen(false, true), &seen(false, false)), 0);
     assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+#[test]
+fn counts_are_diagnostics() {
+    let _gpu = gpu();
+    let built = grove(1);
+    let mut renderer = showing(&built.stage);
+    renderer.app().add_plugins(CanopyDiagnosticsPlugin);
+    // Added late, as here, a plugin is finished by hand.
+    CanopyDiagnosticsPlugin.finish(renderer.app());
+    draw(&mut renderer, &built.stage, &super::pictures::over_the_grove(&built.stage), NOON);
+    again(&mut renderer);
+    let statistics = renderer.app().sub_app(RenderApp).world().resource::<ForestStatistics>().clone();
+    let store = renderer.app().world().resource::<DiagnosticsStore>();
+    let value = |path: &str| store.get(&DiagnosticPath::new(path.to_owned())).and_then(Diagnostic::value);
+    for level in &statistics.levels {
+        let name = level.representation.name();
+        assert!(level.trees > 0);
+        assert_eq!(value(&format!("canopy/forest/{name}/trees")), Some(level.trees as f64));
+        assert_eq!(value(&format!("canopy/forest/{name}/triangles")), Some(level.triangles as f64));
+    }
+    assert!(value("canopy/terrain/tiles").is_some_and(|tiles| tiles > 0.0));
+    assert_eq!(value("canopy/forest/none/trees"), None);
 }

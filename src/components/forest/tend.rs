@@ -27,6 +27,7 @@ use crate::{
     assets::{
         PlantAsset, StageError, TerrainMap,
         background::{self, Background},
+        load_error::load_error,
         stage::check_trees,
     },
     components::{Terrain3d, cover::ForestCover},
@@ -102,7 +103,7 @@ impl Sources<'_, '_> {
     /// Why an asset cannot be loaded, where it cannot.
     fn failure(&self, id: impl Into<UntypedAssetId>) -> Option<String> {
         match self.server.as_ref()?.get_load_state(id)? {
-            LoadState::Failed(error) => Some(error.to_string()),
+            LoadState::Failed(error) => Some(load_error(&error)),
             LoadState::NotLoaded | LoadState::Loading | LoadState::Loaded => None,
         }
     }
