@@ -31,7 +31,7 @@ use crate::{
         stage::check_trees,
     },
     components::{Terrain3d, cover::ForestCover},
-    render::components::{CanopyOrigin, Forest},
+    render::components::Forest,
 };
 
 /// What is under way for a forest.
@@ -96,7 +96,7 @@ pub struct Sources<'w, 's> {
     plants: Res<'w, Assets<PlantAsset>>,
     maps: Res<'w, Assets<TerrainMap>>,
     server: Option<Res<'w, AssetServer>>,
-    terrains: Query<'w, 's, (Entity, Ref<'static, Terrain3d>)>,
+    terrains: Query<'w, 's, (Entity, Ref<'static, Terrain3d>, &'static GlobalTransform)>,
 }
 
 impl Sources<'_, '_> {
@@ -114,7 +114,7 @@ impl Sources<'_, '_> {
             return Err(ForestError::NoSpecies);
         }
         let ground = forest.ground.map(|ground| self.terrains.get(ground).map_err(|_| ForestError::NoTerrain(ground)));
-        let ground = ground.transpose()?.map(|(_, terrain)| terrain.0.id());
+        let ground = ground.transpose()?.map(|(_, terrain, _)| terrain.0.id());
         // What has failed is said at once, whatever else is still on its way.
         if let Some(error) = forest.species.iter().find_map(|species| self.failure(species.plant.id())) {
             return Err(ForestError::Plant(error));
@@ -136,17 +136,9 @@ impl Sources<'_, '_> {
 /// Builds forests and gives their entities what the renderer draws.
 pub fn tend_forests(
     mut commands: Commands,
-    mut forests: Query<(
-        Entity,
-        Ref<Forest3d>,
-        Ref<ForestSettings>,
-        &GlobalTransform,
-        &mut ForestWork,
-        Option<&mut Forest>,
-    )>,
+    mut forests: Query<(Entity, Ref<Forest3d>, Ref<ForestSettings>, &mut ForestWork, Option<&mut Forest>)>,
     mut changes: Changes,
     sources: Sources,
-    origin: Option<Res<CanopyOrigin>>,
     device: Option<Res<RenderDevice>>,
 ) {
     for entity in changes.removed_forests.read().filter(|entity| !forests.contains(*entity)) {
@@ -157,14 +149,12 @@ pub fn tend_forests(
     let (plants, maps) = (changes.changed_plants(), changes.changed_maps());
     let mut grounds: HashSet<Entity> = changes.removed_terrains.read().collect();
     let moved = |terrain: &Ref<Terrain3d>| terrain.is_changed() || maps.contains(&terrain.0.id());
-    grounds.extend(sources.terrains.iter().filter(|(_, terrain)| moved(terrain)).map(|(entity, _)| entity));
-    let base = origin.map_or(DVec3::ZERO, |origin| origin.0);
+    grounds.extend(sources.terrains.iter().filter(|(_, terrain, _)| moved(terrain)).map(|(entity, ..)| entity));
 
-    for (entity, wanted, settings, transform, mut work, shown) in &mut forests {
-        let place = match wanted.ground {
-            Some(_) => DVec3::ZERO,
-            None => base + transform.translation().as_dvec3(),
-        };
+    for (entity, wanted, settings, mut work, shown) in &mut forests {
+        // Trees stand on their terrain wherever that is; the forest's own transform is the renderer's affair.
+        let terrain = wanted.ground.and_then(|ground| sources.terrains.get(ground).ok());
+        let place = terrain.map_or(DVec3::ZERO, |(.., transform)| transform.translation().as_dvec3());
         let stale = wanted.is_changed()
             || wanted.ground.is_some_and(|ground| grounds.contains(&ground))
             || plants.iter().any(|plant| wanted.has(*plant));
