@@ -1,4 +1,4 @@
-//! Follows the forests of a world: builds what is new or has changed, beside the frames.
+//! Builds new and changed forests of a world in the background.
 
 use std::collections::HashSet;
 
@@ -33,13 +33,13 @@ use crate::{
     render::components::{CanopyOrigin, Forest},
 };
 
-/// What is under way for a forest.
+/// The state of a forest's build.
 #[derive(Component, Default)]
 pub struct ForestWork {
-    /// What was asked for is not being built yet: something is still missing.
+    /// The build has not started yet: something is still missing.
     waits: bool,
     job: Option<Job>,
-    /// Why it could not be built the last time: what is known is not said again.
+    /// Why the last build failed: the same error is not logged again.
     failure: Option<String>,
 }
 
@@ -99,7 +99,7 @@ pub struct Sources<'w, 's> {
 }
 
 impl Sources<'_, '_> {
-    /// Why an asset cannot be loaded, where it cannot.
+    /// Why an asset cannot be loaded, if it failed.
     fn failure(&self, id: impl Into<UntypedAssetId>) -> Option<String> {
         match self.server.as_ref()?.get_load_state(id)? {
             LoadState::Failed(error) => Some(error.to_string()),
@@ -114,7 +114,7 @@ impl Sources<'_, '_> {
         }
         let ground = forest.ground.map(|ground| self.terrains.get(ground).map_err(|_| ForestError::NoTerrain(ground)));
         let ground = ground.transpose()?.map(|(_, terrain)| terrain.0.id());
-        // What has failed is said at once, whatever else is still on its way.
+        // Report a failure at once, whatever else is still being loaded.
         if let Some(error) = forest.species.iter().find_map(|species| self.failure(species.plant.id())) {
             return Err(ForestError::Plant(error));
         }
@@ -132,7 +132,7 @@ impl Sources<'_, '_> {
     }
 }
 
-/// Builds forests and gives their entities what the renderer draws.
+/// Builds forests and inserts the renderer's components on their entities.
 pub fn tend_forests(
     mut commands: Commands,
     mut forests: Query<(
@@ -189,7 +189,7 @@ pub fn tend_forests(
             }
         }
         if let Some(mut shown) = shown {
-            // Each of these marks the forest as changed, so only where it is.
+            // Each assignment marks the forest as changed, so only assign real changes.
             if shown.origin != place {
                 shown.origin = place;
             }
