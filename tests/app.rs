@@ -132,7 +132,7 @@ fn info_tells_what_would_be_ignored_and_why() {
     heights.save(path("heights.png")).expect("a picture");
     assert_says(
         &described(&path("heights.png")),
-        &["4 x 3", "0 to 3002 of 65535", "says nothing about metres", "Image("],
+        &["4 x 3", "0 to 3002 of 65535", "neither a scale in metres", "Image("],
     );
     image::RgbImage::new(4, 4).save(path("photo.png")).expect("a picture");
     assert!(info(&path("photo.png")).is_err_and(|error| error.to_string().contains("16-bit greyscale")));

@@ -244,7 +244,7 @@ fn an_adapter_that_is_not_there_is_named() {
     let _gpu = gpu();
     let case = Case::new(&plain(), &[]);
     let output = case.render(&case.path("a.png"), &["--adapter", "abacus"]).output().expect("the program");
-    assert_refused(&output, &["abacus", "there are:"]);
+    assert_refused(&output, &["abacus", "available:"]);
 }
 
 #[test]
