@@ -1,7 +1,7 @@
 //! Constants that Rust and the shaders share: the WGSL module `canopy::constants`, written from the Rust constants.
 //!
-//! A number stands once, in the room that it belongs to. Shaders import it by its name here; the test that validates every
-//! shader composes them with the same text.
+//! Each number is defined once, in the module that it belongs to. Shaders import it by its name here. The test that
+//! validates every shader composes them with the same text.
 
 use std::fmt::Write as _;
 
@@ -40,7 +40,7 @@ impl From<u32> for Value {
     }
 }
 
-/// All shared constants: name in WGSL, what it is, value.
+/// All shared constants: name in WGSL, description, value.
 pub fn constants() -> Vec<(&'static str, &'static str, Value)> {
     let uint = |value: usize| Value::Uint(value as u32);
     let float = |value: usize| Value::Float(value as f32);
