@@ -126,7 +126,7 @@ impl GroundFile {
 }
 
 impl GroundImage {
-    /// The greyscale picture `path` with `spacing` metres between pixels; black is at 0 m, white at `high` metres.
+    /// The greyscale image `path` with `spacing` metres between pixels; black is at 0 m, white at `high` metres.
     pub fn new(path: impl Into<PathBuf>, spacing: f64, high: f64) -> Self {
         Self { path: path.into(), spacing, low: 0.0, high }
     }

@@ -24,7 +24,7 @@ pub enum Command {
     /// Let the camera go below the ground.
     Underground,
     /// Save an image.
-    Picture,
+    SaveImage,
     /// Show all keys.
     Help,
     /// Show the small overlay.
@@ -134,7 +134,7 @@ pub fn command(code: KeyCode, key: &Key, shift: bool, repeat: bool) -> Option<Co
             " " => Command::Pause,
             "t" => Command::Tint,
             "u" => Command::Underground,
-            "p" => Command::Picture,
+            "p" => Command::SaveImage,
             "h" => Command::Help,
             "o" => Command::Overlay,
             "l" => Command::Light,

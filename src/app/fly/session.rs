@@ -142,7 +142,7 @@ impl Session {
     pub fn carry_out(&mut self, command: Command) {
         match command {
             Command::Leave | Command::Light => {}
-            Command::Picture => self.capturing = true,
+            Command::SaveImage => self.capturing = true,
             Command::Tour if self.tour.is_none() => {
                 self.show_message("this scene has no camera path; add `camera: (path: [...])` to its file".to_owned());
             }

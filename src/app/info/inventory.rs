@@ -1,4 +1,4 @@
-//! Inventories: the columns, and what stands in them.
+//! Inventories: the columns and their contents.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -31,7 +31,7 @@ pub(super) fn describe_file(page: &mut Page, path: &Path) -> Result<(), AppError
     Ok(())
 }
 
-/// What stands in the rows.
+/// The contents of the rows.
 pub(super) fn describe(page: &mut Page, inventory: &Inventory) {
     let rows = &inventory.rows;
     if rows.is_empty() {

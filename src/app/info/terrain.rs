@@ -1,4 +1,4 @@
-//! Terrains: files as they are, and pictures of heights that lack their metres.
+//! Terrains: files with a scale, and height images without one.
 
 use std::path::Path;
 

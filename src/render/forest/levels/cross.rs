@@ -56,19 +56,19 @@ pub enum CrossLight {
     /// Some by lighting textures.
     Mixed,
     /// All by lighting textures.
-    Pictures,
+    Textured,
 }
 
 impl CrossLight {
     /// All values.
-    pub const ALL: [Self; 3] = [Self::Plain, Self::Mixed, Self::Pictures];
+    pub const ALL: [Self; 3] = [Self::Plain, Self::Mixed, Self::Textured];
 
     /// The value for the crosses of these plants.
     pub fn of(plants: &[BakedPlant]) -> Self {
         let lit = plants.iter().filter(|plant| has_light(plant)).count();
         match lit {
             0 => Self::Plain,
-            all if all == plants.len() => Self::Pictures,
+            all if all == plants.len() => Self::Textured,
             _ => Self::Mixed,
         }
     }
