@@ -1,14 +1,14 @@
-//! Question: which order of a fade pops less, leaf by leaf or from the centre of the picture outwards?
+//! Question: which order of a fade pops less, leaf by leaf or from the centre of the image outwards?
 //!
-//! A tree changes its level of detail while its alpha threshold moves ([`canopy::lod::FadeBand`]). Here a crown is drawn at
-//! every sixteenth of that way, as a picture of its crosses, as its full model, and as both while one gives way to the other,
-//! and each picture is compared with the one before: the share of the crown's area that changes, root mean square error of
-//! linear light, and mean FLIP [Andersson et al. 2020] at 67 pixels a degree. A fade that does not pop changes little from
-//! step to step, and no step much more than the others. The crown stands before a bright sky, the worst case: in a forest
-//! other trees are behind it.
+//! A tree changes its level of detail while its alpha threshold moves ([`canopy::lod::FadeBand`]). Here a crown is
+//! drawn at every sixteenth of that way, as an image of its crosses, as its full model, and as both while one gives way
+//! to the other, and each image is compared with the one before: the share of the crown's area that changes, root mean
+//! square error of linear light, and mean FLIP [Andersson et al. 2020] at 67 pixels a degree. A fade that does not pop
+//! changes little from step to step, and no step much more than the others. The crown stands before a bright sky, the
+//! worst case: in a forest other trees are behind it.
 //!
-//! A second table asks what the order costs where nothing fades: the whole crown in each mip of its crosses, against the mean
-//! of what the finest level shows there.
+//! A second table asks what the order costs where nothing fades: the whole crown in each mip of its crosses, against
+//! the mean of what the finest level shows there.
 //!
 //! Results: `docs/measurements/alpha-fade.md`.
 
@@ -45,7 +45,7 @@ struct Pixel {
     color: Vec3,
 }
 
-/// A square picture of the crown alone.
+/// A square image of the crown alone.
 type Picture = Vec<Pixel>;
 
 /// Largest and mean value of a series.
@@ -85,7 +85,7 @@ fn fading() {
                 let settings = CrossSettings { fade, ..CrossSettings::default() };
                 let chain = &bake_cross(&tree, &BakedLighting::Local, &settings).textures.color[0];
                 let (side, _) = chain.level_size(level);
-                let picture = RgbaImage::from_raw(side, side, chain.levels[level].clone()).expect("a square picture");
+                let picture = RgbaImage::from_raw(side, side, chain.levels[level].clone()).expect("a square image");
                 report(&species.name, "crosses", side as usize, fade, |threshold| of_texture(&picture, threshold));
             }
         }
@@ -115,7 +115,7 @@ fn at_rest() {
                 let of = |level: usize| {
                     let (side, _) = chain.level_size(level);
                     let texture = RgbaImage::from_raw(side, side, chain.levels[level].clone());
-                    of_texture(&texture.expect("a square picture"), 0.5)
+                    of_texture(&texture.expect("a square image"), 0.5)
                 };
                 let side = chain.level_size(level).0 as usize;
                 let (truth, mip) = (averaged(&of(0), chain.width as usize, 1 << level), of(level));
@@ -132,7 +132,7 @@ fn at_rest() {
     }
 }
 
-/// A picture of `width` pixels a row with the mean of `times`² of them in each.
+/// An image of `width` pixels a row with the mean of `times`² of them in each.
 fn averaged(picture: &Picture, width: usize, times: usize) -> Picture {
     let side = width / times;
     let mean = |index: usize| {
@@ -248,8 +248,8 @@ fn foliage_of(tree: &Plant) -> Vec<PlantPart> {
     tree.parts.iter().filter(|part| part.kind == PartKind::Foliage).cloned().collect()
 }
 
-/// The foliage of a tree with the mip of the leaves' picture that has about a texel a pixel, where the tree is `side` pixels
-/// high.
+/// The foliage of a tree with the mip of the leaves' image that has about a texel a pixel, where the tree is `side`
+/// pixels high.
 fn crown(tree: &Plant, fade: AlphaFade, side: usize) -> Plant {
     let texel = tree.height() / side as f32;
     let mut parts = foliage_of(tree);

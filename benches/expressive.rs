@@ -1,17 +1,17 @@
 //! Question: how far is the light of `expressive` from the truth, and with which constants of the shader is it nearest?
 //!
-//! The shader (`with_indirect_ambient` and `leaf_visibility` in `shaders/forest/instance.wgsl`, `even_sky` and `shade` in
-//! `shaders/common/lighting.wgsl`) turns k_a and a crown's normal into light; here is its twin. Points lie evenly over the
-//! leaves, each with its two sides, and count by how much of them is seen from all around. The truth is their exitant
-//! radiance by the path tracer under the sky alone and under the sun alone, all bounces included.
+//! The shader (`with_indirect_ambient` and `leaf_visibility` in `shaders/forest/instance.wgsl`, `even_sky` and `shade`
+//! in `shaders/common/lighting.wgsl`) turns k_a and a crown's normal into light; here is its twin. Points lie evenly
+//! over the leaves, each with its two sides, and count by how much of them is seen from all around. The truth is their
+//! exitant radiance by the path tracer under the sky alone and under the sun alone, all bounces included.
 //!
 //! What the shader knows of the sun: the visibility along a ray, and the share that a shadow map of the near
 //! cascade finds, which looks from a place before the leaf and over three texels.
 //!
 //! A cell of the first table has three numbers before the fit and three after it: error of classes, light as a share of
 //! the truth's, and relative RMSE of single sides. A crown's normal says nothing of a single leaf's, so the last hardly
-//! depends on the constants. They are fitted to means: of classes of k_a, twelve a plant and hour, each relative to that
-//! plant's mean.
+//! depends on the constants. They are fitted to means: of classes of k_a, twelve a plant and hour, each relative to
+//! that plant's mean.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -157,7 +157,7 @@ fn is_free(tracer: &PlantTracer, origin: Vec3, direction: Vec3) -> bool {
     !tracer.occluded(&Ray { origin, direction, t_max: f32::INFINITY })
 }
 
-/// Twin of `cascade_visibility`, on the leaves themselves instead of their picture.
+/// Twin of `cascade_visibility`, on the leaves themselves instead of their image.
 fn mapped(tracer: &PlantTracer, point: &Point, light: Vec3) -> f64 {
     const TAPS: usize = 16;
     let slope = 1.0 - point.normal.dot(light).abs();
@@ -222,8 +222,8 @@ fn sides(
     sides
 }
 
-/// Means of the shader's light and of the truth over classes of `sides`, which ascend by k_a, relative to the mean of the truth, with weights
-/// that sum to 1.
+/// Means of the shader's light and of the truth over classes of `sides`, which ascend by k_a, relative to the mean of
+/// the truth, with weights that sum to 1.
 fn classes(sides: &[Side], light: impl Fn(&Side) -> (f64, f64)) -> Vec<(f64, f64, f64)> {
     let total: f64 = sides.iter().map(|side| side.weight).sum();
     let mean: f64 = sides.iter().map(|side| side.weight * light(side).1).sum::<f64>() / total;

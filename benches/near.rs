@@ -1,17 +1,17 @@
-//! Question: how near is a near tree's picture to the truth, and by which light of its foliage?
+//! Question: how near is a near tree's image to the truth, and by which light of its foliage?
 //!
 //! One tree and a small stand, at noon and against a low sun, are drawn with each light and traced by
 //! [`canopy::app::reference`] from the same view in the same light, with the same tone curve. Every picture is compared
-//! with the traced one: mean FLIP at 67 pixels per degree over the whole picture, and where the trees are (where the
-//! picture without trees differs from the traced one) the relative RMSE and the light, both linear.
+//! with the traced one: mean FLIP at 67 pixels per degree over the whole image, and where the trees are (where the
+//! image without trees differs from the traced one) the relative RMSE and the light, both linear.
 //!
 //! `harmonics` is `transfer` with the sun through the transfer too, as published.
 //!
-//! The second table is of dense stands seen from above, with the light and against it, drawn as full models and as crosses,
-//! by the default light: what neighbours do to a tree's light, which no bake of a single tree knows. Nothing of it is fitted
-//! but the share of a crosses' leaves that is both lit and seen.
+//! The second table is of dense stands seen from above, with the light and against it, drawn as full models and as
+//! crosses, by the default light: what neighbours do to a tree's light, which no bake of a single tree knows. Nothing
+//! of it is fitted but the share of a crosses' leaves that is both lit and seen.
 //!
-//! With `--out` the pictures stay, and each row of the table is one more picture: local, expressive, transfer, traced.
+//! With `--out` the images stay, and each row of the table is one more image: local, expressive, transfer, traced.
 
 use std::path::{Path, PathBuf};
 
@@ -27,20 +27,20 @@ use canopy::{
 use clap::Parser;
 use nv_flip::{FlipImageRgb8, FlipPool, flip};
 
-/// Pictures of near trees against the path tracer.
+/// Images of near trees against the path tracer.
 #[derive(Parser, Debug)]
 #[command(name = "near")]
 struct Arguments {
-    /// Picture size in pixels.
+    /// Image size in pixels.
     #[arg(long, default_value = "480x480", value_parser = parse_size)]
     size: (u32, u32),
-    /// Samples a pixel of the traced pictures.
+    /// Samples a pixel of the traced images.
     #[arg(long, default_value_t = 128)]
     spp: u32,
     /// Which tables.
     #[arg(long, value_delimiter = ',', default_value = "near,stands")]
     only: Vec<String>,
-    /// Folder for the pictures.
+    /// Folder for the images.
     #[arg(long)]
     out: Option<PathBuf>,
     /// Given by cargo.
@@ -50,7 +50,7 @@ struct Arguments {
 
 const SCENES: [&str; 2] = ["one_tree", "small_stand"];
 const LIGHTS: [&str; 4] = ["local", "expressive", "transfer", "harmonics"];
-/// How many of them have a place in the row of pictures.
+/// How many of them have a place in the row of images.
 const SHOWN: usize = 3;
 /// Noon, with the sun high behind the camera, and evening, with the sun low on the left before it.
 const HOURS: [(&str, &str); 2] = [("noon", "2026-06-21T12:30+01:00"), ("low sun", "2026-06-21T19:15+01:00")];
@@ -100,7 +100,8 @@ fn near(arguments: &Arguments, folder: &Path) -> anyhow::Result<()> {
 
 /// Views of a stand of 120 m by 120 m: name, camera (x, height, z), yaw.
 const VIEWS: [(&str, &str, u32); 2] = [("looking north", "(0, 32, 10)", 0), ("looking south", "(0, 32, -140)", 180)];
-/// Hours of the stands: the sun 64 degrees high in the south, 9 degrees in the north-west, and 3 degrees under the horizon.
+/// Hours of the stands: the sun 64 degrees high in the south, 9 degrees in the north-west, and 3 degrees under the
+/// horizon.
 const STAND_HOURS: [(&str, &str); 3] =
     [("noon", "2026-06-21T11:30+00:00"), ("low sun", "2026-06-21T18:15+00:00"), ("dusk", "2026-06-21T19:50+00:00")];
 
@@ -134,7 +135,7 @@ fn stands(arguments: &Arguments, folder: &Path) -> anyhow::Result<()> {
                 let at: LocalTime = at.parse()?;
                 let name = |what: &str| folder.join(format!("{kind}-{view}-{hour}-{what}.png").replace(' ', "-"));
                 let traced = trace(arguments, &forms[0].1, at, &name("traced"))?;
-                // The lower part of the pictures is all trees.
+                // The lower part of the images is all trees.
                 let canopy = |index: usize| index / traced.width as usize >= traced.height as usize * 5 / 12;
                 for (form, scene) in &forms {
                     let drawn = draw(arguments, scene, Some("transfer"), at)?;
@@ -184,7 +185,7 @@ fn trace(arguments: &Arguments, scene: &Scene, at: LocalTime, out: &Path) -> any
     Ok(Picture { width: image.width(), height: image.height(), pixels: image.into_raw() })
 }
 
-/// Whether a tree stands in pixel `index`: where the picture without trees differs from the traced one.
+/// Whether a tree stands in pixel `index`: where the image without trees differs from the traced one.
 fn of_tree(truth: &Picture, bare: &Picture, index: usize) -> bool {
     let pixel = |picture: &Picture| [0, 1, 2].map(|c| picture.pixels[3 * index + c]);
     pixel(truth).iter().zip(pixel(bare)).any(|(a, b)| a.abs_diff(b) >= 40)
@@ -209,7 +210,7 @@ fn compare(truth: &Picture, drawn: &Picture, counted: impl Fn(usize) -> bool) ->
     (mean, (squared / square).sqrt(), sum / of)
 }
 
-/// The pictures of one size beside each other.
+/// The images of one size beside each other.
 fn beside(pictures: &[Picture]) -> Picture {
     let (width, height) = pictures.first().map_or((0, 0), |picture| (picture.width, picture.height));
     let row = 3 * width as usize;

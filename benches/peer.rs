@@ -39,7 +39,7 @@ struct Arguments {
     /// Sizes of the stands, at 282 trees a hectare.
     #[arg(long, value_delimiter = ',', default_values_t = [1_000, 28_200, 100_000])]
     trees: Vec<u32>,
-    /// Picture size in pixels.
+    /// Image size in pixels.
     #[arg(long, default_value = "640x360", value_parser = parse_size)]
     size: (u32, u32),
     /// Timed frames of each side and series.
@@ -51,7 +51,7 @@ struct Arguments {
     /// The tree, as glTF. Without it $CANOPY_DATA/trees/oak-medium.glb, or where that is absent one grown by rule.
     #[arg(long)]
     plant: Option<PathBuf>,
-    /// Folder for the pictures of both sides.
+    /// Folder for the images of both sides.
     #[arg(long)]
     out: Option<PathBuf>,
     /// Metres to which trees are full models on both sides.
@@ -78,11 +78,11 @@ struct Arguments {
     /// Runs one side alone, for a profiler; no ratios then.
     #[arg(long)]
     only: Option<Side>,
-    /// Trees of the stand whose pictures are compared with full models; 0 for none. Full models and their shadows are
+    /// Trees of the stand whose images are compared with full models; 0 for none. Full models and their shadows are
     /// slow without a GPU: choose fewer there.
     #[arg(long, default_value_t = 1_000)]
     error_trees: u32,
-    /// Hours of the day, UTC, at which pictures are compared: the sun from behind, high, low and from the front.
+    /// Hours of the day, UTC, at which images are compared: the sun from behind, high, low and from the front.
     #[arg(long, value_delimiter = ',', default_values_t = [8.5, 11.25, 17.0, 19.0])]
     error_hours: Vec<f64>,
     /// Cargo says so to every benchmark; nothing depends on it.

@@ -2,9 +2,9 @@
 //!
 //! 1. Million rays a second through a grown broadleaf and through a small stand of them on hills: the first surface of
 //!    rays from a camera, the first surface of rays between the leaves, and whether such rays meet anything.
-//! 2. Relative error of a picture of the stand over the samples a pixel, against one of many samples and another seed,
+//! 2. Relative error of an image of the stand over the samples per pixel, against one of many samples and another seed,
 //!    with the seconds it takes. Independent samples would keep the last column level: error times root of samples.
-//! 3. Share of the light in a picture of the stand from above that is missing when light is scattered between surfaces
+//! 3. Share of the light in an image of the stand from above that is missing when light is scattered between surfaces
 //!    a few times only.
 //!
 //! Run `cargo bench --bench reference -- --help` for the arguments.
@@ -44,13 +44,13 @@ struct Arguments {
     /// Rays of each contestant.
     #[arg(long, default_value_t = 400_000)]
     rays: u64,
-    /// Width of the picture in pixels; its height is three quarters of it.
+    /// Width of the image in pixels; its height is three quarters of it.
     #[arg(long, default_value_t = 64)]
     width: u32,
-    /// Samples a pixel of the picture that errors are measured against.
+    /// Samples a pixel of the image that errors are measured against.
     #[arg(long, default_value_t = 1024)]
     truth: u32,
-    /// Most samples a pixel of the pictures that are measured.
+    /// Most samples per pixel of the images that are measured.
     #[arg(long, default_value_t = 64)]
     most: u32,
     /// Cargo hands this on.
@@ -182,7 +182,7 @@ fn trace(scene: &ReferenceScene, light: &Light, settings: TraceSettings, shot: &
     tracer.render(shot, film, samples, &mut on).expect("the camera is possible");
 }
 
-/// What is missing without the later bounces, over the picture's mean.
+/// What is missing without the later bounces, over the image's mean.
 fn bounces(scene: &ReferenceScene, shot: &Shot, samples: u32) {
     let light = Light::of(&daylight(), None);
     let mean = |bounces: u32| {

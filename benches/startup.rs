@@ -1,12 +1,12 @@
-//! Question: what does a user wait for between `canopy render` and the picture on disk?
+//! Question: what does a user wait for between `canopy render` and the image on disk?
 //!
 //! The steps of the program on the demo scene, timed one by one in a process of their own for each turn, so that
 //! nothing is warm but what is warm for a user too: the files in the page cache, the baked plants, the driver's shader
 //! cache. The first turn warms these and is not reported.
 //!
-//! Then the same frame is drawn twice more, each time after one of another place and hour, so that shadow maps, tiles and
-//! sky are made anew every time: once with all plants and trees uploaded again, once without. What the first frame costs
-//! beyond the former are the pipelines; what the former costs beyond the latter is the upload.
+//! Then the same frame is drawn twice more, each time after one of another place and hour, so that shadow maps, tiles
+//! and sky are made anew every time: once with all plants and trees uploaded again, once without. What the first frame
+//! costs beyond the former are the pipelines; what the former costs beyond the latter is the upload.
 //!
 //! Run `cargo bench --bench startup -- --help` for the arguments; benches/README.md has results.
 
@@ -27,20 +27,20 @@ use canopy::{
 use chrono::TimeDelta;
 use clap::Parser;
 
-/// The time to the first picture, by its steps.
+/// The time to the first image, by its steps.
 #[derive(Parser, Debug)]
 #[command(name = "startup")]
 struct Arguments {
     /// The scene.
     #[arg(long, default_value = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/scenes/demo.ron"))]
     scene: PathBuf,
-    /// Picture size in pixels.
+    /// Image size in pixels.
     #[arg(long, default_value = "1280x720", value_parser = parse_size)]
     size: (u32, u32),
     /// Reported turns.
     #[arg(long, default_value_t = 3)]
     turns: usize,
-    /// The other picture's shift, metres.
+    /// The other image's shift, metres.
     #[arg(long, default_value_t = 700.0)]
     shift: f64,
     /// One turn in this process: what the other processes of a run are.
@@ -69,7 +69,7 @@ fn main() -> anyhow::Result<()> {
         let text = String::from_utf8(output.stdout)?;
         ensure!(output.status.success(), "a turn failed: {}", String::from_utf8_lossy(&output.stderr));
         let mut steps = text.lines().map(parse_step).collect::<anyhow::Result<Vec<_>>>()?;
-        // What comes after the picture is not what a user waits for, so the process is charged up to there.
+        // What comes after the image is not what a user waits for, so the process is charged up to there.
         let after = steps.iter().filter(|(name, _)| name.starts_with(AFTER)).map(|(_, time)| time).sum::<f64>();
         let inside: f64 = steps.iter().filter(|(name, _)| !name.starts_with(AFTER)).map(|(_, time)| time).sum();
         steps.insert(0, ("process: loading the program, and its end".to_owned(), (whole - after - inside).max(0.0)));
@@ -81,7 +81,7 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Steps that come after the picture is on disk.
+/// Steps that come after the image is on disk.
 const AFTER: &str = "(after)";
 const FIRST_FRAME: &str = "first frame, with uploads and pipelines";
 const ELSEWHERE: &str = "(after) frames of another place and hour";
@@ -140,7 +140,7 @@ fn turn(arguments: &Arguments) -> anyhow::Result<()> {
     renderer.update()?;
     steps.done(FIRST_FRAME);
     let picture = renderer.read()?;
-    steps.done("reading the picture back");
+    steps.done("reading the image back");
     picture.save(&folder.path().join("picture.png"), &[])?;
     steps.done("writing the PNG");
     let elsewhere = Viewpoint { position: view.position - arguments.shift * view.forward().with_y(0.0), ..view };
@@ -176,7 +176,7 @@ fn first_view(arguments: &Arguments, scene: &Scene, stage: &Stage) -> anyhow::Re
         explain: false,
     };
     let plan = RenderPlan::new(&options, scene, &|x, z| stage.terrain.height(x, z))?;
-    Ok(plan.frames.first().context("the scene has no picture")?.view)
+    Ok(plan.frames.first().context("the scene has no image")?.view)
 }
 
 fn print_table(turns: &[Vec<(String, f64)>]) {

@@ -1,6 +1,6 @@
-//! A level of detail of one's own: beyond 40 m a tree is a box of its plant's size. `cargo run --release --example box_level`
+//! A custom level of detail: beyond 40 m a tree is a box of its plant's size. `cargo run --release --example box_level`
 //!
-//! A level needs a shader, a [`LevelRenderer`] and a [`GpuLevel`]; lists, statistics and tints come with [`Forest::levels`].
+//! A level needs a shader, a [`LevelRenderer`] and a [`GpuLevel`]. Lists and statistics come with [`Forest::levels`].
 
 use bevy::{
     prelude::*,
@@ -8,7 +8,7 @@ use bevy::{
 };
 use canopy::{bake::BakedPlant, cull::Grouping, prelude::*, render::forest::representation::*};
 
-/// Twelve triangles a tree; their 36 vertices are pulled from its entry in the list. Group 0 is the frame, group 1 the trees.
+/// Twelve triangles per tree; the shader pulls their 36 vertices. Group 0 is the frame, group 1 the trees.
 const WGSL: &str = "
 #import canopy::frame::{frame, light}
 #import canopy::instance::{trees, visible, variants, unpack_tree, plant_vertex_position, rotate, tint_level}
@@ -39,7 +39,7 @@ struct Varying {
 /// The level.
 pub const BOX: Representation = Representation::named("box");
 
-/// Makes the level known; all forests show it beyond 40 m.
+/// Registers the level; all forests show it beyond 40 m.
 pub struct BoxLevelPlugin;
 
 impl Plugin for BoxLevelPlugin {

@@ -1,6 +1,6 @@
 //! A day in two minutes: `cargo run --release --example clock`.
 //!
-//! The clock runs every frame; the light is computed beside the frames, as often as [`SunRefresh`] says.
+//! The clock runs every frame; the light is computed in the background, as often as [`SunRefresh`] says.
 
 use bevy::prelude::*;
 use canopy::prelude::*;
@@ -15,9 +15,10 @@ pub fn plugin(app: &mut App) {
 }
 
 fn set_up(mut commands: Commands) -> Result {
-    // The scene brings its own sun only where the world has none.
+    // The scene adds its own sun only if the world has none.
     let sun = Sun::at(48.0, 11.0, "2026-06-21T05:00+02:00")?.running(24.0 * 60.0 / 2.0);
-    // A day in two minutes: the sun moves by three degrees a second, and half a minute of its clock is no lag that one sees.
+    // A day in two minutes: the sun moves by three degrees a second, so a lag of half a minute of its clock is not
+    // visible.
     commands.spawn((sun, SunRefresh::Background { lag: 30.0 }));
     commands.spawn(CanopyScene::new("assets/scenes/inventory.ron"));
     Ok(())

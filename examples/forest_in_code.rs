@@ -1,7 +1,7 @@
-//! A forest made in code: `cargo run --release --example forest_in_code`.
+//! A forest built in code: `cargo run --release --example forest_in_code`.
 //!
-//! Plants and terrain are Bevy assets, the forest is a component. The first start bakes the plants, which takes a minute; later
-//! ones take them from the cache.
+//! Plants and terrain are Bevy assets, the forest is a component. The first start bakes the plants, which takes a
+//! minute; later starts load them from the cache.
 
 use bevy::{math::DVec2, prelude::*};
 use canopy::{prelude::*, scatter::Area};
@@ -34,7 +34,7 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>) {
 }
 
 fn camera(mut commands: Commands) {
-    // The valley lies some 500 m above the sea; the camera is put over its ground when that is known.
+    // The valley is about 500 m above sea level; the camera is placed above its ground when the terrain is loaded.
     commands.spawn((CanopyCamera, Transform::from_xyz(0.0, 600.0, 220.0)));
     commands.add_observer(
         |ready: On<TerrainReady>,

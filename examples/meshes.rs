@@ -1,4 +1,4 @@
-//! Ordinary Bevy meshes in a forest, which give and take shadow: `cargo run --release --example meshes`.
+//! Ordinary Bevy meshes in a forest, which cast and receive shadows: `cargo run --release --example meshes`.
 
 use bevy::prelude::*;
 use canopy::prelude::*;
@@ -13,7 +13,7 @@ pub fn plugin(app: &mut App) {
 }
 
 fn set_up(mut commands: Commands) {
-    // Its DirectionalLight lights the meshes as the forest is lit; `shadow_maps_enabled` is Bevy's own switch.
+    // Its DirectionalLight lights the meshes like the forest; `shadow_maps_enabled` is Bevy's own switch.
     commands.spawn((Sun::default(), DirectionalLight { shadow_maps_enabled: true, ..DirectionalLight::default() }));
     commands.spawn(CanopyScene::new("assets/scenes/one_tree.ron")).observe(place);
 }
@@ -32,7 +32,7 @@ fn place(
             Mesh3d(cube.clone()),
             MeshMaterial3d(clay.clone()),
             Transform::from_xyz(x, ground(x.into(), z.into()) + 1.0, z),
-            // Casts onto trees and ground; what trees cast onto it comes by the light's own shadow maps.
+            // Casts shadows onto trees and ground; the light's own shadow maps hold what trees cast onto it.
             CastsCanopyShadow,
         ));
     }

@@ -1,6 +1,6 @@
 //! Two forests in one world: `cargo run --release --example two_forests`.
 //!
-//! A dense stand of conifers in the west, broadleaves with clearings in the east, on a plane that the program makes itself.
+//! A dense stand of conifers in the west, broadleaves with clearings in the east, on a plane that the program creates.
 
 use bevy::{math::DVec2, prelude::*};
 use canopy::{

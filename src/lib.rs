@@ -1,7 +1,7 @@
 //! Canopy: a real-time forest renderer and landscape simulator on Bevy.
 //!
-//! As a library, Canopy is a plugin group and a handful of components. A forest in any Bevy program, which bakes it beside
-//! the frames, with progress, and takes from the cache what it has:
+//! As a library, Canopy is a plugin group and a handful of components. This is a forest in a Bevy program. It is baked
+//! in the background, with progress, or loaded from the cache:
 //!
 //! ```no_run
 //! use bevy::prelude::*;
@@ -24,19 +24,20 @@
 //! }
 //! ```
 //!
-//! A scene that is built in code ([`Scene`](scene::Scene)) goes where a file's name can go, and needs no file.
-//! Another [`CanopyScene`](components::CanopyScene) on the same entity takes its place. A program that would rather wait calls
-//! [`Stage::build`](assets::Stage::build) itself, and [`Stage::show`](assets::Stage::show).
+//! A [`Scene`](scene::Scene) that is built in code can be passed instead of a file name. Another
+//! [`CanopyScene`](components::CanopyScene) on the same entity replaces it. A program that prefers to wait calls
+//! [`Stage::build`](assets::Stage::build) and [`Stage::show`](assets::Stage::show) itself.
 //!
-//! The rooms: [`math`], [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`bake`], [`light`], [`lod`],
-//! [`trace`] and [`mod@reference`] know no App and no GPU; [`assets`] builds scenes from them, [`render`] draws what
-//! they make, and [`components`] are what a program spawns. ARCHITECTURE.md in the repository shows how a tree gets from a file to a pixel.
+//! The modules [`math`], [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`bake`], [`light`],
+//! [`lod`], [`trace`] and [`mod@reference`] use neither `App` nor GPU. [`assets`] builds scenes from them, [`render`]
+//! draws them, and [`components`] has what a program spawns. ARCHITECTURE.md in the repository shows the path of a tree
+//! from a file to a pixel.
 //!
 //! # Cargo features
 //! - `program` (default): the command `canopy` and the module `app`; brings `clap`, `egui` and progress bars.
 //! - `window` (part of `program`): Bevy's window, keyboard and mouse.
 //!
-//! A program that has a window of its own takes Canopy with `default-features = false`.
+//! A program with its own window uses Canopy with `default-features = false`.
 
 #[cfg(feature = "program")]
 pub mod app;

@@ -1,8 +1,8 @@
-//! How far a long task has come: told to whoever waits for it.
+//! Progress reports of long tasks.
 
-/// Hears how far a long task has come. One stage at a time: a new one ends the one before.
+/// Receives the progress of a long task. One stage at a time: a new stage ends the previous one.
 pub trait Progress: Send {
-    /// A stage of `steps` equal steps begins (0 where their number is unknown), called `what` for the user.
+    /// A stage of `steps` equal steps begins (0 if their number is unknown). `what` is its name for the user.
     fn begin(&mut self, what: &str, steps: u64);
 
     /// `steps` further steps of the stage are done.
@@ -11,19 +11,19 @@ pub trait Progress: Send {
     /// The stage is over.
     fn end(&mut self);
 
-    /// Something that the user ought to know though the work goes on: a missing texture, holes in a terrain.
+    /// A warning for the user that does not stop the work: a missing texture, holes in a terrain.
     fn warn(&mut self, message: &str);
 
-    /// Something worth a line for who wants to know: what was loaded, from which cache, how long it took.
+    /// A note for interested users: what was loaded, from which cache, how long it took.
     fn note(&mut self, message: &str);
 
-    /// Whether nobody waits for the result any more. Work that takes long looks now and then, and gives up.
+    /// Whether the result is no longer needed. Long work checks this regularly, and stops.
     fn is_cancelled(&self) -> bool {
         false
     }
 }
 
-/// Hears nothing.
+/// Ignores all reports.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Silent;
 

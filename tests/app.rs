@@ -129,12 +129,12 @@ fn info_tells_what_would_be_ignored_and_why() {
     assert_says(&described(&path("holes.asc")), &["in 1 of 6 samples (16.67 %)", "3 x 2", "5.0 m to 11.0 m"]);
 
     let heights = image::ImageBuffer::<image::Luma<u16>, _>::from_fn(4, 3, |x, y| image::Luma([(x * 1000 + y) as u16]));
-    heights.save(path("heights.png")).expect("a picture");
+    heights.save(path("heights.png")).expect("an image");
     assert_says(
         &described(&path("heights.png")),
-        &["4 x 3", "0 to 3002 of 65535", "says nothing about metres", "Image("],
+        &["4 x 3", "0 to 3002 of 65535", "neither a scale in metres", "Image("],
     );
-    image::RgbImage::new(4, 4).save(path("photo.png")).expect("a picture");
+    image::RgbImage::new(4, 4).save(path("photo.png")).expect("an image");
     assert!(info(&path("photo.png")).is_err_and(|error| error.to_string().contains("16-bit greyscale")));
 
     write("notes.txt", b"hello");

@@ -1,4 +1,4 @@
-//! Pictures: small scenes drawn without a window, on whatever graphics driver there is (a software one will do).
+//! Images: small scenes drawn without a window, on whatever graphics driver there is (a software one will do).
 
 mod foliage;
 mod levels;
@@ -14,7 +14,7 @@ use canopy::scene::Viewpoint;
 
 use crate::support::stage::instant;
 
-/// Size of the tests' pictures.
+/// Size of the tests' images.
 const SIZE: (u32, u32) = (192, 108);
 
 const NOON: &str = "2026-06-21T12:30+01:00";

@@ -214,7 +214,7 @@ fn only_the_terrain_is_required() -> Outcome {
 fn optional_values_may_be_wrapped_or_not() -> Outcome {
     let wrapped = parse(&FULL.replace("trunk_radius: 0.4", "trunk_radius: Some(0.4)"))?;
     assert_eq!(wrapped, parse(FULL)?);
-    faulty("elevation: (0, 500)", "elevation: Some((0, 500))", 16, &["leave `Some` out"]);
+    faulty("elevation: (0, 500)", "elevation: Some((0, 500))", 16, &["remove `Some`"]);
     let none = parse(&FULL.replace("elevation: (0, 500)", "elevation: None"))?;
     assert!(matches!(none.trees, Trees::Scattered(rules) if rules.elevation.is_none()));
     Ok(())

@@ -215,7 +215,7 @@ fn plain() -> String {
 }
 
 #[test]
-fn a_picture_beyond_the_device_is_refused() {
+fn an_image_larger_than_the_device_limit_is_refused() {
     let _gpu = gpu();
     let case = Case::new(&plain(), &[]);
     let before = listing(case.folder.path());
@@ -244,7 +244,7 @@ fn an_adapter_that_is_not_there_is_named() {
     let _gpu = gpu();
     let case = Case::new(&plain(), &[]);
     let output = case.render(&case.path("a.png"), &["--adapter", "abacus"]).output().expect("the program");
-    assert_refused(&output, &["abacus", "there are:"]);
+    assert_refused(&output, &["abacus", "available:"]);
 }
 
 #[test]
@@ -274,11 +274,11 @@ fn drawn(scene: &str, files: &[(&str, &[u8])], says: &[&str]) {
             "no `{word}`: {message}"
         );
     }
-    let picture = image::open(&out).expect("a picture").to_rgb8();
+    let picture = image::open(&out).expect("an image").to_rgb8();
     assert_eq!(picture.dimensions(), (96, 54));
-    assert!(picture.pixels().any(|pixel| pixel != picture.get_pixel(0, 0)), "the picture has one colour");
+    assert!(picture.pixels().any(|pixel| pixel != picture.get_pixel(0, 0)), "the image has one colour");
     let left: Vec<_> = std::fs::read_dir(case.path("pictures")).expect("the folder").flatten().collect();
-    assert_eq!(left.len(), 1, "something was left beside the picture: {left:?}");
+    assert_eq!(left.len(), 1, "something was left beside the image: {left:?}");
 }
 
 #[test]

@@ -36,11 +36,11 @@ fn mean_flip(reference: &RgbImage, test: &RgbImage) -> f32 {
     FlipPool::from_image(&flip(image(reference), image(test), PIXELS_PER_DEGREE)).mean()
 }
 
-/// How far a picture is from its side's full models.
+/// How far an image is from its side's full models.
 struct Difference {
     flip: f32,
-    /// Root mean square of the difference over that of the reference, in linear light, over the pixels that differ: unlike
-    /// FLIP it does not grow with a picture's brightness, and stock's pictures are darker.
+    /// Root mean square of the difference over that of the reference, in linear light, over the pixels that differ:
+    /// unlike FLIP it does not grow with an image's brightness, and stock's images are darker.
     relative: f64,
     /// Light of those pixels, as a share of the reference's.
     light: f64,
@@ -68,7 +68,7 @@ impl std::fmt::Display for Difference {
     }
 }
 
-/// Rows of the table for `field` at each of `hours` (UTC); pictures go into `out`.
+/// Rows of the table for `field` at each of `hours` (UTC); images go into `out`.
 pub fn compare(field: &Field, hours: &[f64], out: Option<&Path>) -> anyhow::Result<String> {
     let full = field.full()?;
     let (mut ours, mut ours_full) = (Ours::new(field)?, Ours::new(&full)?);

@@ -43,7 +43,7 @@ pub const GROUND_REACH: f64 = 4000.0;
 /// How both sides draw it.
 #[derive(Clone, Copy, Debug)]
 pub struct Look {
-    /// Picture size in pixels.
+    /// Image size in pixels.
     pub size: (u32, u32),
     /// Metres on the ground plane to which trees are full models; infinite: all are, and cast as such.
     pub near: f32,

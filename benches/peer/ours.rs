@@ -82,7 +82,7 @@ impl Ours {
     /// The last frame.
     pub fn read(&self) -> anyhow::Result<RgbImage> {
         let picture = self.0.read()?;
-        RgbImage::from_raw(picture.width, picture.height, picture.pixels).context("a picture of another size")
+        RgbImage::from_raw(picture.width, picture.height, picture.pixels).context("an image of another size")
     }
 }
 

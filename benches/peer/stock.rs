@@ -1,11 +1,12 @@
 //! The field as a Bevy user would build it today.
 //!
-//! One entity a tree, level and material, with shared meshes and materials so that Bevy batches them; `StandardMaterial`
-//! with `AlphaMode::Mask`; `VisibilityRange` with a cross-fade; a `DirectionalLight` with cascades. A cross is one mesh
-//! of its three planes over one atlas of their pictures, since three meshes would be three entities a tree.
+//! One entity a tree, level and material, with shared meshes and materials so that Bevy batches them;
+//! `StandardMaterial` with `AlphaMode::Mask`; `VisibilityRange` with a cross-fade; a `DirectionalLight` with cascades.
+//! A cross is one mesh of its three planes over one atlas of their images, since three meshes would be three entities a
+//! tree.
 //!
 //! Kind to stock: wood has no normal map (it would need tangents), the sky is a clear colour, there is no fog, and the
-//! picture is not HDR; ours has all four.
+//! image is not HDR; ours has all four.
 
 use anyhow::{Context, bail};
 use bevy::{
@@ -187,10 +188,10 @@ impl Stock {
         let render_world = self.app.sub_app(RenderApp).world();
         let device = render_world.resource::<RenderDevice>();
         let images = render_world.resource::<RenderAssets<GpuImage>>();
-        let image = images.get(&self.target).context("stock Bevy has drawn no picture")?;
+        let image = images.get(&self.target).context("stock Bevy has drawn no image")?;
         let pixels = read_rgb(device, render_world.resource::<RenderQueue>(), &image.texture)?;
         let (width, height) = self.size;
-        RgbImage::from_raw(width, height, pixels).context("a picture of another size")
+        RgbImage::from_raw(width, height, pixels).context("an image of another size")
     }
 }
 
@@ -336,7 +337,7 @@ fn cross_mesh(cross: &Cross) -> Mesh {
     build_mesh(positions, normals, uvs, indices)
 }
 
-/// The pictures side by side, level by level.
+/// The images side by side, level by level.
 fn atlas(pictures: &[MipChain]) -> MipChain {
     let Some(first) = pictures.first() else {
         return MipChain { width: 1, height: 1, levels: vec![vec![0; 4]] };

@@ -1,4 +1,4 @@
-// What every pass of a view shares: bind group 0. Rust twins in src/render/frame/uniforms.rs.
+// Bind group 0, which all passes of a view share. Rust twins in src/render/frame/uniforms.rs.
 #define_import_path canopy::frame
 
 #import canopy::constants::MAX_CASCADES
@@ -14,7 +14,7 @@ struct Frame {
     mean_cover: f32,
 }
 
-// The light of the moment, premultiplied by the exposure.
+// The current light, premultiplied by the exposure.
 struct Light {
     // Unit vector to the key light: the one that casts shadows, sun or moon.
     key_direction: vec3<f32>,
@@ -22,7 +22,7 @@ struct Light {
     exposure: f32,
     // Illuminance of the key light, normal to its direction.
     key_illuminance: vec3<f32>,
-    // The most colour that night sight takes, 0..1.
+    // Maximum loss of colour by night vision, 0..1.
     scotopic_strength: f32,
     sun_direction: vec3<f32>,
     // Cosine of the disc's angular radius.
@@ -36,17 +36,17 @@ struct Light {
     moon_disc_cosine: f32,
     // Radiance of the moon's disc.
     moon_radiance: vec3<f32>,
-    // Share of the star field's cells with a star, 0..1.
+    // Fraction of the star field's cells with a star, 0..1.
     star_density: f32,
-    // Radiance that a white Lambertian surface sends back under the sky: spherical harmonics, bands 0 to 2.
+    // Exitant radiance of a white Lambertian surface under the sky: spherical harmonics, bands 0 to 2.
     sky: array<vec4<f32>, 9>,
     // Extinction per metre at the datum.
     fog_extinction: vec3<f32>,
     // 1/m.
     fog_inverse_scale_height: f32,
-    // Colour of night sight, luminance 1.
+    // Colour of night vision, luminance 1.
     scotopic_tint: vec3<f32>,
-    // Share of night sight that the adaptation to the whole picture allows, 0..1.
+    // Fraction of night vision that the adaptation to the whole image allows, 0..1.
     scotopic_amount: f32,
     // World axes to the stars' frame.
     star_frame: mat3x3<f32>,
@@ -55,7 +55,7 @@ struct Light {
     star_seed: u32,
 }
 
-// Where the ground map lies: u = (x - origin.x) * inverse_size.x in camera-relative metres.
+// Position of the ground map: u = (x - origin.x) * inverse_size.x in camera-relative metres.
 struct GroundMap {
     origin: vec2<f32>,
     inverse_size: vec2<f32>,
@@ -64,7 +64,7 @@ struct GroundMap {
 struct Cascade {
     // Camera-relative metres to the map: xy in -1..1, z the reversed depth 0..1.
     map_from_relative: mat4x4<f32>,
-    // Metres a texel.
+    // Metres per texel.
     texel: f32,
     // Radius around the camera within which the map is read, metres.
     radius: f32,
@@ -73,7 +73,7 @@ struct Cascade {
 struct Shadow {
     cascades: array<Cascade, MAX_CASCADES>,
     ground: GroundMap,
-    // How many of the cascades there are.
+    // Number of cascades.
     cascade_count: i32,
     // One over the map's size in texels.
     inverse_map_size: f32,

@@ -14,17 +14,17 @@ struct Surface {
     normal: vec3<f32>,
     // Linear factor on the albedo for light from behind; zero for wood and ground.
     transmission: vec3<f32>,
-    // Share of the light that the surface of a leaf reflects without letting it in; 0: matt.
+    // Specular reflectance of a leaf's surface; 0: matt.
     specular_reflectance: f32,
     // Root mean square slope of its facets.
     roughness: f32,
-    // Strength with which the lobe carries a share of 1, and its greatest strength where nothing else reflects or transmits:
+    // Strength of the lobe for a specular albedo of 1, and its maximum strength if nothing else reflects or transmits:
     // lobe_gain and one over lobe_peak of src/plant/gloss.rs.
     lobe_gain: f32,
     lobe_limit: f32,
-    // How far the gloss is that of many leaves with isotropic normals, 0..1.
+    // Weight of the gloss of many leaves with isotropic normals, 0..1.
     gloss_isotropy: f32,
-    // Visibility of the surroundings, 0..1: what ambient occlusion leaves of them.
+    // Ambient occlusion, 0..1: visible fraction of the surroundings.
     ambient_visibility: f32,
     // Unit vector to the viewer.
     viewer: vec3<f32>,
@@ -32,23 +32,24 @@ struct Surface {
     isotropic_fraction: f32,
 }
 
-// Mean cosine to the light over the leaves that face a viewer, where normals are isotropic and each leaf counts by its
-// projected area: the phase function of a diffuse sphere [Lambert 1760; Schoenberg 1925]. `cosine` is that of the
-// angle between light and viewer.
+// Mean cosine to the light over the leaves that face a viewer, for isotropic normals, weighted by projected area: the
+// phase function of a diffuse sphere [Lambert 1760; Schoenberg 1925]. `cosine` is that of the angle between light and
+// viewer.
 fn sphere_cosine(cosine: f32) -> f32 {
     let c = clamp(cosine, -1.0, 1.0);
     return (sqrt(1.0 - c * c) + acos(-c) * c) * 0.21220659;
 }
 
-// Irradiance over pi of the surroundings on a surface in a stand that sees `ambient_visibility` of them evenly.
+// Irradiance over pi of the surroundings on a surface in a stand, of which it sees the fraction `ambient_visibility`,
+// evenly.
 fn even_sky(surface: Surface, stand: StandLight) -> vec3<f32> {
     let n = surface.normal;
     let through = surface.transmission * in_stand(sky_irradiance(-n), -n.y, stand);
     return (in_stand(sky_irradiance(n), n.y, stand) + through) * surface.ambient_visibility;
 }
 
-// Share of the reflected light that has been inside a leaf (its subsurface albedo over its albedo), which reflects the share
-// `reflectance` at its surface: the rest is specular. src/plant/gloss.rs derives it.
+// Fraction of the reflected light that has been inside a leaf (its subsurface albedo over its albedo), for a specular
+// reflectance of `reflectance`; the rest is specular. src/plant/gloss.rs derives it.
 fn subsurface_share(albedo: vec3<f32>, reflectance: f32) -> vec3<f32> {
     return albedo / max(sqrt(albedo * albedo + reflectance * reflectance) + reflectance, vec3(1e-6));
 }
@@ -60,15 +61,15 @@ fn leaf_transmission(base_color: vec3<f32>, factor: vec3<f32>, reflectance: f32)
 }
 
 // The specular term of the leaf shader [Franzke 2005, 4.2.2], times pi and the cosine, for the albedo
-// `specular_albedo` of the surface, its mean over all directions: microfacets [Walter et al. 2007, GGX; the masking of Hammon 2017], of whose
-// Fresnel factor half is constant and half rises as Schlick's [1994]: a mean of (1 - cosine)^5 is 1/21. Leaves with
-// isotropic normals reflect like a ball, alike in all directions but for that factor.
+// `specular_albedo` of the surface, its mean over all directions: microfacets [Walter et al. 2007, GGX; the masking of
+// Hammon 2017], whose Fresnel factor is half constant and half that of Schlick [1994]: the mean of (1 - cosine)^5 is
+// 1/21. Leaves with isotropic normals reflect like a ball: equally in all directions except for that factor.
 //
-// A single reflection loses what facets shade; the lobe's strength makes up for it, as far as `room`, what the diffuse light
-// leaves, allows in the grazing direction that gets most.
+// A single reflection loses the light that facets mask; the strength of the lobe compensates for it, limited by `room`,
+// the energy that the diffuse light leaves in the brightest grazing direction.
 fn leaf_gloss(surface: Surface, specular_albedo: vec3<f32>, room: vec3<f32>) -> vec3<f32> {
     let to_light = light.key_direction;
-    // Between two opposite directions lies every direction: any will do.
+    // Between two opposite directions the half vector is not defined: any direction will do.
     let between = surface.viewer + to_light;
     let middle = between * inverseSqrt(max(dot(between, between), 1e-8));
     let grazing = 1.0 - saturate(dot(middle, to_light));
@@ -86,11 +87,11 @@ fn leaf_gloss(surface: Surface, specular_albedo: vec3<f32>, room: vec3<f32>) -> 
     return fresnel * mix(strength * (distribution * masking * nl), specular_albedo * 0.25, surface.gloss_isotropy);
 }
 
-// Exitant radiance towards the viewer. `near` and `far`: what the key light brings to the viewer's side and to the other
-// where nothing is in the way, irradiance over pi; `visibility` of the key light in 0..1; `sky`: irradiance of the
-// surroundings over pi, what is transmitted included.
+// Exitant radiance towards the viewer. `near` and `far`: unshadowed irradiance over pi of the key light on the viewer's
+// side and on the other; `visibility` of the key light in 0..1; `sky`: irradiance of the surroundings over pi,
+// transmitted light included.
 //
-// The gloss is taken out of the diffuse light of the key light alone: that of the sky has no lobe to be seen.
+// Only the diffuse part of the key light is reduced by the gloss: the sky has no visible specular lobe.
 fn exitant(surface: Surface, near: vec3<f32>, far: vec3<f32>, visibility: f32, sky: vec3<f32>) -> vec3<f32> {
     var reflected = near;
     var gloss = vec3(0.0);
@@ -104,7 +105,7 @@ fn exitant(surface: Surface, near: vec3<f32>, far: vec3<f32>, visibility: f32, s
     return surface.albedo * ((reflected + far * surface.transmission) * visibility + sky) + gloss * visibility;
 }
 
-// Exitant radiance of a surface that the key light reaches by the angle to its normal.
+// Exitant radiance of a surface that the key light hits at the angle to its normal.
 fn shade(surface: Surface, visibility: f32, sky: vec3<f32>) -> vec3<f32> {
     let cosine = dot(surface.normal, light.key_direction);
     let between = dot(surface.viewer, light.key_direction);

@@ -1,16 +1,16 @@
-// The one exit of all fragment shaders: what air and eye do to the light of a surface. Styles will go here.
+// The common exit of all fragment shaders: applies fog and night vision to the light of a surface. Styles will go here.
 #define_import_path canopy::output
 
 #import canopy::frame::light
 #import canopy::sky::apply_fog
 
-// The colour of a surface at `relative` (metres from the camera) that sends `radiance` (exposed) to the viewer and covers the
-// share `coverage` of the sample.
+// The colour of a surface at `relative` (metres from the camera) that sends `radiance` (exposed) to the viewer and
+// covers the fraction `coverage` of the sample.
 fn finish(relative: vec3<f32>, radiance: vec3<f32>, coverage: f32) -> vec4<f32> {
     return vec4(night_vision(apply_fog(radiance, relative)), coverage);
 }
 
-// The colour of the sky, whose radiance holds the light of the air already.
+// The colour of the sky, whose radiance already includes the light of the air.
 fn finish_sky(radiance: vec3<f32>) -> vec4<f32> {
     return vec4(night_vision(radiance), 1.0);
 }

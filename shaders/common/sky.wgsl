@@ -33,11 +33,10 @@ fn sky_irradiance(n: vec3<f32>) -> vec3<f32> {
     return max(sum, vec3(0.0));
 }
 
-// Irradiance over pi that the sky brings to what has these two bands of transfer: the first coefficient `mean`, and the second
-// band's `vector`.
+// Irradiance over pi of the sky, for two bands of transfer: the coefficient `mean`, and `vector` of the second band.
 fn sky_transfer(mean: f32, vector: vec3<f32>) -> vec3<f32> {
     let s = &light.sky;
-    // The light is kept as a Lambertian surface returns it: its second band times 2/3.
+    // The light is stored convolved with a Lambertian surface: its second band is multiplied by 2/3.
     let band = vector.y * (*s)[2].rgb - vector.x * (*s)[1].rgb - vector.z * (*s)[3].rgb;
     return max(mean * (*s)[0].rgb + 1.5 * band, vec3(0.0));
 }
@@ -53,9 +52,9 @@ fn fog_optical_depth(relative: vec3<f32>) -> f32 {
     return distance * start * min(mean, 50.0);
 }
 
-// What lies behind much air has the colour of the sky's rim in its direction. Little air has the mean colour of the sky on
-// that side: the bright rim around a low sun belongs to the whole path to the horizon, most of which is not there, or lies
-// in the shadow of the land.
+// Fog over a long path has the colour of the sky at the horizon in that direction. Fog over a short path has the mean
+// colour of the sky on that side: the bright horizon around a low sun comes from the whole path to the horizon, most of
+// which is missing here, or lies in the shadow of the terrain.
 fn apply_fog(color: vec3<f32>, relative: vec3<f32>) -> vec3<f32> {
     let transmittance = exp(-light.fog_extinction * fog_optical_depth(relative));
     let direction = relative / max(length(relative), 1e-3);

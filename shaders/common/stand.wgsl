@@ -1,12 +1,12 @@
-// Light inside a stand of trees: the transmittance of neighbouring crowns for sky and sun, and what they scatter. The table is
-// that of src/light/stand.rs, exposed.
+// Light inside a stand of trees: the transmittance of neighbouring crowns for sky and sun, and their scattered light.
+// The table comes from src/light/stand.rs, multiplied by the exposure.
 #define_import_path canopy::stand
 
 #import canopy::constants::{STAND_COVERS, STAND_DEPTHS}
 #import canopy::frame::{stand_texture, sky_sampler}
 
 struct StandLight {
-    // Transmittance of the neighbouring crowns for the light of the sky, in the mean over the upper hemisphere.
+    // Transmittance of the neighbouring crowns for the light of the sky, averaged over the upper hemisphere.
     sky_transmittance: vec3<f32>,
     // Their transmittance for the key light.
     key_transmittance: f32,
@@ -29,18 +29,18 @@ fn look_up(cover: f32, row: f32) -> StandLight {
     return stand;
 }
 
-// Where crowns cover the share `cover` of the ground, at a depth of 0 (the tops) to 1 (the ground).
+// The light for a canopy cover of `cover`, at a depth of 0 (the tops) to 1 (the ground).
 fn stand_light(cover: f32, depth: f32) -> StandLight {
     return look_up(cover, clamp(depth, 0.0, 1.0) * (STAND_DEPTHS - 1.0));
 }
 
-// On the ground.
+// The light on the ground.
 fn ground_light(cover: f32) -> StandLight {
     return look_up(cover, STAND_DEPTHS);
 }
 
-// Spherical harmonics of the first two bands in a direction, not below zero: the first coefficient, and the second band's
-// vector times the direction.
+// Spherical harmonics of the first two bands in a direction, not below zero: the first coefficient, and the second
+// band's vector times the direction.
 fn evaluate_two_bands(mean: f32, band: f32) -> f32 {
     return max(0.28209479 * mean + 0.48860251 * band, 0.0);
 }
@@ -51,8 +51,8 @@ fn in_stand(open: vec3<f32>, y: f32, stand: StandLight) -> vec3<f32> {
     return max(stand.sky_transmittance * open + scattered, vec3(0.0));
 }
 
-// The same on a side whose first coefficient of transfer is `mean`, and whose second band has the component `zenith` (relative
-// to `mean`) towards the zenith: a hemisphere of radiance 1 has the coefficients sqrt(pi) and 0.4886 pi.
+// The same on a side whose first coefficient of transfer is `mean`, and whose second band has the component `zenith`
+// (relative to `mean`) towards the zenith: a hemisphere of radiance 1 has the coefficients sqrt(pi) and 0.4886 pi.
 fn in_stand_by_transfer(open: vec3<f32>, mean: vec3<f32>, zenith: vec3<f32>, stand: StandLight) -> vec3<f32> {
     let even = 1.7724539 * (stand.downwelling + stand.upwelling);
     let scattered = even + 1.5349901 * zenith * (stand.downwelling - stand.upwelling);

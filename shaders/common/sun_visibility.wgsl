@@ -1,17 +1,17 @@
-// How much of the key light reaches a point: near, from the cascades of the sun_shadow pass; everywhere, from the
-// horizon that the terrain raises towards the light (src/terrain/sun_horizon.rs).
+// Visibility of the key light at a point: nearby, from the cascades of the sun_shadow pass; everywhere, from the
+// horizon map of the terrain (src/terrain/sun_horizon.rs).
 #define_import_path canopy::sun_visibility
 
 #import canopy::constants::MAX_CASCADES
 #import canopy::frame::{frame, light, shadow, shadow_map, shadow_sampler, ground_texture, sky_sampler}
 
-// What the ground map has below a point.
+// The ground map's values below a point.
 struct GroundSample {
     // Height above the ground up to which the terrain hides the key light, metres.
     shadow_height: f32,
-    // Share of ground under crowns, 0..1.
+    // Canopy cover, 0..1.
     cover: f32,
-    // The same in the mean over the surroundings.
+    // Mean canopy cover of the surroundings.
     surrounding_cover: f32,
 }
 
@@ -22,8 +22,8 @@ fn sample_ground(relative: vec3<f32>) -> GroundSample {
 }
 
 // Light that clears the terrain: a penumbra that widens with the distance to the ridge is approximated by one of
-// fixed height, the sun's disc over a kilometre. It lies below the horizon: open ground, whose horizon is itself, once
-// stood in the middle of it and had half its light.
+// fixed height, the sun's disc over a kilometre. It lies below the horizon, because open ground is its own
+// horizon: centred on it, the penumbra would halve the light there.
 fn terrain_visibility(ground: GroundSample, height_above_ground: f32) -> f32 {
     return smoothstep(-6.0, 0.0, height_above_ground - ground.shadow_height);
 }
@@ -31,13 +31,13 @@ fn terrain_visibility(ground: GroundSample, height_above_ground: f32) -> f32 {
 // Metres.
 const MOST_LEAF_BIAS: f32 = 0.3;
 
-// `bias` is 1 for solid surfaces; less where the position is known to lie off the caster, more among leaves.
+// `bias` is 1 for solid surfaces; less if the position is known to be off the caster, more among leaves.
 fn cascade_visibility(index: i32, relative: vec3<f32>, normal: vec3<f32>, bias: f32) -> f32 {
     let texel = shadow.cascades[index].texel;
     let slope = 1.0 - abs(dot(normal, light.key_direction));
-    // Offset along the normal by the reach of the filter, and along the ray by one texel.
+    // Offset along the normal by the radius of the filter, and along the ray by one texel.
     let offset = normal * (0.6 + 1.6 * slope) + light.key_direction * 1.2;
-    // What a bias above 1 adds is a matter of leaves, not of the map: in the coarse ones it would be metres.
+    // The part of a bias above 1 depends on the leaves, not on the map: in coarse maps it would be metres.
     let position = relative + offset * min(texel * bias, max(texel, MOST_LEAF_BIAS));
     let map = shadow.cascades[index].map_from_relative * vec4(position, 1.0);
     let uv = map.xy * vec2(0.5, -0.5) + 0.5;
@@ -55,15 +55,15 @@ fn pixel_noise(pixel: vec2<f32>) -> f32 {
     return fract(52.9829189 * fract(dot(floor(pixel), vec2(0.06711056, 0.00583715))));
 }
 
-// What the cascades say of the key light at a point.
+// The result of the cascades for the key light at a point.
 struct CascadeSample {
     visibility: f32,
-    // How far `visibility` counts: 1 within the cascades, 0 beyond the last one.
+    // Weight of `visibility`: 1 within the cascades, 0 beyond the last one.
     weight: f32,
 }
 
-// Each pixel reads one cascade: where two meet, noise decides which, over the last 7 % of the finer one's radius. Software
-// rasterisers run both sides of every branch, so the choice is arithmetic.
+// Each pixel reads one cascade: where two meet, noise decides which, over the last 7 % of the finer one's radius. The
+// choice is arithmetic, because software rasterisers run both sides of every branch.
 fn cascaded_visibility(relative: vec3<f32>, normal: vec3<f32>, bias: f32, pixel: vec2<f32>) -> CascadeSample {
     let last = shadow.cascade_count - 1;
     let distance = length(relative);

@@ -1,4 +1,4 @@
-// Crossed billboards [Franzke 2005, 4.3]: two upright planes and a level one, eighteen pulled vertices a tree.
+// Crossed billboards [Franzke 2005, 4.3]: two vertical planes and a horizontal one, eighteen pulled vertices per tree.
 #import canopy::constants::{CROSS_VERTICES, PLANES, SPREAD_LEVELS, LIGHT_SCALE, WHOLE, FADE_SPAN, GONE}
 #import canopy::cross_variant::cross_variants
 #import canopy::frame::{frame, light}
@@ -13,7 +13,7 @@
 @group(2) @binding(1) var property_textures: texture_2d_array<f32>;
 @group(2) @binding(2) var texture_sampler: sampler;
 #ifdef TRANSFER
-// How the sky's light reaches the leaves: src/bake/levels/cross/light.rs.
+// How the light of the sky reaches the leaves: src/bake/levels/cross/light.rs.
 @group(3) @binding(0) var light_textures: texture_2d_array<f32>;
 #endif
 
@@ -42,7 +42,7 @@ struct Look {
     tint: f32,
 }
 
-// Four numbers are interpolated at the price of one.
+// Packed: four numbers are interpolated at the cost of one.
 fn pack_look(look: Look) -> vec4<f32> {
     return vec4(look.threshold, look.height, look.relative_height, look.tint);
 }
@@ -65,8 +65,8 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     let center = plant_vertex_position(tree, plane.center.xyz).relative;
     let normal = rotate(plane.normal.xyz, tree.yaw);
     let toward = dot(normal, normalize(center));
-    // A plane vanishes as it is seen edge-on: its texture is nothing but a streak there. The level plane comes in only
-    // when looked down on; from the side it would be a shelf in the crown.
+    // A plane fades out when it is seen edge-on, where its texture is only a streak. The horizontal plane fades in only
+    // when seen from above; from the side it would look like a shelf in the crown.
     let level = plane_index == 2u;
     let edge = WHOLE + FADE_SPAN * (1.0 - smoothstep(select(0.10, 0.42, level), select(0.34, 0.72, level), abs(toward)));
     let threshold = max(level_threshold(length(tree.position.xz)), edge);
@@ -76,14 +76,15 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     out.relative = position.relative;
     out.clip = frame.clip_from_relative * vec4(out.relative, 1.0);
     if threshold >= GONE {
-        // Nothing would pass the test: no area, no fragments. Inside the view, as clipping costs more than rejection.
+        // No texel would pass the alpha test, so the plane gets no area and no fragments. Its position is inside the
+        // view, because clipping costs more than rejection.
         out.clip = vec4(0.0, 0.0, 0.5, 1.0);
     }
     out.uv = vec2(0.5 + 0.5 * corner.x, 0.5 - 0.5 * corner.y);
     out.layer = cross_variants[tree.variant].first_layer + plane_index;
     out.right = rotate(plane.u.xyz, tree.yaw) / max(length(plane.u.xyz), 1e-6);
     out.up = rotate(plane.v.xyz, tree.yaw) / max(length(plane.v.xyz), 1e-6);
-    // Seen from behind, the crown's other half stands before the viewer: mirrored across the plane.
+    // From behind, the other half of the crown faces the viewer: it is mirrored across the plane.
     out.front = normal * select(1.0, -1.0, toward > 0.0);
     out.look = pack_look(Look(threshold, position.from_foot.y, position.from_foot.y / height, tree.tint));
     out.crown_radius = variants[tree.variant].crown_radius * tree.scale;
@@ -157,11 +158,12 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let sky = even_sky(surface, stand);
 #endif
     if visibility > 0.0 {
-        // The texture stands for a round crown: what faces the light lies before the plane that casts the shadow, what
-        // turns away from it behind.
+        // The texture represents a round crown: parts that face the light lie in front of the plane that casts the
+        // shadow, parts that face away lie behind it.
         let bulge = normal * (0.55 * in.crown_radius * foliage);
         let cascades = cascaded_visibility(in.relative + bulge, normal, 0.25, in.clip.xy);
-        // The crown's own shadow: its far side lies behind all of its leaves, of which the maps have one texture.
+        // The crown's own shadow: its far side lies behind all of its leaves, of which the maps hold only one
+        // billboard.
         let side = dot(normal, light.key_direction);
         let own = mix(1.0, smoothstep(-0.6, 0.3, side), foliage);
         visibility *= mix(
@@ -179,9 +181,10 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     return finish(in.relative, color, coverage);
 }
 
-// Sunlit fraction of the visible leaf area, the hot-spot effect [Kuusk 1991]: what is seen from the light's own side is lit;
-// the farther apart both are, the more of it lies in shade. Fitted to traced dense stands of oaks and of grown trees, seen with
-// the light and against it (benches/README.md, dense stands). A lone tree needs no correction, so it is weighted by the cover.
+// Sunlit fraction of the visible leaf area, the hot-spot effect [Kuusk 1991]: leaves seen from the direction of the
+// light are lit; the larger the angle between view and light, the more of them lie in shade. Fitted to path-traced
+// dense stands of oaks and of grown trees, seen with the light and against it (benches/README.md, dense stands). A lone
+// tree needs no correction, so it is weighted by the cover.
 fn hot_spot(viewer: vec3<f32>) -> f32 {
     return 0.725 + 0.275 * dot(viewer, light.key_direction);
 }
@@ -195,8 +198,9 @@ fn isotropic_fraction(variant: u32, level: f32) -> f32 {
     return mix((*fraction)[finer / 4u][finer % 4u], (*fraction)[coarser / 4u][coarser % 4u], fract(at));
 }
 
-// Level of the textures: the mean of the two axes' levels. The larger one, as samplers have it, would blur a plane seen
-// askew along its whole height; what little this leaves to alias is leaves, and their coverage is right at any level.
+// Mip level of the textures: the mean of the two axes' levels. The larger one, which samplers use, would blur a plane
+// seen at an angle along its whole height. The little aliasing that remains affects leaves, whose coverage is right at
+// any level.
 fn mip_level(uv: vec2<f32>) -> f32 {
     let size = vec2<f32>(textureDimensions(color_textures));
     let dx = dpdx(uv * size);

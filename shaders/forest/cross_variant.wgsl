@@ -1,4 +1,4 @@
-// What is known of each plant's crossed billboards, for the view and for the shadow maps.
+// Data of each plant's crossed billboards, for the view and for the shadow maps.
 #define_import_path canopy::cross_variant
 
 #import canopy::constants::{PLANES, SPREAD_VECTORS}

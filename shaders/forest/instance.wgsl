@@ -1,4 +1,4 @@
-// Trees of 16 bytes: src/scatter/packed.rs packs what this unpacks.
+// Packed trees of 16 bytes: src/scatter/packed.rs packs them, this file unpacks them.
 #define_import_path canopy::instance
 
 #import canopy::constants::{PLACE_STEPS, YAW_BITS, YAWS, SCALE_SHIFT, SCALE_BITS, SCALE_STEPS, SCALE_OCTAVES, LEAST_SCALE_LOG2}
@@ -13,7 +13,7 @@ struct Tree {
     look: u32,
 }
 
-// Where positions are relative to: the camera for the view, a box's centre for a cascade.
+// The anchor that positions are relative to: the camera for the view, a box's centre for a cascade.
 struct ForestView {
     // Counted from the stand's base cell, as those of the trees.
     anchor_cell: vec2<i32>,
@@ -22,31 +22,31 @@ struct ForestView {
     // Anchor's height over the stand's datum in metres.
     anchor_y: f32,
     cell_size: f32,
-    // Distances in metres over which the level comes in and goes out.
+    // Distances in metres over which the level fades in and out.
     fade_in: vec2<f32>,
     fade_out: vec2<f32>,
-    // The level's tint, and how much of it is mixed in.
+    // The level's tint, and its weight.
     tint: vec4<f32>,
 }
 
-// What is known of each plant, whatever it is drawn as.
+// Data of each plant, used by all representations.
 struct Variant {
     // Metres.
     height: f32,
     crown_radius: f32,
-    // 1 where it is lit by radiance transfer: its ambient visibility is traced, and holds what leaves scatter.
+    // 1 if it is lit by radiance transfer: its ambient occlusion is ray-traced, and includes light scattered by leaves.
     radiance_transfer: u32,
     // Gloss of its leaves.
     specular_reflectance: f32,
     roughness: f32,
-    // 1 where the foliage's normals point out of the crown, else 0.
+    // 1 if the foliage's normals are realigned to point out of the crown, else 0.
     realigned: f32,
-    // Indirect light of the key light (indirect_sun in transfer.wgsl) in the mean over its leaves: the component of the second
-    // band towards the zenith, the first coefficient, and its colour.
+    // Indirect light of the key light (indirect_sun in transfer.wgsl) in the mean over its leaves: the component of the
+    // second band towards the zenith, the first coefficient, and its colour.
     indirect_sun_zenith: f32,
     indirect_sun_mean: f32,
     indirect_sun_color: vec3<f32>,
-    // 1 where its ambient visibility is the ambient term of a density field, else 0.
+    // 1 if its ambient occlusion is the ambient term of a density field, else 0.
     ambient_term: u32,
     // As in `Surface`.
     lobe_gain: f32,
@@ -96,7 +96,7 @@ fn rotate(v: vec3<f32>, yaw: vec2<f32>) -> vec3<f32> {
     return vec3(yaw.x * v.x + yaw.y * v.z, v.y, -yaw.y * v.x + yaw.x * v.z);
 }
 
-// Where a vertex of a tree is, metres in world axes.
+// Position of a tree's vertex, metres in world axes.
 struct VertexPosition {
     // From the anchor.
     relative: vec3<f32>,
@@ -104,13 +104,13 @@ struct VertexPosition {
     from_foot: vec3<f32>,
 }
 
-// Where a tree has the vertex that its plant has at `local` (metres in the plant's frame). All vertex shaders of plants
-// take their positions from here, those of shadows too.
+// Position of the vertex that is at `local` (metres) in the plant's frame. All vertex shaders of plants call this,
+// those of shadows too.
 fn plant_vertex_position(tree: Instance, local: vec3<f32>) -> VertexPosition {
     return rotated_vertex_position(tree, rotate(local, tree.yaw));
 }
 
-// The same for a position in the plant that is rotated into world axes already.
+// The same for a position in the plant that is already rotated into world axes.
 fn rotated_vertex_position(tree: Instance, rotated: vec3<f32>) -> VertexPosition {
     var position: VertexPosition;
     position.from_foot = rotated * tree.scale;
@@ -138,14 +138,15 @@ fn tint_foliage(albedo: vec3<f32>, tint: f32) -> vec3<f32> {
     return albedo * (1.0 + tint * vec3(0.18, 0.07, -0.05));
 }
 
-// Ambient light at an ambient visibility `k`: what does not come from the sky comes from other leaves, by their albedo. The
-// share is fitted to the path tracer (benches/expressive.rs).
+// Ambient light for an ambient occlusion `k`: light that does not come from the sky comes from other leaves, by their
+// albedo. The fraction is fitted to the path tracer (benches/expressive.rs).
 fn with_indirect_ambient(k: f32) -> f32 {
     return k + (1.0 - k) * 0.13;
 }
 
-// Share of the key light that reaches a leaf of which the ambient term of a density field is `k` past the leaves around it, for which the shadow
-// maps are too coarse: what sees little of the sky mostly lies in shade. Where the map is fine, `k` adds nothing to it, and 0.8 + 0.75 k, at most 1.3, would be a little nearer (benches/expressive.rs).
+// Visibility of the key light behind nearby leaves, for which the shadow maps are too coarse, from the ambient term `k`
+// of a density field: a leaf that sees little of the sky mostly lies in shade. Where the map is fine, `k` adds no
+// information, and 0.8 + 0.75 k, at most 1.3, would be slightly closer to the path tracer (benches/expressive.rs).
 fn leaf_visibility(k: f32) -> f32 {
     return min(0.35 + 2.0 * k, 1.1);
 }

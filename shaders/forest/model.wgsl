@@ -16,13 +16,13 @@
 
 struct Part {
     base_color: vec3<f32>,
-    // 1 where normals point out of the crown, whichever side of a leaf is seen; else 0.
+    // 1 if normals are realigned: they point out of the crown, whichever side of a leaf is seen; else 0.
     realigned: f32,
     // As in `Surface`.
     transmission: vec3<f32>,
     specular_reflectance: f32,
     roughness: f32,
-    // 1 where the ambient visibility is the ambient term of a density field, else 0.
+    // 1 if the ambient occlusion is the ambient term of a density field, else 0.
     ambient_term: u32,
     // As in `Surface`.
     lobe_gain: f32,
@@ -36,14 +36,14 @@ struct Part {
 
 struct Vertex {
     @location(0) position: vec3<f32>,
-    // The normal, as long as the ambient visibility says: src/bake/lighting/implicit/packing.rs.
+    // The normal, scaled by the ambient occlusion: src/bake/lighting/implicit/packing.rs.
     @location(1) normal: vec4<f32>,
     @location(2) uv: vec2<f32>,
 }
 
 #ifdef FOLIAGE
-// A texel of a map knows the leaf that is nearest to the light, and shades with it all the others behind that it would have
-// to tell apart: against the path tracer, crowns were a tenth to a third too dark. Factor on a solid surface's bias.
+// Factor on a solid surface's bias. A texel of a map stores only the leaf nearest to the light, and shades all leaves
+// behind it, even those that it does not hide: compared with the path tracer, crowns were a tenth to a third too dark.
 const SHADOW_BIAS: f32 = 3.0;
 #else
 const SHADOW_BIAS: f32 = 1.0;
@@ -58,7 +58,7 @@ struct Look {
     tint: f32,
 }
 
-// Four numbers are interpolated at the price of one.
+// Packed: four numbers are interpolated at the cost of one.
 fn pack_look(look: Look) -> vec4<f32> {
     return vec4(look.ambient_visibility, look.height, look.relative_height, look.tint);
 }
@@ -72,8 +72,8 @@ struct Varying {
     @location(0) relative: vec3<f32>,
     @location(1) @interpolate(perspective, centroid) normal: vec3<f32>,
     @location(2) uv: vec2<f32>,
-    // A packed `Look`. Light is taken inside the triangle: extrapolated to the middle of a pixel that a sliver of a leaf only
-    // touches, it would sparkle.
+    // A packed `Look`. It is interpolated at the centroid: extrapolated to the centre of a pixel that the edge of a
+    // leaf only touches, it would sparkle.
     @location(3) @interpolate(perspective, centroid) look: vec4<f32>,
     @location(4) threshold: f32,
 #ifdef TRANSFER
@@ -147,7 +147,7 @@ fn detail_normal(normal: vec3<f32>, relative: vec3<f32>, uv: vec2<f32>) -> vec3<
     let t = p2 * duv1.x + p1 * duv2.x;
     // The image's v runs down, the map's green runs up.
     let b = -(p2 * duv1.y + p1 * duv2.y);
-    // Both are gradients times this volume, whose sign is that of the seen side: pixels count downwards.
+    // Both are gradients times this volume, whose sign is that of the visible side, because pixel rows count downwards.
     let volume = dot(normal, cross(dp1, dp2));
     let scale = sign(volume) * inverseSqrt(max(max(dot(t, t), dot(b, b)), 1e-30));
     return normalize(normal * texel.z + (t * texel.x + b * texel.y) * scale);
@@ -177,8 +177,8 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         discard;
     }
 #endif
-    // A leaf has two sides, and its own normal is that of the side that is seen. A normal that points out of the crown is none
-    // that a map of the leaf could lean.
+    // A leaf has two sides; its own normal is that of the visible side. A realigned normal points out of the crown, and
+    // a normal map of the leaf does not apply to it.
     let own_normal = part.realigned < 0.5;
     let behind = own_normal & (dot(smooth_normal, in.relative) > 0.0);
     normal = select(smooth_normal, select(normal, -normal, behind), own_normal);
@@ -198,8 +198,8 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.roughness = part.roughness;
     surface.lobe_gain = part.lobe_gain;
     surface.lobe_limit = part.lobe_limit;
-    // A pixel that covers half a texture of leaves covers several of them, and each faces elsewhere: highlights of one would
-    // sparkle. Normals that point out of the crown are no leaf's at all.
+    // A pixel that covers half a texture of leaves covers several leaves with different normals: the highlight of one
+    // would sparkle. Realigned normals do not belong to a leaf at all.
     surface.gloss_isotropy = max(saturate(2.0 * max(across.x, across.y)), part.realigned);
 #endif
     surface.normal = normal;

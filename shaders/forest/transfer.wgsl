@@ -7,19 +7,19 @@
 #import canopy::stand::{StandLight, in_stand_by_transfer, evaluate_two_bands}
 
 struct Transfer {
-    // What 127 stands for in each coefficient after the first, relative to it, four a word of codes.
+    // Scale of each coefficient after the first, relative to it: the value of code 127; four per word of codes.
     scale: array<vec4<f32>, TRANSFER_WORDS>,
     // Words from one vertex to the next.
     vertex_words: u32,
-    // Words of a vertex's means, which stand first.
+    // Number of words of a vertex's means, which come first.
     mean_words: u32,
     // Words of the codes of one side and channel.
     side_words: u32,
-    // Where the codes of the indirect key light begin, a word a vertex.
+    // Index of the first code of the indirect key light, one word per vertex.
     indirect_sun_start: u32,
-    // Colour of the indirect key light, which leaves send each other.
+    // Colour of the indirect key light, which is scattered between leaves.
     indirect_sun_color: vec3<f32>,
-    // What 127 stands for in its codes.
+    // Scale of its codes: the value of code 127.
     indirect_sun_scale: f32,
 }
 
@@ -29,20 +29,21 @@ struct Sides {
     back: vec3<f32>,
 }
 
-// The surroundings' light as a plant of each yaw sees it, then, where a plant wants it, the sun's.
+// The light of the surroundings per yaw, then, if a plant needs it, that of the sun.
 @group(3) @binding(0) var<storage, read> light_by_yaw: array<vec4<f32>>;
 @group(3) @binding(1) var<storage, read> coefficients: array<u32>;
-// No uniform: its values steer loops, and lavapipe compiles a shader again for every binding of such a buffer.
+// Not a uniform: its values control loops, and lavapipe compiles a shader again for every binding of such a uniform
+// buffer.
 @group(3) @binding(2) var<storage, read> transfer: Transfer;
 
-// A half that is not negative, by its bits: unpack2x16float is not on every device.
+// Decodes a non-negative half float from its bits: not every device has unpack2x16float.
 fn mean_at(vertex: u32, index: u32) -> f32 {
     let bits = extractBits(coefficients[vertex + index / 2u], 16u * (index % 2u), 15u);
     return bitcast<f32>(bits << 13u) * 5.192297e33;
 }
 
-// Irradiance over pi by four coefficients of the light on a side whose codes for them are in `word`, and in words `stride`
-// further on for green and blue where light takes on colour.
+// Irradiance over pi by four coefficients of the light on a side whose codes for them are in `word`, and in words
+// `stride` further on for green and blue if the transfer is coloured.
 fn irradiance_by_word(word: u32, stride: u32, scale: vec4<f32>, light: u32) -> vec3<f32> {
     let red = unpack4x8snorm(coefficients[word]) * scale;
 #ifdef TRANSFER_COLOR
@@ -88,7 +89,7 @@ fn zenith(word: u32) -> f32 {
     return unpack4x8snorm(coefficients[word]).y;
 }
 
-// What the surroundings bring to both sides of a vertex of a tree in a stand.
+// Irradiance of the surroundings on both sides of a vertex of a tree in a stand.
 fn light_in_stand(vertex: u32, yaw: u32, stand: StandLight) -> Sides {
     let open = light_sides(vertex, yaw);
     let own = means(vertex);
@@ -100,8 +101,8 @@ fn light_in_stand(vertex: u32, yaw: u32, stand: StandLight) -> Sides {
     return sides;
 }
 
-// Irradiance over pi of the indirect key light at a vertex: what the leaves around it scatter, the same on both of its sides,
-// where nothing else is in the way. `to_light`: in the plant's frame.
+// Irradiance over pi of the indirect key light at a vertex: what the leaves around it scatter, the same on both of its
+// sides, where nothing else is in the way. `to_light`: in the plant's frame.
 fn indirect_sun(vertex: u32, to_light: vec3<f32>) -> vec3<f32> {
     let codes = unpack4x8snorm(coefficients[transfer.indirect_sun_start + vertex]) * transfer.indirect_sun_scale;
     let band = codes.z * to_light.y - codes.y * to_light.x - codes.w * to_light.z;
@@ -132,7 +133,7 @@ fn light_sides(vertex: u32, row: u32) -> Sides {
         sides.back += irradiance_by_word(codes + other + k, words, transfer.scale[k], at);
 #endif
     }
-    // A few bands can fall below zero where next to nothing arrives.
+    // With few bands the sum can be negative where almost no light arrives.
 #ifdef TRANSFER_COLOR
     sides.front = max(sides.front * vec3(mean_at(first, 0u), mean_at(first, 1u), mean_at(first, 2u)), vec3(0.0));
 #else

@@ -22,7 +22,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
 // Coverage of a disc around `center`, of which `disc_cosine` is the cosine of the angular radius.
 fn disc(direction: vec3<f32>, center: vec3<f32>, disc_cosine: f32) -> f32 {
     let cosine = dot(direction, center);
-    // Soft over a pixel, in angle.
+    // The edge is soft over the angle of one pixel.
     let angle = sqrt(max(2.0 - 2.0 * cosine, 0.0));
     let radius = sqrt(max(2.0 - 2.0 * disc_cosine, 0.0));
     let pixel = 1.0 / frame.focal_length_pixels;
@@ -40,7 +40,7 @@ fn unit(h: u32) -> f32 {
     return f32(h >> 8u) / 16777216.0;
 }
 
-// Radiance of the procedural star field, exposed: one star at most in each cell of a cube grid.
+// Radiance of the procedural star field, exposed: at most one star in each cell of a cube grid.
 fn stars(direction: vec3<f32>) -> vec3<f32> {
     let d = light.star_frame[0] * direction.x + light.star_frame[1] * direction.y + light.star_frame[2] * direction.z;
     let a = abs(d);

@@ -1,5 +1,5 @@
 // Depth from the key light: far trees as one upright texture that faces the light's azimuth, so that the
-// shadow's area does not depend on it, and the level one for a high light.
+// shadow's area does not depend on it, and the horizontal one for a high light.
 #import canopy::constants::CASTER_VERTICES
 #import canopy::cross_variant::cross_variants
 #import canopy::instance::{trees, visible, unpack_tree, rotate, rotated_vertex_position}
@@ -39,7 +39,8 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     return out;
 }
 
-// One texel, as in model.wgsl, but of a level that is twice as fine: a cross has few texels, and their sum must hold.
+// A single texel, as in model.wgsl, but of a mip that is twice as fine: a cross has few texels, and their coverage must
+// be preserved.
 fn alpha(uv: vec2<f32>, layer: u32) -> f32 {
     let size = vec2<f32>(textureDimensions(color_textures));
     let texels = max(fwidth(uv.x) * size.x, fwidth(uv.y) * size.y);

@@ -23,7 +23,8 @@ fn vertex(
 }
 
 #ifdef FOLIAGE
-// One texel of the fitting level: a map's texel is coarser than what a filter would add, and most of the pass is this.
+// A single texel of the matching mip: a map's texel is coarser than the effect of a filter, and most of the pass is
+// spent here.
 fn alpha(uv: vec2<f32>) -> f32 {
     let size = vec2<f32>(textureDimensions(color_texture));
     let texels = max(fwidth(uv.x) * size.x, fwidth(uv.y) * size.y);

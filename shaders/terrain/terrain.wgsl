@@ -65,13 +65,14 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     return out;
 }
 
-// Noise of a period that divides the 1024 metres of `frame.camera`: r smooth, g fine, b patchy, a ridged; each 0..1 around 0.5.
+// Noise of a period that divides the 1024 metres of `frame.camera`: r smooth, g fine, b patchy, a ridged; each 0..1
+// around 0.5.
 fn noise(xz: vec2<f32>, period: f32) -> vec4<f32> {
     return textureSample(noise_texture, noise_sampler, xz / period);
 }
 
 // The same, rotated by the angle of a 3-4-5 triangle: periods of 1024 * 3 / (5 k) and 1024 * 4 / (5 k) metres keep it
-// seamless. Mixed with the other it hides the repetition of both.
+// seamless. Mixed with the other, it hides the repetition of both.
 fn rotated_noise(xz: vec2<f32>, period: f32) -> vec4<f32> {
     return noise(vec2(0.6 * xz.x - 0.8 * xz.y, 0.8 * xz.x + 0.6 * xz.y), period);
 }
@@ -94,7 +95,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         cover = frame.mean_cover;
     }
 
-    // Detail in the normal, as far as it can be seen.
+    // Detail in the normal, faded out where it is too small to see.
     let detail = 1.0 - smoothstep(20.0, 120.0, distance);
     let tilt = vec2(fine.r - fine.a, fine.g - fine.b) * 0.25 + vec2(grain.r - grain.g, grain.b - grain.a) * 0.35;
     let normal = normalize(smooth_normal + vec3(tilt.x, 0.0, tilt.y) * detail);
@@ -111,7 +112,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
 
     let wooded = smoothstep(0.10, 0.45, cover + (middle.g - 0.5) * 0.25);
     var albedo = mix(meadow, forest_floor, wooded);
-    // Wooded ground too far for its trees to be drawn is seen as crowns.
+    // Forest too far away for its trees to be drawn is coloured as crowns.
     if outside {
         let crowns = mix(vec3(0.028, 0.045, 0.013), vec3(0.050, 0.072, 0.022), middle.g);
         albedo = mix(albedo, crowns, wooded);
@@ -135,7 +136,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     var visibility = select(terrain_visibility(ground, 0.0), 1.0, outside);
     if visibility > 0.0 {
         let cascades = cascaded_visibility(in.relative, smooth_normal, 1.0, in.clip.xy);
-        // Beyond the maps: the share of light that finds its way between the crowns.
+        // Beyond the maps: the fraction of light that passes between the crowns.
         visibility *= mix(stand.key_transmittance, cascades.visibility, cascades.weight);
     }
     let color = shade(surface, visibility, even_sky(surface, stand));

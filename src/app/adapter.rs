@@ -1,4 +1,4 @@
-//! Graphics adapters: which there are, and the one to use.
+//! Graphics adapters: lists them and chooses one.
 
 use bevy::{
     render::settings::{Backends, WgpuSettings},
@@ -47,16 +47,15 @@ fn best_first(mut infos: Vec<wgpu::AdapterInfo>) -> Vec<wgpu::AdapterInfo> {
     infos
 }
 
-/// Whether `name` contains `part`, as Bevy compares them: case does not count, and an empty part is in every name.
+/// Whether `name` contains `part`, as Bevy compares them: case is ignored, and every name contains an empty part.
 fn is_named(name: &str, part: &str) -> bool {
     name.to_lowercase().contains(&part.to_lowercase())
 }
 
-/// Refuses an environment that would have Bevy take another adapter than the one called `chosen`, which `wanted` asks
-/// for.
+/// Rejects an environment that would make Bevy use another adapter than `chosen`, the one that `wanted` names.
 ///
 /// Bevy prefers WGPU_ADAPTER_NAME to its settings (bevy_render 0.19, `initialize_renderer`): it takes the first
-/// adapter, in the drivers' order `present`, whose name contains the variable's value, and any adapter where none does.
+/// adapter, in the drivers' order `present`, whose name contains the variable's value, and any adapter if none does.
 fn check_environment(environment: &str, wanted: &str, chosen: &str, present: &[&str]) -> Result<(), AppError> {
     match present.iter().find(|name| is_named(name, environment)) {
         Some(taken) if *taken == chosen => Ok(()),
@@ -68,11 +67,11 @@ fn check_environment(environment: &str, wanted: &str, chosen: &str, present: &[&
     }
 }
 
-/// Settings for the adapter whose name contains `wanted` (case does not count), or the best one.
+/// Settings for the adapter whose name contains `wanted` (case is ignored), or for the best one.
 ///
 /// # Errors
 /// [`AppError::NoAdapter`] and [`AppError::UnknownAdapter`], before Bevy would stop the process;
-/// [`AppError::AdapterConflict`] where the environment's WGPU_ADAPTER_NAME would replace `wanted` by another adapter.
+/// [`AppError::AdapterConflict`] if the environment's WGPU_ADAPTER_NAME would replace `wanted` by another adapter.
 pub fn settings(wanted: Option<&str>) -> Result<WgpuSettings, AppError> {
     let present = enumerate();
     let adapters = best_first(present.clone());
@@ -103,7 +102,7 @@ pub fn settings(wanted: Option<&str>) -> Result<WgpuSettings, AppError> {
     })
 }
 
-/// Refuses a window or picture of `(width, height)` pixels that the adapter of `settings` cannot hold.
+/// Rejects a window or image of `(width, height)` pixels that is too large for the adapter of `settings`.
 ///
 /// # Errors
 /// [`AppError::TooLarge`].
@@ -137,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn an_environment_that_means_another_adapter_is_told_with_both_names() {
+    fn an_environment_that_means_another_adapter_is_reported_with_both_names() {
         // Another name, a name that fits an earlier adapter too, one that fits all, and one that fits none.
         let cases = [("llvm", 0), ("fast", 1), ("", 2), ("abacus", 0)];
         for (environment, chosen) in cases {

@@ -1,4 +1,4 @@
-//! A viewpoint in f64 as Bevy's f32 camera: the world's origin moves along.
+//! A viewpoint in f64 as Bevy's f32 camera: the world's origin follows the camera.
 
 use bevy::{
     camera::{PerspectiveProjection, Projection},
@@ -7,11 +7,11 @@ use bevy::{
 
 use crate::{render::components::CanopyOrigin, scene::Viewpoint};
 
-/// Metres to the near plane.
+/// Distance of the near plane in metres.
 pub const NEAR: f32 = 0.1;
 
 /// The origin of the Bevy world near the camera, and the camera's transform relative to it.
-pub fn place(view: &Viewpoint) -> (CanopyOrigin, Transform) {
+pub fn origin_and_transform(view: &Viewpoint) -> (CanopyOrigin, Transform) {
     let origin = CanopyOrigin::near(view.position);
     let transform = Transform {
         translation: origin.translation(view.position),

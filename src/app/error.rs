@@ -1,10 +1,10 @@
-//! What can stop the program: every cause in one type, each with its own place and remedy.
+//! Errors of the program: every cause in one type, each with its location and remedy.
 
 use std::path::PathBuf;
 
 use crate::assets::StageError;
 
-/// Why the program cannot do what it was asked for.
+/// Why the program cannot do what the user asked for.
 #[derive(Debug, thiserror::Error)]
 pub enum AppError {
     /// A scene that cannot be built.
@@ -31,8 +31,8 @@ pub enum AppError {
     /// The ground truth.
     #[error(transparent)]
     Reference(#[from] crate::reference::ReferenceError),
-    /// A picture that cannot be written.
-    #[error("{}: {source}; choose a folder that can be written, with --out", path.display())]
+    /// An image that cannot be written.
+    #[error("{}: {source}; choose a writable folder with --out", path.display())]
     Write {
         /// The file or folder.
         path: PathBuf,
@@ -45,18 +45,18 @@ pub enum AppError {
          Ubuntu: apt-get install libvulkan1 mesa-vulkan-drivers)"
     )]
     NoAdapter {
-        /// What was looked for, with a leading comma or blank.
+        /// The adapter that was searched for, with a leading blank.
         details: String,
     },
-    /// The adapter that was asked for is not there.
-    #[error("no graphics adapter has a name with `{wanted}` in it; there are: {present} (see --list-adapters)")]
+    /// The requested adapter does not exist.
+    #[error("no graphics adapter has `{wanted}` in its name; available: {present} (see --list-adapters)")]
     UnknownAdapter {
-        /// What was asked for.
+        /// The requested name.
         wanted: String,
-        /// Names of those that are there.
+        /// Names of the available adapters.
         present: String,
     },
-    /// The environment names another adapter than the request, and has the last word.
+    /// The environment names another adapter than the request, and takes precedence.
     #[error(
         "WGPU_ADAPTER_NAME is set to `{environment}` and overrides --adapter `{wanted}`, which is {chosen}; unset \
          WGPU_ADAPTER_NAME"
@@ -71,16 +71,16 @@ pub enum AppError {
     },
     /// No display to open a window on.
     #[error(
-        "no window can be opened: {details}; use `canopy render` for pictures without one, or run this in a virtual \
+        "no window can be opened: {details}; use `canopy render` to render images without a window, or use a virtual \
          display (xvfb-run canopy fly ...)"
     )]
     NoDisplay {
         /// What is missing.
         details: String,
     },
-    /// A picture that the device cannot hold.
+    /// An image that is too large for the device.
     #[error(
-        "a picture of {width}x{height} is beyond this device's limit of {limit} pixels a side; choose a smaller --size"
+        "an image of {width}x{height} exceeds this device's limit of {limit} pixels per side; choose a smaller --size"
     )]
     TooLarge {
         /// Width asked for.

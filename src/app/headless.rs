@@ -1,4 +1,4 @@
-//! Pictures without a window: the frames of a plan, one after another, each a function of its own arguments.
+//! Renders images without a window: the frames of a plan, one after the other, each a function of its own arguments.
 
 use std::{
     collections::BTreeSet,
@@ -50,10 +50,10 @@ use crate::{
     scene::Viewpoint,
 };
 
-/// Draws the pictures that `options` ask for.
+/// Renders the images of `options`.
 ///
 /// # Errors
-/// [`AppError`]; pictures that were finished before it stay, nothing half-written does.
+/// [`AppError`]; images that were finished before it stay, and no file is left half-written.
 pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<RenderReport, AppError> {
     // The scene's own errors come first, then the device's: both are found before the long work, and before anything is
     // left behind.
@@ -71,7 +71,7 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
     progress.end();
     progress.note(&format!("renderer: {:.2} s", started.elapsed().as_secs_f64()));
     let mut report = RenderReport::default();
-    progress.begin("Pictures", plan.frames.len() as u64);
+    progress.begin("Images", plan.frames.len() as u64);
     for frame in &plan.frames {
         let started = Instant::now();
         let picture = renderer.draw(&stage, &frame.view, frame.instant)?;
@@ -93,7 +93,7 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
     Ok(report)
 }
 
-/// Finds out before the first picture is drawn whether all of them can be kept; makes the folders that are missing.
+/// Checks before the first image is rendered whether all of them can be written; creates missing folders.
 fn check_writable(plan: &RenderPlan) -> Result<(), AppError> {
     let folder = |file: &Path| match file.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
@@ -108,7 +108,7 @@ fn check_writable(plan: &RenderPlan) -> Result<(), AppError> {
     Ok(())
 }
 
-/// How long shaders and pipelines may take; far more than they need on the slowest machine.
+/// Time limit for shaders and pipelines; far more than they need on the slowest machine.
 const LONGEST_WAIT: Duration = Duration::from_secs(120);
 
 /// A renderer without a window, driven frame by frame.
@@ -119,12 +119,12 @@ pub struct Renderer {
     target: Handle<Image>,
     size: (u32, u32),
     warm: bool,
-    /// First error that the device reported and nobody was told of yet.
+    /// First error that the device reported and that was not returned yet.
     fault: Arc<Mutex<Option<String>>>,
 }
 
 impl Renderer {
-    /// A renderer for pictures of `size` pixels on the adapter whose name contains `adapter`, with `msaa` samples.
+    /// A renderer for images of `size` pixels on the adapter whose name contains `adapter`, with `msaa` samples.
     ///
     /// # Errors
     /// [`AppError::NoAdapter`], [`AppError::UnknownAdapter`], [`AppError::AdapterConflict`], [`AppError::TooLarge`].
@@ -183,7 +183,7 @@ impl Renderer {
         }
     }
 
-    /// The Bevy app, to put further entities into its world.
+    /// The Bevy app, to spawn further entities.
     pub fn app(&mut self) -> &mut App {
         &mut self.app
     }
@@ -201,12 +201,12 @@ impl Renderer {
         self.app.world_mut().entity_mut(self.sun).insert(shadow);
     }
 
-    /// Sets the light's place and instant, as the scene has them.
+    /// Sets the light to the scene's location and instant.
     pub fn set_instant(&mut self, stage: &Stage, instant: DateTime<Utc>) {
         self.set_sun(stage.sun(instant));
     }
 
-    /// Sets the light; the next frame has it.
+    /// Sets the light of the next frame.
     pub fn set_sun(&mut self, sun: Sun) {
         let mut entity = self.app.world_mut().entity_mut(self.sun);
         if entity.get() != Some(&sun) {
@@ -214,9 +214,9 @@ impl Renderer {
         }
     }
 
-    /// Places the camera.
+    /// Sets the camera.
     pub fn set_view(&mut self, view: &Viewpoint) {
-        let (origin, transform) = camera::place(view);
+        let (origin, transform) = camera::origin_and_transform(view);
         let projection = camera::projection(view.field_of_view);
         let world = self.app.world_mut();
         world.insert_resource(origin);
@@ -226,7 +226,7 @@ impl Renderer {
     /// Draws one frame and waits until the device has finished it.
     ///
     /// # Errors
-    /// [`AppError::Render`] with what the device says of this very frame.
+    /// [`AppError::Render`] with the device's error in this frame.
     pub fn update(&mut self) -> Result<(), AppError> {
         if !self.warm {
             self.warm_up()?;
@@ -252,7 +252,7 @@ impl Renderer {
         }
     }
 
-    /// The first updates bring meshes, textures and shaders to the device, and draw nothing yet.
+    /// The first updates upload meshes, textures and shaders, and draw nothing yet.
     fn warm_up(&mut self) -> Result<(), AppError> {
         let started = Instant::now();
         loop {
@@ -273,7 +273,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Whether the last frame had every pipeline that it asked for.
+    /// Whether all pipelines that the last frame requested were ready.
     fn pipelines_are_ready(&self) -> Result<bool, AppError> {
         let cache = self.app.sub_app(RenderApp).world().resource::<PipelineCache>();
         let mut ready = true;
@@ -303,7 +303,7 @@ impl Renderer {
         self.read()
     }
 
-    /// What the last frame ran and skipped, one line a pass.
+    /// Which passes the last frame ran or skipped, one line per pass.
     pub fn explain(&self) -> Vec<String> {
         let report = self.app.world().resource::<FrameReport>();
         let line = |(pass, outcome)| match outcome {
@@ -324,7 +324,7 @@ impl Renderer {
         let images = render_world.resource::<RenderAssets<GpuImage>>();
         let image = images
             .get(&self.target)
-            .ok_or_else(|| AppError::Render("the picture could not be read back: it was never drawn".to_owned()))?;
+            .ok_or_else(|| AppError::Render("the image could not be read back: it was never drawn".to_owned()))?;
         let pixels = read_rgb(device, queue, &image.texture);
         // What the device reported says more than that nothing came back.
         self.check_fault()?;
@@ -334,7 +334,7 @@ impl Renderer {
     }
 }
 
-/// Fails where what began at `started` has taken too long.
+/// Fails if a wait that began at `started` takes too long.
 fn patience(started: Instant, what: &str) -> Result<(), AppError> {
     if started.elapsed() < LONGEST_WAIT {
         return Ok(());
@@ -342,15 +342,15 @@ fn patience(started: Instant, what: &str) -> Result<(), AppError> {
     Err(AppError::Render(format!("{what} were not ready within {} s", LONGEST_WAIT.as_secs())))
 }
 
-/// Where the device's errors go from now on, the first of them.
+/// Installs a handler that stores the first error of the device.
 ///
-/// Bevy's own handler, which this replaces, tells of an error only with the next frame; the one in which it arose would
-/// be kept as a broken picture.
+/// Bevy's own handler, which this replaces, reports an error only with the next frame; the frame that caused it would
+/// be saved as a broken image.
 fn report_faults(device: &RenderDevice) -> Arc<Mutex<Option<String>>> {
     let fault = Arc::new(Mutex::new(None));
-    let told = fault.clone();
+    let stored = fault.clone();
     device.wgpu_device().on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-        if let Ok(mut slot) = told.lock() {
+        if let Ok(mut slot) = stored.lock() {
             slot.get_or_insert(error.to_string());
         }
     }));

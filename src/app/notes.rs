@@ -1,10 +1,10 @@
-//! What a picture's text chunks say: enough to make it again.
+//! The text chunks of an image: enough to render it again.
 
 use chrono::{DateTime, Utc};
 
 use crate::{assets::Stage, scene::Viewpoint};
 
-/// Pairs of keyword and text for a picture of `stage`, seen from `view` in the light of `instant`.
+/// Pairs of keyword and text for an image of `stage`, seen from `view` in the light of `instant`.
 pub fn notes(stage: &Stage, view: &Viewpoint, instant: DateTime<Utc>) -> Vec<(&'static str, String)> {
     vec![
         ("Software", format!("Canopy {}", env!("CARGO_PKG_VERSION"))),

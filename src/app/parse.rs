@@ -1,4 +1,4 @@
-//! Texts of the command line to values.
+//! Parses the values of command-line arguments.
 
 use crate::{
     bake::lighting::{SunLight, implicit::ImplicitSettings},
@@ -33,7 +33,7 @@ pub enum ArgumentError {
     Positive(String),
 }
 
-/// Reads `1280x720`: width and height in pixels, each from 1 to 4294967295 (what the device can draw is its affair).
+/// Reads `1280x720`: width and height in pixels, each from 1 to 4294967295 (the device's limit is checked later).
 ///
 /// # Errors
 /// [`ArgumentError::Size`].
@@ -43,8 +43,8 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), ArgumentError> {
     size.filter(|(width, height)| *width > 0 && *height > 0).ok_or_else(|| ArgumentError::Size(text.to_owned()))
 }
 
-/// Reads the name of a light: `local`, `expressive` or `transfer`, with all its default values, or `harmonics`: transfer with
-/// the sun by [`SunLight::Harmonics`].
+/// Reads the name of a light: `local`, `expressive` or `transfer`, with all its default values, or `harmonics`:
+/// transfer with the sun by [`SunLight::Harmonics`].
 ///
 /// # Errors
 /// [`ArgumentError::Lighting`].
@@ -58,7 +58,7 @@ pub fn parse_lighting(text: &str) -> Result<Lighting, ArgumentError> {
     }
 }
 
-/// Reads the number of samples per pixel: 1 or 4, what every device can do.
+/// Reads the number of samples per pixel: 1 or 4, which every device supports.
 ///
 /// # Errors
 /// [`ArgumentError::Samples`].

@@ -1,25 +1,25 @@
-//! Pictures on disk: PNG with the settings that made it in its text chunks.
+//! Rendered images on disk: PNG, with the settings that reproduce it in its text chunks.
 
 use std::{io::Write, path::Path};
 
 use super::error::AppError;
 use crate::files::write_whole;
 
-/// A rendered picture.
+/// A rendered image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// sRGB, three bytes a pixel, row by row from the top.
+    /// sRGB, three bytes per pixel, row by row from the top.
     pub pixels: Vec<u8>,
 }
 
 impl Picture {
-    /// Writes the picture as PNG. `notes` are pairs of keyword (Latin-1, 1 to 79 characters) and text.
+    /// Writes the image as PNG. `notes` are pairs of keyword (Latin-1, 1 to 79 characters) and text.
     ///
-    /// The file appears whole or not at all: it is written under a temporary name beside its place, then renamed.
+    /// The file appears whole or not at all: it is written under a temporary name in the same folder, then renamed.
     ///
     /// # Errors
     /// [`AppError::Write`].

@@ -1,4 +1,5 @@
-//! From a request to the frames to draw: file names, cameras, instants. A pure function of the request and the scene.
+//! Turns a request into the frames to draw: file names, cameras, instants. A pure function of the request and the
+//! scene.
 
 use std::ffi::OsStr;
 use std::path::{Path as FilePath, PathBuf};
@@ -8,12 +9,12 @@ use chrono::{DateTime, Utc};
 use super::request::{Clock, Pictures, RenderOptions, View};
 use crate::scene::{LocalTime, Path, Pose, Scene, Viewpoint};
 
-/// Pictures per second of a flight whose rate nobody stated.
+/// Default frames per second of a flight.
 const DEFAULT_FPS: f64 = 25.0;
-/// A day of film; more frames than that are a slip of the keyboard.
+/// A day of film; more frames than that are a typing error.
 const MOST_FRAMES: u32 = 10_000_000;
 
-/// One picture to draw.
+/// One image to draw.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     /// The PNG to write.
@@ -24,7 +25,7 @@ pub struct Frame {
     pub instant: DateTime<Utc>,
 }
 
-/// The pictures that a request asks for, in order.
+/// The images of a request, in order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderPlan {
     /// At least one.
@@ -40,27 +41,27 @@ pub enum PlanError {
     /// The request starts off the path.
     #[error("{seconds} s is not on the scene's camera path, which goes from {start} s to {end} s; choose a time on it")]
     OffPath {
-        /// The time asked for.
+        /// The requested time.
         seconds: f64,
         /// The path's first time.
         start: f64,
         /// The path's last time.
         end: f64,
     },
-    /// No picture was asked for.
-    #[error("no picture was asked for; name one file, or one frame, at least")]
+    /// No image was requested.
+    #[error("no image was requested; name at least one file, or one frame")]
     Nothing,
-    /// Too many pictures.
-    #[error("{0} frames are too many; ask for at most {MOST_FRAMES}")]
+    /// Too many frames.
+    #[error("{0} frames are too many; request at most {MOST_FRAMES}")]
     TooMany(u32),
-    /// Pictures per second that are none.
-    #[error("{0} pictures per second is not a rate (expected a number above 0, such as 25)")]
+    /// A frame rate that is not positive.
+    #[error("{0} is not a frame rate (expected a number of frames per second above 0, such as 25)")]
     BadRate(f64),
-    /// A picture's name does not say that it is a PNG.
-    #[error("`{}` does not end in .png, the format of all pictures; call it {}", .0.display(), .0.with_extension("png").display())]
+    /// An image's name does not end in `.png`.
+    #[error("`{}` does not end in .png, the format of all images; call it {}", .0.display(), .0.with_extension("png").display())]
     NoPng(PathBuf),
-    /// Two pictures of a request would overwrite each other.
-    #[error("`{}` is named twice; give each picture a file of its own", .0.display())]
+    /// Two images of a request would overwrite each other.
+    #[error("`{}` is named twice; give each image its own file", .0.display())]
     SameFile(PathBuf),
 }
 
@@ -68,9 +69,9 @@ impl RenderPlan {
     /// Plans `options` for `scene`. `ground` gives the terrain's height in metres at local `(x, z)`; heights in poses
     /// count from it.
     ///
-    /// A sequence moves along the scene's path, `1 / fps` seconds per picture from [`View::Along`] (or the path's
-    /// beginning) on, and rests at the path's end; its camera stands still at a [`View::Pose`], in a scene without
-    /// a path, and in a time-lapse whose `fps` nobody stated.
+    /// A sequence moves along the scene's path, `1 / fps` seconds per frame from [`View::Along`] (or the path's
+    /// beginning) on, and rests at the path's end; its camera does not move at a [`View::Pose`], in a scene without
+    /// a path, and in a time-lapse without `fps`.
     ///
     /// # Errors
     /// [`PlanError`]: a path that the scene lacks, a time off the path, no frames or too many, a rate that is not
@@ -121,7 +122,7 @@ impl RenderPlan {
 /// The camera of a request.
 enum Flight {
     Standing(Pose),
-    /// A path, the time at which pictures start, and the pose of a still.
+    /// A path, the time of the first frame, and the pose of a still.
     Moving {
         path: Path,
         start: f64,
@@ -174,7 +175,7 @@ fn is_png(path: &FilePath) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) && path.file_stem().is_some()
 }
 
-/// The name of picture `number` of `frames`: four digits, or as many as the last one needs.
+/// The name of frame `number` of `frames`: four digits, or as many as the last one needs.
 fn numbered(out: &FilePath, number: u32, frames: u32) -> PathBuf {
     let digits = frames.saturating_sub(1).to_string().len().max(4);
     if is_png(out) {

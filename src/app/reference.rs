@@ -20,17 +20,17 @@ use crate::{
     },
 };
 
-/// How often the film is kept on disk while it grows.
+/// Interval at which the film is saved during the trace.
 const KEEP_EVERY: Duration = Duration::from_secs(30);
 
-/// Traces the picture that `options` ask for, as OpenEXR or PNG by the ending of its name; returns the file.
+/// Traces the image of `options`, as OpenEXR or PNG by the ending of its name; returns the file.
 ///
-/// The film is kept every 30 s, in a file beside the picture that ends in `.checkpoint`. With `resume` a film of the
-/// same scene, light and camera goes on from there, and stays when the picture is done, so that more samples can be
-/// added; without, it begins anew and the file is deleted in the end.
+/// The film is saved every 30 s, in a file next to the image that ends in `.checkpoint`. With `resume` a film of the
+/// same scene, light and camera continues from there, and the file stays when the image is done, so that more samples
+/// can be added. Without it the trace starts from the beginning, and the file is deleted at the end.
 ///
 /// # Errors
-/// [`AppError`]; a picture that was there before stays as it is.
+/// [`AppError`]; an existing image stays as it is.
 pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Result<PathBuf, AppError> {
     let stage = Stage::build(&options.overrides.applied(options.scene.read()?), progress)?;
     let frame = frame(options, &stage)?;
@@ -38,7 +38,7 @@ pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Res
     let atmosphere = Atmosphere::new(AtmosphereParams::with_visibility_km(sun.visibility_km))?;
     let light = sun.light(&atmosphere)?;
 
-    progress.begin("Trees of rays", 0);
+    progress.begin("Building ray tracing structures", 0);
     let scene = scene(&stage)?;
     progress.end();
     let settings = TraceSettings { bounces: options.bounces.unwrap_or(u32::MAX), ..TraceSettings::default() };
@@ -91,7 +91,7 @@ pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Res
     Ok(options.out.clone())
 }
 
-/// Camera and instant, planned as `canopy render` plans a still.
+/// Camera and instant, the same as `canopy render` has for a still.
 fn frame(options: &ReferenceOptions, stage: &Stage) -> Result<Frame, AppError> {
     let still = RenderOptions {
         scene: options.scene.clone(),

@@ -1,4 +1,4 @@
-//! What a user asks of the program: plain data that the command line fills and the other files here carry out.
+//! The requests of a user: plain data that the command line fills and the other files of this module carry out.
 
 use std::path::PathBuf;
 
@@ -13,13 +13,13 @@ pub struct FlyOptions {
     pub size: (u32, u32),
     /// Date and time at the start; `None` takes the scene's.
     pub at: Option<LocalTime>,
-    /// Where the camera starts; along the path it starts flying.
+    /// Where the camera starts; on the path it starts flying.
     pub view: View,
-    /// Simulated seconds per real second at the start; 0 is a standing clock.
+    /// Simulated seconds per real second at the start; 0 is a stopped clock.
     pub clock: f64,
-    /// Whether the camera may go under the ground.
+    /// Whether the camera may go below the ground.
     pub underground: bool,
-    /// Replaces values of the scene.
+    /// Values that replace those of the scene.
     pub overrides: Overrides,
     /// Part of the name of the graphics adapter to use; `None` lets the driver choose.
     pub adapter: Option<String>,
@@ -34,13 +34,13 @@ pub struct FlyOptions {
 pub struct RenderOptions {
     /// The scene.
     pub scene: SceneSource,
-    /// Which pictures, and where they go. [`super::RenderPlan`] turns them into frames.
+    /// The images, and where they are written. [`super::RenderPlan`] turns them into frames.
     pub pictures: Pictures,
-    /// Where the camera stands.
+    /// Where the camera is.
     pub view: View,
-    /// Size of a picture in pixels, each at least 1; the device may allow less than what is asked.
+    /// Size of an image in pixels, each at least 1; the device may have a lower limit.
     pub size: (u32, u32),
-    /// Replaces values of the scene.
+    /// Values that replace those of the scene.
     pub overrides: Overrides,
     /// Part of the name of the graphics adapter to use; `None` lets the driver choose.
     pub adapter: Option<String>,
@@ -50,19 +50,19 @@ pub struct RenderOptions {
     pub explain: bool,
 }
 
-/// Which light a picture of the ground truth has: light adds up, so errors of the two can be told apart.
+/// The light sources of a ground truth render. Light is additive, so the errors of each source can be separated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum LightGroup {
-    /// All of it.
+    /// All light sources.
     #[default]
     All,
-    /// What casts shadows, sun or moon, and what ground and plants make of it.
+    /// The key light, sun or moon, with its bounces off ground and plants.
     Sun,
-    /// The sky, and what ground and plants make of it.
+    /// The sky, with its bounces off ground and plants.
     Sky,
 }
 
-/// Everything about a picture of the ground truth.
+/// Everything about a ground truth render.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReferenceOptions {
     /// The scene.
@@ -71,47 +71,48 @@ pub struct ReferenceOptions {
     pub out: PathBuf,
     /// Date and time; `None` takes the scene's.
     pub at: Option<LocalTime>,
-    /// Where the camera stands.
+    /// Where the camera is.
     pub view: View,
-    /// Size of the picture in pixels, each at least 1.
+    /// Size of the image in pixels, each at least 1.
     pub size: (u32, u32),
-    /// Samples a pixel, at least 1.
+    /// Samples per pixel, at least 1.
     pub samples: u32,
-    /// How often light may be scattered between surfaces; `None` is as often as it will.
+    /// Maximum number of bounces between surfaces; `None` is unlimited.
     pub bounces: Option<u32>,
-    /// Which light there is.
+    /// The light sources to include.
     pub light: LightGroup,
-    /// Whether the renderer's fog lies before what the camera sees.
+    /// Whether to include the renderer's fog.
     pub fog: bool,
-    /// Go on from where an earlier picture of the same scene, light and camera stopped, and keep the state for the next.
+    /// Whether to continue an earlier trace of the same scene, light and camera, and to keep the state for the next
+    /// one.
     pub resume: bool,
-    /// Replaces values of the scene.
+    /// Values that replace those of the scene.
     pub overrides: Overrides,
     /// No progress and no notes, only warnings and errors.
     pub quiet: bool,
 }
 
-/// Single pictures or a sequence.
+/// Single images or a sequence.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Pictures {
-    /// Pictures from one camera at one or several instants.
+    /// Images from one camera at one or several instants.
     Stills(Vec<Still>),
-    /// Numbered pictures.
+    /// Numbered frames.
     Sequence {
-        /// A `.png` file name, into which the numbers go (`flight.png` becomes `flight-0000.png`, ...), or a folder
-        /// (no `.png` ending), in which the files are called `0000.png`, ...
+        /// A `.png` file name, to which the numbers are added (`flight.png` becomes `flight-0000.png`, ...), or a
+        /// folder (no `.png` ending), in which the files are called `0000.png`, ...
         out: PathBuf,
         /// How many, at least 1.
         frames: u32,
-        /// Pictures per second of flight along the scene's path, above 0; `None` is 25 for a flight, and a camera
-        /// that stands still for a time-lapse.
+        /// Frames per second of flight along the scene's path, above 0; `None` is 25 for a flight, and a camera that
+        /// does not move for a time-lapse.
         fps: Option<f64>,
         /// The instants.
         clock: Clock,
     },
 }
 
-/// One picture.
+/// One image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Still {
     /// The PNG to write.
@@ -123,18 +124,18 @@ pub struct Still {
 /// The instants of a sequence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Clock {
-    /// All pictures at one instant; `None` takes the scene's.
+    /// All frames at one instant; `None` takes the scene's.
     Standing(Option<LocalTime>),
     /// A time-lapse: evenly spaced from the first to the last, both included.
     Lapse {
-        /// Instant of the first picture.
+        /// Instant of the first frame.
         from: LocalTime,
-        /// Instant of the last picture.
+        /// Instant of the last frame.
         to: LocalTime,
     },
 }
 
-/// Where the camera stands.
+/// Where the camera is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum View {
     /// As the scene says: a still from its start, a sequence along its path if it has one.
@@ -146,7 +147,7 @@ pub enum View {
     Along(f64),
 }
 
-/// What a headless render did.
+/// The result of a headless render.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RenderReport {
     /// The files written, in order.

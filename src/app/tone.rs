@@ -1,4 +1,4 @@
-//! The table of the tone curve that the renderer's cameras use, out of Bevy.
+//! Reads the table of the renderer's tone curve from Bevy.
 
 use bevy::{
     app::{App, TaskPoolPlugin},
@@ -14,10 +14,11 @@ use half::f16;
 use super::error::AppError;
 use crate::reference::ToneTable;
 
-/// The table behind [`TONEMAPPING`](crate::render::components::TONEMAPPING). No device is needed: Bevy keeps its tables in the main world.
+/// The table of [`TONEMAPPING`](crate::render::components::TONEMAPPING). No device is needed: Bevy keeps its tables in
+/// the main world.
 ///
 /// # Errors
-/// [`AppError::Render`] where Bevy has no such table, or in another format than half floats.
+/// [`AppError::Render`] if Bevy has no such table, or not in half floats.
 pub fn tone_table() -> Result<ToneTable, AppError> {
     let failed = |what: &str| AppError::Render(format!("Bevy's tone curve cannot be read: {what}"));
     let mut app = App::new();

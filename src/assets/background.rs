@@ -1,9 +1,9 @@
-//! Work beside the frames, on threads that belong to it.
+//! Background work on its own threads.
 //!
-//! Not on Bevy's task pools, whose few threads a bake would hold for seconds while other loads wait, and not in rayon's global
-//! pool, in which the frames' own work would queue up behind it. The threads are as many as the cores but one; they are
-//! started with the first work and shared by all of it. Work that nobody waits for any more does not begin, and can ask
-//! whether it is still wanted.
+//! Bevy's task pools are not used: a bake would block their few threads for seconds while other loads wait. Neither is
+//! rayon's global pool: the frames' own work would queue up behind the bake. There is one thread per core but one; the
+//! first work starts them, and all work shares them. Cancelled work does not start, and running work can check whether
+//! it is still needed.
 
 use std::{
     any::Any,
@@ -18,21 +18,23 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::threads::spare_cores;
 
-/// Stack of a thread. One that waits for a part of its work may begin other work meanwhile, on the same stack.
+/// Stack size of a thread. A thread that waits for a part of its work may start other work meanwhile, on the same
+/// stack.
 const STACK: usize = 16 << 20;
 
 /// Why there is no result.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BackgroundError {
-    /// The system gives no threads.
-    #[error("there are no threads for work beside the frames: {0}; close other programs")]
+    /// The system cannot create threads.
+    #[error("cannot create threads for background work: {0}; close other programs")]
     NoThreads(String),
-    /// The work broke off.
+    /// The work panicked.
     #[error("an error in the program: {0}")]
     BrokeOff(String),
 }
 
-/// Work under way. As a [`Future`] it can be awaited, and [`finished`](Self::finished) can be asked. Dropped, it is given up.
+/// Work in progress. It can be awaited as a [`Future`], or polled with [`finished`](Self::finished). Dropping it
+/// cancels it.
 #[derive(Debug)]
 pub struct Background<T>(Arc<Shared<T>>);
 
@@ -62,17 +64,17 @@ impl<T> Shared<T> {
     }
 }
 
-/// Whether anybody waits for a piece of work.
+/// Whether the result of some work is still needed.
 pub struct Wanted<'a>(&'a (dyn Fn() -> bool + Sync));
 
 impl Wanted<'_> {
-    /// Whether anybody still waits.
+    /// Whether it is still needed.
     pub fn is_wanted(&self) -> bool {
         (self.0)()
     }
 }
 
-/// Begins `work`.
+/// Starts `work`.
 pub fn start<T: Send + 'static>(work: impl FnOnce(&Wanted) -> T + Send + 'static) -> Background<T> {
     let shared = Arc::new(Shared(Mutex::new(State { result: None, waker: None })));
     let line: Weak<Shared<T>> = Arc::downgrade(&shared);
@@ -82,7 +84,7 @@ pub fn start<T: Send + 'static>(work: impl FnOnce(&Wanted) -> T + Send + 'static
             if !wanted() {
                 return;
             }
-            // A panic would end the process; here it is the failure of one piece of work.
+            // A panic would end the process; here only this work fails.
             let result = catch_unwind(AssertUnwindSafe(|| work(&Wanted(&wanted))));
             if let Some(shared) = line.upgrade() {
                 shared.finish(result.map_err(|panic| BackgroundError::BrokeOff(message(&*panic))));
@@ -152,14 +154,14 @@ mod tests {
     }
 
     #[test]
-    fn work_learns_that_nobody_waits() {
+    fn work_sees_that_it_was_cancelled() {
         let (begun, at_work) = channel();
         let (go_on, dropped) = channel::<()>();
-        let (told, answer) = channel();
+        let (sender, answer) = channel();
         let work = start(move |wanted| {
             let _ = begun.send(wanted.is_wanted());
             let _ = dropped.recv();
-            let _ = told.send(wanted.is_wanted());
+            let _ = sender.send(wanted.is_wanted());
         });
         assert_eq!(at_work.recv(), Ok(true));
         drop(work);

@@ -1,4 +1,4 @@
-//! Why a scene cannot be built: every cause in one type, each with its own place and remedy.
+//! Errors of building a scene: every cause in one type, each with its location and remedy.
 
 use std::path::PathBuf;
 
@@ -36,15 +36,15 @@ pub enum StageError {
         /// The system's reason.
         source: std::io::Error,
     },
-    /// Nobody knows where on earth the scene lies.
-    #[error("{scene}: the terrain does not say where on earth it lies; add `place: (latitude: ..., longitude: ...)`")]
+    /// The scene's location on earth is unknown.
+    #[error("{scene}: the terrain has no location on earth; add `place: (latitude: ..., longitude: ...)`")]
     NoPlace {
-        /// The scene file, or what names a scene that was built in code.
+        /// The scene file, or the label of a scene that was built in code.
         scene: String,
     },
-    /// An inventory whose coordinates say nothing about where it lies on the terrain.
+    /// An inventory whose coordinates cannot be related to the terrain.
     #[error(
-        "{}: the terrain has no coordinate system of the kind that these positions are in; use a terrain file of the \
+        "{}: the terrain does not have the coordinate system of these positions; use a terrain file with the \
          same system, or metres and `anchor: StandCentre`",
         path.display()
     )]
@@ -54,23 +54,23 @@ pub enum StageError {
     },
     /// Too many plants for one forest.
     #[error(
-        "the scene's species have {count} individuals together, but a forest holds at most {limit}; lower `individuals`"
+        "the scene's species have {count} individuals in total, but a forest holds at most {limit}; lower `individuals`"
     )]
     TooManyPlants {
         /// Individuals.
         count: usize,
-        /// Most there can be.
+        /// Maximum number.
         limit: usize,
     },
-    /// More trees that are lit together than a forest can tell apart.
+    /// More trees that are lit together than a forest has variants for.
     #[error(
-        "{count} trees are to be lit together, but beside the scene's other plants a forest holds at most {limit} such \
+        "{count} trees are to be lit together, but besides the scene's other plants a forest holds at most {limit} such \
          trees; place fewer, or take `together` out of their species' lighting"
     )]
     TooManyTogether {
         /// Trees.
         count: usize,
-        /// Most there can be.
+        /// Maximum number.
         limit: usize,
     },
     /// More trees than the device's largest buffer holds.
@@ -81,13 +81,13 @@ pub enum StageError {
     TooManyTrees {
         /// Trees of the stand.
         count: usize,
-        /// The most that the device holds.
+        /// Maximum number that the device holds.
         limit: usize,
     },
-    /// A scene that nobody waits for any more.
-    #[error("the scene was given up before it was ready")]
+    /// A cancelled build.
+    #[error("the build of the scene was cancelled")]
     Cancelled,
-    /// A scene that could not be built beside the program.
+    /// A scene that could not be built in the background.
     #[error("the scene could not be built: {0}")]
     Background(String),
 }

@@ -11,7 +11,7 @@ use crate::{
     terrain::{HeightField, NoiseKind, NoiseTerrain, ReadOptions, Surroundings, Terrain, read_terrain},
 };
 
-/// Builds the ground that a scene asks for; what the readers decided on their own account becomes a warning.
+/// Builds the ground of a scene; decisions of the readers become warnings.
 ///
 /// # Errors
 /// [`StageError::Terrain`].

@@ -1,4 +1,4 @@
-//! From a scene to what a Bevy world shows: terrain, plants and stand are built, baked and packed into a [`Stage`].
+//! Builds what a Bevy world shows from a scene: terrain, plants and stand, baked and packed into a [`Stage`].
 //!
 //! ```text
 //!  scene --> ground ----------------------------------+
@@ -7,9 +7,9 @@
 //! ```
 //!
 //! [`Stage::build`] blocks, reports to a [`Progress`](crate::progress::Progress) and can be cancelled;
-//! [`CanopyScene`](crate::components::CanopyScene) runs it beside a Bevy program's frames, on threads of its own.
+//! [`CanopyScene`](crate::components::CanopyScene) runs it in the background of a Bevy program, on threads of its own.
 //!
-//! What a program builds its forests of in code are Bevy assets: [`PlantAsset`], [`TerrainMap`] and [`SceneAsset`], registered
+//! Programs that build forests in code use Bevy assets: [`PlantAsset`], [`TerrainMap`] and [`SceneAsset`], registered
 //! by [`CanopyAssetPlugin`].
 
 pub(crate) mod background;

@@ -1,4 +1,4 @@
-//! The plants of a scene's species: which individuals there are, and how each is made.
+//! The plants of a scene's species: their individuals, and how each is built.
 
 use std::{ops::Range, path::PathBuf};
 
@@ -14,18 +14,18 @@ use crate::{
     scene::{GrownForm, Lighting, PlantSource, Quality, Scene, Species},
 };
 
-/// How one individual is made.
+/// The source of one individual.
 #[derive(Clone, Debug)]
 pub enum IndividualSource {
     /// By rule.
     Grown {
         /// The rules.
         parameters: Box<GrowParameters>,
-        /// Where they come from, for messages.
+        /// The source of the rules, for messages.
         from: PathBuf,
         /// Seed of this individual.
         seed: u64,
-        /// Triangles.
+        /// Number of triangles.
         triangles: usize,
     },
     /// From a file.
@@ -38,7 +38,7 @@ pub enum IndividualSource {
 }
 
 impl IndividualSource {
-    /// Makes the plant; the strings are warnings.
+    /// Builds the plant; the strings are warnings.
     ///
     /// # Errors
     /// [`StageError`] for rules or a file that cannot be used.
@@ -61,7 +61,7 @@ impl IndividualSource {
 /// One individual of a species.
 #[derive(Clone, Debug)]
 pub struct Individual {
-    /// How it is made.
+    /// Where it comes from.
     pub source: IndividualSource,
     /// The gloss of its leaves.
     pub gloss: Gloss,
@@ -70,7 +70,7 @@ pub struct Individual {
 }
 
 impl Individual {
-    /// Makes the plant with its gloss; the strings are warnings.
+    /// Builds the plant with its gloss; the strings are warnings.
     ///
     /// # Errors
     /// Those of [`IndividualSource::build`].
@@ -81,7 +81,7 @@ impl Individual {
     }
 }
 
-/// All individuals of a scene, and which belong to which species.
+/// All individuals of a scene, and the species that they belong to.
 #[derive(Clone, Debug, Default)]
 pub struct PlantPlan {
     /// One for each variant.
@@ -154,7 +154,7 @@ fn sources(species: &Species, gloss: Gloss) -> Result<Vec<IndividualSource>, Sta
     })
 }
 
-/// Bake settings of a scene's quality and a species' light.
+/// Bake settings for a scene's quality and a species' lighting.
 pub fn bake_settings(quality: &Quality, lighting: LightingSettings) -> BakeSettings {
     BakeSettings {
         lighting,

@@ -21,16 +21,16 @@ const SPECIES: [(&str, &str); 2] = [
     ("species/conifer.species.ron", include_str!("../../assets/species/conifer.species.ron")),
 ];
 
-/// The assets and their loaders: [`PlantAsset`], [`TerrainMap`], [`SceneAsset`], and the species that come with the crate.
+/// Registers the assets and their loaders: [`PlantAsset`], [`TerrainMap`], [`SceneAsset`], and the built-in species.
 ///
-/// Part of [`CanopyPlugins`](crate::CanopyPlugins). May be added before or after Bevy's `AssetPlugin`, and more than once;
-/// where that plugin is missing when the app starts, the log says so and nothing is registered.
+/// Part of [`CanopyPlugins`](crate::CanopyPlugins). May be added before or after Bevy's `AssetPlugin`, and more than
+/// once; if that plugin is missing when the app starts, an error is logged and nothing is registered.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CanopyAssetPlugin;
 
 impl Plugin for CanopyAssetPlugin {
     fn build(&self, app: &mut App) {
-        // Where this plugin comes first, `finish` makes up for it.
+        // If this plugin was added first, `finish` does it.
         if app.world().contains_resource::<AssetServer>() {
             register(app);
         }

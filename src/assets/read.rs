@@ -36,7 +36,7 @@ pub async fn beside(context: &mut LoadContext<'_>, path: &Path) -> io::Result<Ve
     })
 }
 
-/// `path` without `.` and `..` where that is possible: asset sources other than folders know no parents.
+/// `path` without `.` and `..` where that is possible: asset sources other than folders have no parent folders.
 fn normalized(path: &Path) -> PathBuf {
     let mut parts = PathBuf::new();
     for part in path.components() {

@@ -13,12 +13,12 @@ use bevy::{
 use super::{StageError, read};
 use crate::scene::Scene;
 
-/// A scene file, read and checked; not built yet, which takes longer.
+/// A scene file, read and checked but not built yet, which takes longer.
 ///
-/// `assets.load::<SceneAsset>("forest.canopy.ron")`; any `.ron` can be loaded by the asset's type. The files that the scene
-/// names are not read here: whoever builds it reads them from the file system. Its relative paths, which are relative to the
-/// scene file, lead through the folder of assets where the scene is in the default asset source; in any other source they are
-/// relative to the working directory.
+/// `assets.load::<SceneAsset>("forest.canopy.ron")`; any `.ron` can be loaded by the asset's type. The files that the
+/// scene names are not read here: the build reads them from the file system. Its relative paths, which are relative to
+/// the scene file, lead through the folder of assets where the scene is in the default asset source; in any other
+/// source they are relative to the working directory.
 #[derive(Asset, TypePath, Clone, Debug, PartialEq)]
 pub struct SceneAsset {
     /// The scene, its paths ready to open.

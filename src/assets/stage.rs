@@ -1,4 +1,4 @@
-//! From a validated scene to what the renderer shows: terrain, plants, stand, baked and packed.
+//! Builds what the renderer draws from a validated scene: terrain, plants and stand, baked and packed.
 
 use std::{ops::Range, sync::Arc, time::Instant};
 
@@ -17,28 +17,28 @@ use crate::{
     terrain::Terrain,
 };
 
-/// Metres a texel of the cover map.
+/// Metres per texel of the cover map.
 pub(crate) const COVER_TEXEL: f64 = 8.0;
-/// Share of a plant's half width, the greater of its two, that counts as its crown's radius.
+/// Crown radius as a fraction of the larger half width of a plant.
 const CROWN_SHARE: f32 = 0.8;
 /// Extent of a plant without any surface, metres.
 const NO_PLANT: PlantSize = PlantSize { radius: 0.1, height: 0.1 };
 
-/// A scene, built.
+/// A built scene.
 pub struct Stage {
     /// The ground.
     pub terrain: Arc<Terrain>,
     /// The trees.
     pub stand: Arc<PackedStand>,
-    /// Their plants, by variant.
+    /// The plants, by variant.
     pub plants: Arc<Vec<BakedPlant>>,
     /// Variants of each of the scene's species.
     pub variants: Vec<Range<u16>>,
-    /// How the sun lights each.
+    /// How the sun lights each plant.
     pub suns: Arc<[SunLight]>,
-    /// Share of ground under crowns; `None` without trees.
+    /// Canopy cover; `None` without trees.
     pub cover: Option<Arc<CoverMap>>,
-    /// Place on earth.
+    /// Location on earth.
     pub observer: Observer,
     /// The scene as written.
     pub scene: Scene,
@@ -48,8 +48,8 @@ impl Stage {
     /// Builds `scene`: one from a file ([`Scene::read`]), or one that was built in code.
     ///
     /// # Errors
-    /// [`StageError`] for anything in the scene or its files that cannot be used; [`StageError::Cancelled`] soon after `progress`
-    /// [is cancelled](Progress::is_cancelled), in the midst of the bakes after those of a few plants.
+    /// [`StageError`] for anything in the scene or its files that cannot be used; [`StageError::Cancelled`] soon after
+    /// `progress` [is cancelled](Progress::is_cancelled); during the bakes, after the current few plants.
     pub fn build(scene: &Scene, progress: &mut dyn Progress) -> Result<Self, StageError> {
         scene.validate()?;
         let started = Instant::now();
@@ -128,19 +128,19 @@ impl Stage {
         }
     }
 
-    /// Shadows as the scene's quality asks for them.
+    /// Shadow settings of the scene's quality.
     pub fn shadow(&self) -> SunShadowSettings {
         shadow(&self.scene.quality)
     }
 }
 
-/// Shadows as `quality` asks for them.
+/// Shadow settings of `quality`.
 fn shadow(quality: &Quality) -> SunShadowSettings {
     SunShadowSettings {
         map_size: quality.shadow_map_size,
         cascades: quality.cascades as usize,
         distance: quality.shadow_distance,
-        // A billboard's level plane would draw a line across the crowns of full models.
+        // A billboard's horizontal plane would draw a line across the crowns of full models.
         proxy_distance: quality.nearest_level_end(),
         ..SunShadowSettings::default()
     }
@@ -157,15 +157,15 @@ pub(crate) fn check_trees(count: usize, device: &RenderDevice) -> Result<(), Sta
     if count > limit { Err(StageError::TooManyTrees { count, limit }) } else { Ok(()) }
 }
 
-/// Stops a build that nobody waits for any more.
+/// Stops a cancelled build.
 fn check_wanted(progress: &dyn Progress) -> Result<(), StageError> {
     if progress.is_cancelled() { Err(StageError::Cancelled) } else { Ok(()) }
 }
 
-/// Where on earth the scene lies: as it says itself, or else as its terrain file does.
+/// The scene's location on earth: its own, or else that of its terrain file.
 ///
 /// # Errors
-/// [`StageError::NoPlace`] where neither says.
+/// [`StageError::NoPlace`] if both are missing.
 pub(crate) fn observer(scene: &Scene, terrain: &Terrain) -> Result<Observer, StageError> {
     let known = terrain.reference().and_then(|reference| reference.latitude_longitude());
     let latitude = scene.place.latitude.or(known.map(|place| place.0));
@@ -177,7 +177,7 @@ pub(crate) fn observer(scene: &Scene, terrain: &Terrain) -> Result<Observer, Sta
     Ok(Observer::new(latitude, longitude, height)?)
 }
 
-/// The disc of ground that the plant's crown covers, which is smaller than what holds every twig of it.
+/// The disc of ground that the plant's crown covers, which is smaller than one that contains every twig.
 pub(crate) fn crown(plant: &BakedPlant) -> PlantSize {
     let (half_width, height) = plant.plant.bounds().map_or((NO_PLANT.radius, NO_PLANT.height), |bounds| {
         let size = bounds.size();
@@ -196,7 +196,7 @@ fn bake(
     let cache = Cache::of_user();
     let mut baked = Vec::with_capacity(species.individuals.len());
     let mut fresh = 0;
-    // A few at a time: in parallel, and still with progress.
+    // A few at a time: in parallel, but with progress.
     for group in species.individuals.chunks(rayon::current_num_threads().max(1)) {
         check_wanted(progress)?;
         let results: Vec<_> = group
@@ -225,7 +225,7 @@ fn bake(
     }
     progress.end();
     let seconds = started.elapsed().as_secs_f64();
-    progress.note(&format!("{} plants, {fresh} baked anew: {seconds:.2} s", baked.len()));
+    progress.note(&format!("{} plants, {fresh} newly baked: {seconds:.2} s", baked.len()));
     Ok(baked)
 }
 

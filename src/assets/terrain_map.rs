@@ -12,21 +12,21 @@ use tracing::warn;
 use super::{StageError, background, read};
 use crate::terrain::{HeightField, ReadOptions, Surroundings, Terrain, TerrainError, read_terrain_bytes};
 
-/// How a terrain file is read; the settings of [`TerrainMapLoader`]: the part of it, the metres of an image, the coordinate
-/// system, what lies around it.
+/// How a terrain file is read; the settings of [`TerrainMapLoader`]: the part of it, the metres of an image, the
+/// coordinate system, what lies around it.
 pub type TerrainMapSettings = ReadOptions;
 
-/// A terrain, as [`Terrain3d`](crate::components::Terrain3d) shows it.
+/// A terrain, for [`Terrain3d`](crate::components::Terrain3d).
 ///
-/// `assets.load::<TerrainMap>("valley.tif")` reads GeoTIFF, ESRI ASCII grids, SRTM `.hgt` and, with a scale in the settings,
-/// greyscale PNG. Bevy's image loader keeps the endings `tif` and `png`; the asset's type chooses the loader. A file is read as
-/// a whole before a crop is cut from it: a program that needs a window of a very large one calls
+/// `assets.load::<TerrainMap>("valley.tif")` reads GeoTIFF, ESRI ASCII grids, SRTM `.hgt` and, with a scale in the
+/// settings, greyscale PNG. Bevy's image loader keeps the endings `tif` and `png`; the asset's type chooses the loader.
+/// A file is read as a whole before a crop is cut from it: a program that needs a window of a very large one calls
 /// [`read_terrain`](crate::terrain::read_terrain) itself and adds the map to `Assets<TerrainMap>`.
 #[derive(Asset, TypePath, Clone, Debug)]
 pub struct TerrainMap {
     /// Heights.
     pub terrain: Arc<Terrain>,
-    /// What the reader decided on its own account, such as holes that were filled.
+    /// Decisions of the reader that the user should know, such as filled holes.
     pub warnings: Vec<String>,
 }
 

@@ -1,9 +1,9 @@
-//! Trees that are lit together [Luft 2007, 5]: one density field over all crowns, so that a small tree is darkened by its
-//! tall neighbour.
+//! Trees that are lit together [Luft 2007, 5]: one density field over all crowns, so that a small tree is darkened by
+//! its tall neighbour.
 //!
-//! Such a light belongs to one tree at one place. Each tree therefore becomes a variant of its own, with vertices (20 bytes
-//! each) and billboard pictures (11 bytes a texel and plane, mips included) of its own; the meshes on the processor and the
-//! leaves' textures stay shared.
+//! Such a lighting belongs to one tree at one position. Each tree therefore becomes its own variant, with its own
+//! vertices (20 bytes each) and billboard textures (11 bytes per texel and plane, mips included). The meshes in main
+//! memory and the leaves' textures stay shared.
 
 use std::{collections::HashSet, sync::Arc};
 
@@ -24,12 +24,12 @@ use crate::{
     scene::{Scene, Species},
 };
 
-/// Makes a plant of its own of every tree whose species asks for it, and lights those trees in one field. Brings `stand`,
-/// `plants` and the species' `variants` to the new plants, species by species. The first such species' settings hold for
-/// all of them.
+/// Gives every tree of a species that is lit together its own plant, and lights those trees in one field. Updates
+/// `stand`, `plants` and the species' `variants` to the new plants, species by species. The settings of the first such
+/// species apply to all of them.
 ///
 /// # Errors
-/// [`StageError::TooManyTogether`] where the trees are more than a forest can tell apart.
+/// [`StageError::TooManyTogether`] if there are more such trees than a forest has variants for.
 pub fn light_together(
     scene: &Scene,
     plan: &mut PlantPlan,
@@ -92,7 +92,7 @@ pub fn light_together(
     let vertices: usize = lit.iter().flat_map(|p| &p.plant.parts).map(|part| part.mesh.positions.len()).sum();
     progress.advance(count as u64);
     progress.end();
-    progress.note(&format!("{count} trees lit together: {vertices} vertices of their own"));
+    progress.note(&format!("{count} trees lit together: {vertices} own vertices"));
 
     let mut all: Vec<BakedPlant> = Vec::with_capacity(others + lit.len());
     let mut lit = lit.into_iter();

@@ -31,7 +31,7 @@ impl Ground for Terrain {
 /// Builds the stand of `scene` on `terrain`, from plants of these sizes, by variant.
 ///
 /// # Errors
-/// [`StageError`] for rules that cannot be met and inventories that cannot be read.
+/// [`StageError`] for rules that cannot be fulfilled and inventories that cannot be read.
 pub fn build_stand(
     scene: &Scene,
     plan: &PlantPlan,
@@ -50,7 +50,7 @@ fn plant_heights(variants: &std::ops::Range<u16>, sizes: &[PlantSize]) -> Vec<f3
     variants.clone().map(|variant| sizes.get(usize::from(variant)).map_or(1.0, |size| size.height)).collect()
 }
 
-/// Trunk radius at scale 1, where a species states it for a tree of mean height.
+/// Trunk radius at scale 1, whereas a species states it for a tree of mean height.
 fn trunk_radius(species: &Species, heights: &[f32]) -> f32 {
     let mean_plant = heights.iter().sum::<f32>() / heights.len().max(1) as f32;
     species.trunk_radius_m() as f32 * mean_plant / species.mean_height() as f32
@@ -135,7 +135,7 @@ fn from_inventory(
     Ok(result.stand)
 }
 
-/// Where the coordinates of an inventory lie on the terrain.
+/// Converts the coordinates of an inventory to positions on the terrain.
 fn placement<'a>(
     trees: &InventoryTrees,
     inventory: &Inventory,
@@ -161,7 +161,7 @@ fn placement<'a>(
     };
     let span = (all(f64::INFINITY, f64::min), all(f64::NEG_INFINITY, f64::max));
     let origin = trees.anchor.origin(span, terrain.extent()).ok_or_else(unknown)?;
-    // The file's y runs north, the scene's z south.
+    // The file's y points north, the scene's z south.
     Ok(Box::new(move |x, y| on_ground(DVec2::new(x - origin.x, origin.y - y))))
 }
 

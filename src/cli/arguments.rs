@@ -1,4 +1,4 @@
-//! What can be written behind `canopy`.
+//! The arguments of `canopy`.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use canopy::{
 };
 use clap::{Args, Parser, Subcommand};
 
-/// Width and height of pictures and windows unless stated.
+/// Default width and height of images and windows.
 const DEFAULT_SIZE: &str = "1280x720";
 
 /// A real-time forest renderer and landscape simulator.
@@ -24,16 +24,16 @@ const DEFAULT_SIZE: &str = "1280x720";
   canopy reference my-valley.ron --out truth.exr --spp 256
   canopy info stand.csv
 
-`canopy help render` shows how to render pictures, sequences and time-lapses."
+`canopy help render` shows how to render images, sequences and time-lapses."
 )]
 pub struct Arguments {
     /// What to do.
     #[command(subcommand)]
     pub command: Option<Command>,
-    /// List the graphics adapters that --adapter can name, and stop.
+    /// List the graphics adapters for --adapter, and exit.
     #[arg(long)]
     pub list_adapters: bool,
-    /// What all commands understand.
+    /// Options of all commands.
     #[command(flatten)]
     pub common: Common,
 }
@@ -41,23 +41,23 @@ pub struct Arguments {
 /// Options of all commands.
 #[derive(Clone, Debug, Args)]
 pub struct Common {
-    /// No progress bars and no notes; warnings and errors only.
+    /// Print warnings and errors only: no progress bars and no notes.
     #[arg(long, short, global = true)]
     pub quiet: bool,
-    /// Replaces the scene's seed: other places, sizes and turns of the trees.
+    /// Replace the scene's seed: other positions, sizes and rotations of the trees.
     #[arg(long, global = true, value_name = "NUMBER")]
     pub seed: Option<u64>,
     /// Part of the name of the graphics adapter to use (see --list-adapters).
     #[arg(long, global = true, value_name = "NAME")]
     pub adapter: Option<String>,
-    /// Samples per pixel, 1 (rough leaf edges, faster) or 4, instead of what the scene asks for.
+    /// Samples per pixel, 1 (rough leaf edges, faster) or 4 [default: the scene's].
     #[arg(long, global = true, value_name = "1|4", value_parser = parse_samples)]
     pub msaa: Option<u32>,
-    /// Light of all foliage: local, expressive, transfer or harmonics (transfer for the sun too) [default: each species'
-    /// own].
+    /// Lighting of all foliage: local, expressive, transfer or harmonics (transfer for the sun too) [default: each
+    /// species' own].
     #[arg(long, global = true, value_name = "LIGHT", value_parser = parse_lighting)]
     pub lighting: Option<Lighting>,
-    /// Say which passes ran, which were skipped, and why.
+    /// Print which passes ran, which were skipped, and why.
     #[arg(long, global = true)]
     pub explain: bool,
 }
@@ -69,50 +69,59 @@ pub enum Command {
     Fly(Fly),
     /// Render a scene to PNG files, without a window.
     Render(Render),
-    /// Trace the ground truth of a scene on the processor: slow, and right.
+    /// Path-trace the ground truth of a scene on the CPU: slow, but accurate.
     Reference(Reference),
-    /// Say what a plant, terrain, inventory or scene file holds.
+    /// Describe a plant, terrain, inventory or scene file.
     Info(Info),
 }
 
 /// Where the camera is.
 #[derive(Clone, Debug, Args)]
 pub struct CameraArguments {
-    /// Camera: metres east, above the ground and south of the terrain's centre; compass bearing and degrees upward.
+    /// Camera: metres east of the terrain's centre, above the ground and south; compass bearing and pitch in degrees.
     #[arg(long, value_name = "X,Y,Z,YAW,PITCH", value_parser = parse_pose, allow_hyphen_values = true, conflicts_with = "along")]
     pub camera: Option<Pose>,
-    /// Time on the scene's camera path, as in 12.5s; a sequence starts there.
+    /// Time on the scene's camera path, such as 12.5s; a sequence starts there.
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     pub along: Option<f64>,
 }
 
 /// Arguments of `canopy fly`.
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Keys: W A S D Q E move, mouse looks, wheel sets the speed, Shift hurries, F flies the scene's \
-                        path, L opens a panel that turns the light of the leaves, H shows all keys.
+#[command(after_help = "Keys:
+  W A S D Q E   fly              mouse   look around
+  wheel         set the speed    Shift   five times faster
+  F             fly the scene's path
+  L             open or close the light panel
+  H             show all keys
+
+Keys of the light panel, which adjusts the lighting of the leaves:
+  Up, Down      select a value
+  Left, Right   decrease or increase it; with Shift in small steps
+  Backspace     reset it to automatic, or to the scene's lighting
+  Tab           next species; with Shift the previous one
+  Enter         print the values for the scene file in the terminal
 
 Examples:
   canopy fly
   canopy fly my-valley.ron --at 2026-10-03T18:05+02:00 --clock 60
-  canopy fly my-valley.ron --camera 0,30,200,0,-10 --size 1920x1080"
-)]
+  canopy fly my-valley.ron --camera 0,30,200,0,-10 --size 1920x1080")]
 pub struct Fly {
-    /// Scene file [default: the demo that comes with the program].
+    /// Scene file [default: the demo scene].
     pub scene: Option<PathBuf>,
     /// Size of the window in pixels.
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = DEFAULT_SIZE)]
     pub size: (u32, u32),
-    /// Date and time with the offset from UTC, as in 2026-06-21T15:30+02:00 [default: the scene's].
+    /// Date and time with the offset from UTC, such as 2026-06-21T15:30+02:00 [default: the scene's].
     #[arg(long, value_name = "TIME")]
     pub at: Option<LocalTime>,
     /// Where to start [default: the scene's].
     #[command(flatten)]
     pub view: CameraArguments,
-    /// Simulated seconds per second at the start [default: 0, the clock stands].
+    /// Simulated seconds per second at the start [default: 0, the clock is stopped].
     #[arg(long, value_name = "FACTOR", value_parser = parse_positive)]
     pub clock: Option<f64>,
-    /// Let the camera go under the ground.
+    /// Let the camera go below the ground.
     #[arg(long)]
     pub underground: bool,
 }
@@ -120,33 +129,33 @@ pub struct Fly {
 /// Arguments of `canopy render`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
-  One picture:
+  One image:
     canopy render demo.ron --out noon.png --at 2026-06-21T13:30-04:00 --camera 0,20,0,90,-5
-  Several hours from one camera (as many --out as --at):
+  Several times of day from one camera (one --out for each --at):
     canopy render demo.ron --at 2026-06-21T06:30-04:00 --out dawn.png --at 2026-06-21T23:00-04:00 --out night.png
-  A flight along the scene's path, flight/0000.png and on:
+  A flight along the scene's path, written to flight/0000.png and so on:
     canopy render demo.ron --out flight --along 10s --frames 250 --fps 25
-  A day from a standing camera:
+  A day from a fixed camera:
     canopy render demo.ron --out day.png --frames 96 --from 2026-06-21T04:00-04:00 --to 2026-06-21T22:00-04:00")]
 pub struct Render {
     /// Scene file.
     pub scene: PathBuf,
-    /// PNG to write; for a sequence, a PNG into whose name the numbers go, or a folder.
+    /// PNG file to write; for a sequence, a PNG name to which numbers are added, or a folder.
     #[arg(long, value_name = "FILE", required = true)]
     pub out: Vec<PathBuf>,
-    /// Size of a picture in pixels.
+    /// Size of the images in pixels.
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = DEFAULT_SIZE)]
     pub size: (u32, u32),
-    /// Date and time with the offset from UTC, as in 2026-06-21T15:30+02:00 [default: the scene's].
+    /// Date and time with the offset from UTC, such as 2026-06-21T15:30+02:00 [default: the scene's].
     #[arg(long, value_name = "TIME", conflicts_with_all = ["from", "to"])]
     pub at: Vec<LocalTime>,
-    /// Where the camera is [default: the scene's start; its path for a sequence].
+    /// Where the camera is [default: the scene's start, or its path for a sequence].
     #[command(flatten)]
     pub view: CameraArguments,
-    /// Number of pictures of a sequence.
+    /// Number of images in a sequence.
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..))]
     pub frames: Option<u32>,
-    /// Pictures per second of flight along the path [default: 25; in a time-lapse the camera stands still].
+    /// Frames per second of flight along the path [default: 25; in a time-lapse the camera does not move].
     #[arg(long, value_name = "RATE", value_parser = parse_positive, requires = "frames")]
     pub fps: Option<f64>,
     /// First instant of a time-lapse.
@@ -162,47 +171,47 @@ pub struct Render {
 #[command(after_help = "Examples:
   canopy reference demo.ron --out truth.exr --spp 256 --size 640x360
   canopy reference demo.ron --out truth.png --at 2026-06-21T19:30-04:00 --camera 0,2,0,270,5 --spp 64 --resume
-Pictures can be interrupted: what was traced is kept every 30 s beside them, and --resume goes on from there.")]
+A trace can be interrupted: its state is saved every 30 s next to the image, and --resume continues from there.")]
 pub struct Reference {
     /// Scene file.
     pub scene: PathBuf,
-    /// Picture to write: .exr for radiance in nits, .png as the renderer shows it.
+    /// Image to write: .exr for radiance in nits, .png as the renderer shows it.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Samples a pixel.
+    /// Samples per pixel.
     #[arg(long, value_name = "NUMBER", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: u32,
-    /// Size of the picture in pixels.
+    /// Size of the image in pixels.
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = DEFAULT_SIZE)]
     pub size: (u32, u32),
-    /// Date and time with the offset from UTC, as in 2026-06-21T15:30+02:00 [default: the scene's].
+    /// Date and time with the offset from UTC, such as 2026-06-21T15:30+02:00 [default: the scene's].
     #[arg(long, value_name = "TIME")]
     pub at: Option<LocalTime>,
     /// Where the camera is [default: the scene's start].
     #[command(flatten)]
     pub view: CameraArguments,
-    /// How often light is scattered between surfaces, 0 for light straight from sun and sky [default: as it will].
+    /// Maximum number of bounces between surfaces; 0: only direct light from sun and sky [default: unlimited].
     #[arg(long, value_name = "NUMBER")]
     pub bounces: Option<u32>,
-    /// Which light there is: the sun's (or the moon's) alone, the sky's alone, or all.
+    /// Light sources to include: the sun (or moon) alone, the sky alone, or all.
     #[arg(long, value_enum, default_value_t = LightChoice::All)]
     pub light: LightChoice,
-    /// Leave the renderer's fog out.
+    /// Leave out the renderer's fog.
     #[arg(long)]
     pub clear_air: bool,
-    /// Go on with an earlier picture of the same scene, light and camera.
+    /// Continue an earlier trace of the same scene, light and camera.
     #[arg(long)]
     pub resume: bool,
 }
 
-/// Which light a picture of the ground truth has.
+/// Light sources of a ground truth render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum LightChoice {
-    /// All of it.
+    /// All light sources.
     All,
-    /// Sun or moon alone, and what ground and plants make of it.
+    /// Sun or moon alone, with its bounces off ground and plants.
     Sun,
-    /// The sky alone, and what ground and plants make of it.
+    /// The sky alone, with its bounces off ground and plants.
     Sky,
 }
 

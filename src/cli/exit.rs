@@ -3,9 +3,9 @@
 use std::io::Write;
 use std::process::ExitCode;
 
-/// What a command came to.
+/// The outcome of a command.
 pub enum Outcome {
-    /// All done.
+    /// It succeeded.
     Done,
     /// The arguments do not fit together.
     Usage(clap::Error),
@@ -22,7 +22,7 @@ impl From<anyhow::Result<()>> for Outcome {
     }
 }
 
-/// Prints what there is to say and gives the exit code.
+/// Prints the error, if any, and returns the exit code.
 pub fn finish(outcome: Outcome) -> ExitCode {
     match outcome {
         Outcome::Done => ExitCode::SUCCESS,
@@ -38,7 +38,7 @@ pub fn finish(outcome: Outcome) -> ExitCode {
     }
 }
 
-/// Prints lines on the standard output. A reader that left early (`canopy info oak.glb | head -1`) is no error.
+/// Prints lines on the standard output. A reader that closes early (`canopy info oak.glb | head -1`) is not an error.
 ///
 /// # Errors
 /// The output cannot be written for another reason, such as a full disk.

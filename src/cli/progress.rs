@@ -5,8 +5,8 @@ use std::time::Duration;
 use canopy::progress::Progress;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// A progress bar on the standard error output, one stage at a time. It vanishes with its stage, and is never drawn
-/// where that output is no terminal or the user asked for quiet; lines for the user stay.
+/// A progress bar on the standard error output, one stage at a time. It disappears with its stage, and is never drawn
+/// if that output is not a terminal or the user asked for quiet. Lines for the user stay.
 pub struct Bars {
     bar: ProgressBar,
     quiet: bool,
@@ -28,9 +28,9 @@ impl Progress for Bars {
         let (bar, template) = if steps == 0 {
             (ProgressBar::no_length(), "{spinner} {msg} [{elapsed}]")
         } else {
-            (ProgressBar::new(steps), "{msg} {wide_bar} {pos}/{len} [{elapsed}, {eta} to go]")
+            (ProgressBar::new(steps), "{msg} {wide_bar} {pos}/{len} [{elapsed}, {eta} left]")
         };
-        // Of both outputs, indicatif draws on neither that is no terminal.
+        // indicatif draws nothing if the output is not a terminal.
         bar.set_draw_target(ProgressDrawTarget::stderr());
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
@@ -66,7 +66,7 @@ impl Drop for Bars {
     }
 }
 
-/// A line on the standard error output; one that nobody can read any more is no reason to stop.
+/// Prints a line on the standard error output. A closed output does not stop the program.
 fn eprint_line(line: &str) {
     use std::io::Write;
     let _ = writeln!(std::io::stderr(), "{line}");

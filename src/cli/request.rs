@@ -1,4 +1,4 @@
-//! From arguments to what the library is asked.
+//! Turns arguments into the requests of the library.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use clap::error::ErrorKind;
 
 use super::arguments::{Arguments, CameraArguments, Common, Fly, LightChoice, Reference, Render};
 
-/// The scene of `canopy fly` without a name.
+/// The scene of `canopy fly` without an argument.
 const DEMO: &str = "scenes/demo.ron";
 
 fn overrides(common: &Common) -> Overrides {
@@ -37,7 +37,7 @@ pub fn fly_options(fly: Fly, common: &Common) -> FlyOptions {
 /// The options of a render.
 ///
 /// # Errors
-/// A usage error where the arguments, each fine alone, do not fit together.
+/// A usage error if arguments that are each valid do not fit together.
 pub fn render_options(render: Render, common: &Common) -> Result<RenderOptions, clap::Error> {
     Ok(RenderOptions {
         view: view(&render.view),
@@ -51,7 +51,7 @@ pub fn render_options(render: Render, common: &Common) -> Result<RenderOptions, 
     })
 }
 
-/// The options of a picture of the ground truth.
+/// The options of a ground truth render.
 ///
 /// # Errors
 /// A usage error for a file that ends neither in `.exr` nor in `.png`.
@@ -59,7 +59,7 @@ pub fn reference_options(reference: Reference, common: &Common) -> Result<Refere
     if !ends_in(&reference.out, "exr") && !ends_in(&reference.out, "png") {
         let file = reference.out.display();
         return Err(usage(format!(
-            "--out {file}: a reference is an OpenEXR or a PNG file, end the name in .exr or .png"
+            "--out {file}: a reference is an OpenEXR or PNG file; the name must end in .exr or .png"
         )));
     }
     Ok(ReferenceOptions {
@@ -98,13 +98,13 @@ fn pictures(
             )));
         }
         if let Some(wrong) = out.iter().find(|file| !ends_in(file, "png")) {
-            return Err(usage(format!("--out {}: pictures are PNG files, end the name in .png", wrong.display())));
+            return Err(usage(format!("--out {}: images are PNG files; the name must end in .png", wrong.display())));
         }
         let times = at.iter().copied().map(Some).chain(std::iter::repeat(None));
         return Ok(Pictures::Stills(out.into_iter().zip(times).map(|(out, at)| Still { out, at }).collect()));
     };
     if at.len() > 1 {
-        return Err(usage("a sequence (--frames) has one --at, or --from and --to".to_owned()));
+        return Err(usage("a sequence (--frames) takes one --at, or --from and --to".to_owned()));
     }
     match (out.pop(), out.is_empty()) {
         (Some(out), true) => Ok(Pictures::Sequence {
@@ -116,7 +116,7 @@ fn pictures(
                 None => Clock::Standing(at.first().copied()),
             },
         }),
-        _ => Err(usage("a sequence (--frames) has one --out".to_owned())),
+        _ => Err(usage("a sequence (--frames) takes one --out".to_owned())),
     }
 }
 
@@ -128,9 +128,10 @@ fn usage(message: String) -> clap::Error {
     Arguments::command().error(ErrorKind::ArgumentConflict, message)
 }
 
-/// The usage error of a command line that names no command.
+/// The usage error of a command line without a command.
 pub fn no_command() -> clap::Error {
-    Arguments::command().error(ErrorKind::MissingSubcommand, "name a command: fly, render, reference or info")
+    Arguments::command()
+        .error(ErrorKind::MissingSubcommand, "no command given (expected fly, render, reference or info)")
 }
 
 fn view(camera: &CameraArguments) -> View {
@@ -141,7 +142,8 @@ fn view(camera: &CameraArguments) -> View {
     }
 }
 
-/// The demo scene: of the folder `assets` in the working directory, beside the program, or where the program was built.
+/// The demo scene: in the folder `assets` of the working directory, next to the program, or where the program was
+/// built.
 fn demo_scene() -> PathBuf {
     let beside = std::env::current_exe().ok().and_then(|program| Some(program.parent()?.join("assets").join(DEMO)));
     let built = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets").join(DEMO);

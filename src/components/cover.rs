@@ -1,4 +1,4 @@
-//! The canopy cover of each ground: that of all forests on it.
+//! The canopy cover of each ground: the sum over all forests on it.
 
 use std::sync::Arc;
 
@@ -15,17 +15,18 @@ use glam::DVec2;
 use super::Terrain3d;
 use crate::{render::components::Ground, scatter::CoverMap};
 
-/// The most texels of a sum; 64 MiB. Beyond it the forests lie too far apart for one map, and the largest one's is taken.
+/// Maximum number of texels of a sum; 64 MiB. Beyond it the forests are too far apart for one map, and that of the
+/// largest forest is used.
 const MOST_TEXELS: f64 = 67_108_864.0;
 
-/// Share of ground under the crowns of a forest, and the terrain that it stands on.
+/// The canopy cover of a forest, and its terrain.
 #[derive(Component, Clone, Debug)]
 pub struct ForestCover {
     pub ground: Entity,
     pub map: Arc<CoverMap>,
 }
 
-/// Gives each ground the cover of its forests.
+/// Sets the canopy cover of each ground.
 pub fn cover_grounds(
     covers: Query<(Entity, &ForestCover)>,
     changed: Query<(), Changed<ForestCover>>,
@@ -56,8 +57,8 @@ pub fn cover_grounds(
     }
 }
 
-/// The sum of maps whose texels are of one size and lie on one grid, at most 255 a texel. `None` of none; of one map that
-/// map itself.
+/// The sum of maps whose texels have one size and lie on one grid, at most 255 per texel. `None` for no maps; a single
+/// map is returned as it is.
 fn sum(maps: &[&Arc<CoverMap>]) -> Option<Arc<CoverMap>> {
     let filled: Vec<&Arc<CoverMap>> = maps.iter().filter(|map| map.columns > 0 && map.rows > 0).copied().collect();
     let (first, others) = filled.split_first()?;

@@ -1,4 +1,4 @@
-//! What follows the light of the moment: the exposure of cameras and the lights of ordinary meshes.
+//! What follows the current light: the exposure of cameras and the lights of ordinary meshes.
 
 use bevy::{
     camera::Exposure,
@@ -24,13 +24,13 @@ use crate::{
 };
 
 /// A Bevy directional light that follows the sun or the moon, so that ordinary meshes are lit like the forest. A
-/// [`Sun`](super::Sun) has it.
+/// [`Sun`](super::Sun) requires it.
 #[derive(Component, Clone, Copy, Debug, Default, Reflect)]
 #[reflect(Component, Default)]
 #[require(DirectionalLight)]
 pub struct FollowsDaylight;
 
-/// Gives all Canopy cameras the exposure of the moment.
+/// Sets the current exposure on all Canopy cameras.
 pub(super) fn expose_cameras(
     mut commands: Commands,
     daylight: Option<Res<Daylight>>,
@@ -67,7 +67,7 @@ pub(super) fn light_meshes(
         let sky = light.sky_illuminance.max(Vec3::ZERO);
         let brightest = sky.max_element().max(1e-12);
         ambient.color = LinearRgba::rgb(sky.x / brightest, sky.y / brightest, sky.z / brightest).into();
-        // Bevy's ambient is a radiance from everywhere: the sky's mean over both hemispheres.
+        // Bevy's ambient light is a radiance from all directions: the mean of the sky over both hemispheres.
         ambient.brightness = luminance(sky) / std::f32::consts::PI * 0.5;
     }
 }

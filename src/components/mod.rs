@@ -1,16 +1,16 @@
-//! What a Bevy program spawns, beside the [renderer's own components](crate::render::components): scenes, terrain and forests, of
-//! assets or of values made in code; the sun, the origin.
+//! What a Bevy program spawns, besides the [renderer's own components](crate::render::components): scenes, terrains and
+//! forests from assets or from values in code; the sun; the origin.
 //!
 //! ```text
 //!  CanopyScene { file or value } ----------------------------> Ground, Forest, Sun as children, SceneReady
 //!  Terrain3d(Handle<TerrainMap>) ----------------------------> Ground (renderer) <--- canopy cover of its forests, summed
-//!  Forest3d { trees, species: Handle<PlantAsset>, ground } --> built beside the frames --> Forest (renderer), ForestReady
+//!  Forest3d { trees, species: Handle<PlantAsset>, ground } --> built in the background --> Forest (renderer), ForestReady
 //!  Sun ------------------------------------------------------> Daylight (renderer), exposure, DirectionalLight
 //! ```
 //!
-//! The components of this room say what a program wants; systems ([`CanopySystems`]) bring the renderer's own components to it:
-//! when an asset is loaded, when it changes, when a component changes, when either goes. Any number of scenes, terrains and
-//! forests may stand in one world.
+//! These components say what a program wants. Systems ([`CanopySystems`]) update the renderer's own components from
+//! them: when an asset is loaded or changes, when a component changes, when either is removed. A world can hold any
+//! number of scenes, terrains and forests.
 
 mod cover;
 mod daylight;
@@ -38,7 +38,7 @@ pub use sun::{DrawnSun, Sun, SunError, SunPlugin, SunRefresh};
 pub use terrain::{Terrain3d, TerrainFailed, TerrainReady, TerrainSettings};
 
 /// [`Terrain3d`] and [`Forest3d`]. Part of [`CanopyPlugins`](crate::CanopyPlugins); needs
-/// [`CanopyAssetPlugin`](crate::assets::CanopyAssetPlugin), without whose assets the systems rest.
+/// [`CanopyAssetPlugin`](crate::assets::CanopyAssetPlugin), without whose assets the systems do nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ForestPlugin;
 

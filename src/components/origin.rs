@@ -20,11 +20,11 @@ use glam::Vec3;
 use super::sets::CanopySystems;
 use crate::render::components::{CanopyOrigin, Forest, Ground};
 
-/// On a camera: keeps the Bevy world's origin near it, so that f32 transforms stay exact however far it travels.
+/// On a camera: keeps the Bevy world's origin near it, so that f32 transforms stay precise however far it travels.
 ///
-/// Where the camera is farther than `step` metres from the origin on any axis, [`CanopyOrigin`] moves by whole steps, and
-/// all entities without a parent move the other way, so that nothing moves in the scene. [`Forest`]s and [`Ground`]s stay:
-/// their transforms count from the scene's origin.
+/// When the camera is farther than `step` metres from the origin on any axis, [`CanopyOrigin`] moves by whole steps,
+/// and all entities without a parent move the other way, so that nothing moves in the scene. [`Forest`]s and
+/// [`Ground`]s stay: their transforms are relative to the scene's origin.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Default)]
 pub struct FloatingOrigin {
@@ -65,12 +65,12 @@ fn move_origin(
     }
 }
 
-/// The whole steps in `position`, each axis for itself; none where that is not a number.
+/// The whole steps in `position`, per axis; 0 if it is not a number.
 fn whole_steps(position: Vec3, step: f32) -> Vec3 {
     if !(step > 0.0 && step.is_finite()) {
         return Vec3::ZERO;
     }
-    // Towards zero: at the border between two steps the origin does not go to and fro.
+    // Round towards zero, so that the origin does not jump back and forth at the border between two steps.
     let steps = (position / step).trunc() * step;
     if steps.is_finite() { steps } else { Vec3::ZERO }
 }

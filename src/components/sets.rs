@@ -2,16 +2,17 @@
 
 use bevy::ecs::schedule::SystemSet;
 
-/// What happens in a frame of the main world.
+/// The steps of a frame in the main world.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum CanopySystems {
-    /// Scenes, terrains and forests that have become ready enter the world, in `First`.
+    /// Scenes, terrains and forests that are ready are added to the world, in `First`.
     Load,
     /// Clocks run, in `PreUpdate`.
     Clock,
     /// Terrains and forests follow their components and assets, in `PostUpdate`, after transforms are propagated.
     Forests,
-    /// Light, exposure and the lights that follow, in `PostUpdate`, before transforms are propagated.
+    /// Light, exposure and the directional lights that follow the sun, in `PostUpdate`, before transforms are
+    /// propagated.
     Light,
     /// The origin of the Bevy world follows the camera, in `PostUpdate`, before transforms are propagated.
     Origin,

@@ -1,4 +1,4 @@
-//! The sun: a place, an instant and the air as one entity, and the light that follows from them.
+//! The sun: location, instant and air as one entity, and the light that follows from them.
 
 use std::sync::Arc;
 
@@ -36,10 +36,10 @@ use crate::{
     scene::LocalTime,
 };
 
-/// Why a [`Sun`] cannot be.
+/// Why a [`Sun`] is not possible.
 #[derive(Debug, thiserror::Error)]
 pub enum SunError {
-    /// The place is not on earth.
+    /// The location is not on earth.
     #[error(transparent)]
     Place(#[from] LightError),
     /// The time cannot be read; the text says why, and how to write one.
@@ -47,17 +47,17 @@ pub enum SunError {
     Time(String),
 }
 
-/// When the light follows a [`Sun`] that has changed.
+/// When the light is computed again for a [`Sun`] that has changed.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Default)]
 pub enum SunRefresh {
-    /// In the same frame, which waits for it: some 25 ms, more where the air has changed. For images and tests.
+    /// In the same frame, which waits for it: about 25 ms, more if the air has changed. For images and tests.
     Immediate,
-    /// Beside the frames. While the clock runs, a new light is begun when the drawn one lags by so many of the clock's
-    /// seconds; when it stands still, the light catches up.
+    /// In the background. While the clock runs, a new light is started when the drawn one lags by this many seconds of
+    /// the clock. When the clock stops, the light catches up.
     Background {
-        /// Seconds, 0 or more. In the default of 5 the sun moves by 0.02 degrees, and the shadow of a tree of 20 m by some
-        /// 7 mm.
+        /// Seconds, 0 or more. Within the default of 5 the sun moves by 0.02 degrees, and the shadow of a 20 m tree by
+        /// about 7 mm.
         lag: f32,
     },
 }
@@ -68,29 +68,29 @@ impl Default for SunRefresh {
     }
 }
 
-/// The sun and, at night, the moon over a place on earth at an instant: the light of everything. One entity of a world has
-/// it; a second one is refused with a message.
+/// The sun and, at night, the moon over a location on earth at an instant: they light everything. Only one entity of a
+/// world may have it; a second one is rejected with a message.
 ///
-/// The light is computed beside the frames as often as [`SunRefresh`] says, however often the instant changes. Bevy's
-/// [`DirectionalLight`](bevy::light::DirectionalLight) on the same entity follows it, so that ordinary meshes are lit like
-/// the forest. A program that makes its light otherwise inserts a [`Daylight`] of its own and spawns no `Sun`.
+/// The light is computed in the background as often as [`SunRefresh`] says, however often the instant changes. Bevy's
+/// [`DirectionalLight`](bevy::light::DirectionalLight) on the same entity follows it, so that ordinary meshes are lit
+/// like the forest. A program that computes its own light inserts a [`Daylight`] and spawns no `Sun`.
 #[derive(Component, Clone, Debug, PartialEq, Reflect)]
 #[reflect(Component, Default)]
 #[require(SunRefresh, SunShadowSettings, FollowsDaylight)]
 pub struct Sun {
-    /// Place on earth.
+    /// Location on earth.
     pub observer: Observer,
     /// Universal Time.
     #[reflect(ignore)]
     pub instant: DateTime<Utc>,
-    /// Seconds that the clock runs on in a second of the app's virtual time; 0: it stands.
+    /// Seconds of the clock per second of the app's virtual time; 0: it is stopped.
     pub rate: f64,
-    /// Which moon the night has.
+    /// The moon of the night.
     pub moon: MoonSetting,
     /// Meteorological visibility at sea level in kilometres, 2 to 250. Lower is hazier.
     pub visibility_km: f64,
-    /// Stops by which pictures are brighter than the exposure curve has them, -10 to 10. A forest is darker than the
-    /// middle grey that the curve is made for; the default is 0.9.
+    /// Exposure compensation in stops, -10 to 10; positive is brighter. A forest is darker than the middle grey that
+    /// the exposure curve is made for; the default is 0.9.
     pub compensation_ev: f32,
 }
 
@@ -115,24 +115,24 @@ impl Default for Sun {
 }
 
 impl Sun {
-    /// The sun over a place (degrees, north and east positive) at a local time with its offset from UTC, such as
+    /// The sun over a location (degrees, north and east positive) at a local time with its offset from UTC, such as
     /// `"2026-06-21T15:30-04:00"`, or in UTC, `"2026-06-21T19:30Z"`.
     ///
     /// # Errors
-    /// [`SunError`] for a place or a time that is out of range or cannot be read.
+    /// [`SunError`] for a location or time that is out of range or cannot be read.
     pub fn at(latitude_deg: f64, longitude_deg: f64, time: &str) -> Result<Self, SunError> {
         let observer = Observer::new(latitude_deg, longitude_deg, 0.0)?;
         let instant = time.parse::<LocalTime>().map_err(|error| SunError::Time(error.to_string()))?.utc();
         Ok(Self { observer, instant, ..Self::default() })
     }
 
-    /// The same with a clock that runs `rate` seconds in a second.
+    /// The same with a clock that runs `rate` seconds per second.
     #[must_use]
     pub fn running(self, rate: f64) -> Self {
         Self { rate, ..self }
     }
 
-    /// Whether `other` has the same light but for its instant.
+    /// Whether `other` differs only in its instant.
     fn same_but_for_time(&self, other: &Self) -> bool {
         Self { instant: other.instant, rate: other.rate, ..self.clone() } == *other
     }
@@ -140,7 +140,7 @@ impl Sun {
     /// The light of these settings; `atmosphere` has their visibility.
     ///
     /// # Errors
-    /// [`LightError`] for an impossible place or instant.
+    /// [`LightError`] for an impossible location or instant.
     pub fn light(&self, atmosphere: &Atmosphere) -> Result<LightState, LightError> {
         let sun = SunPosition::at(self.instant, &self.observer)?;
         let moon = self.moon.moon(Some((self.instant, &self.observer)), &sun)?;
@@ -154,17 +154,17 @@ impl Sun {
     }
 }
 
-/// The sun whose light is drawn, which may lag behind the entity's ([`SunRefresh`]). Not there before the first light.
+/// The sun whose light is drawn, which may lag behind the entity's ([`SunRefresh`]). Missing before the first light.
 #[derive(Resource, Clone, Debug, PartialEq)]
 pub struct DrawnSun(pub Sun);
 
 /// Light that was computed: the air that it needed, and its state.
 type Computed = Result<(Arc<Atmosphere>, LightState), LightError>;
 
-/// What is known of the light, and what is under way.
+/// The computed light, and the computation in progress.
 #[derive(Resource, Default)]
 struct LightWork {
-    /// The air, which is laborious to compute, and its visibility in kilometres.
+    /// The atmosphere, which is expensive to compute, and its visibility in kilometres.
     air: Option<(f64, Arc<Atmosphere>)>,
     /// The sun whose light is drawn, or was found to be impossible.
     shown: Option<Sun>,
@@ -174,7 +174,7 @@ struct LightWork {
 }
 
 impl LightWork {
-    /// Whether the light of `sun` is wanted now.
+    /// Whether the light of `sun` must be computed now.
     fn is_due(&self, sun: &Sun, refresh: SunRefresh) -> bool {
         let Some(shown) = &self.shown else { return true };
         if !shown.same_but_for_time(sun) {
@@ -190,7 +190,7 @@ impl LightWork {
         }
     }
 
-    /// What computes the light of `sun`.
+    /// The computation of the light of `sun`.
     fn computation(&self, sun: &Sun) -> impl FnOnce() -> Computed + Send + 'static {
         let known = self.air.clone().filter(|(visibility, _)| *visibility == sun.visibility_km);
         let sun = sun.clone();
@@ -204,7 +204,7 @@ impl LightWork {
         }
     }
 
-    /// Takes in the light of `sun`; what cannot be computed is told once and not tried again.
+    /// Applies the light of `sun`. An error is logged once, and the computation is not tried again.
     fn accept(&mut self, sun: Sun, computed: Computed, commands: &mut Commands) {
         match computed {
             Ok((air, light)) => {
@@ -218,7 +218,7 @@ impl LightWork {
     }
 }
 
-/// A span of time; beyond what a clock can hold, the longest one.
+/// A duration, clamped to the longest possible one.
 fn seconds(seconds: f64) -> TimeDelta {
     let nanoseconds = seconds * 1e9;
     if nanoseconds.is_finite() && nanoseconds.abs() < 9e18 {
@@ -228,7 +228,7 @@ fn seconds(seconds: f64) -> TimeDelta {
     }
 }
 
-/// Keeps [`Daylight`], the cameras' exposure and the lights that follow in step with the [`Sun`].
+/// Updates [`Daylight`], the cameras' exposure and the lights that follow the [`Sun`].
 pub struct SunPlugin;
 
 impl Plugin for SunPlugin {
@@ -246,7 +246,7 @@ impl Plugin for SunPlugin {
     }
 }
 
-/// Moves the clocks that run.
+/// Advances the running clocks.
 fn run_clocks(time: Option<Res<Time>>, mut suns: Query<&mut Sun>) {
     let Some(time) = time else { return };
     for mut sun in &mut suns {
@@ -271,7 +271,7 @@ fn update_light(
     let sun = suns.iter().min_by_key(|(entity, ..)| *entity);
     if let Some((of, mut task)) = work.task.take() {
         match block_on(poll_once(&mut task)) {
-            // Light that was asked for by a sun that is gone comes too late.
+            // The light of a despawned sun comes too late.
             Some(computed) if sun.is_some() => work.accept(of, computed, &mut commands),
             Some(_) => {}
             None => work.task = Some((of, task)),
@@ -285,7 +285,7 @@ fn update_light(
     if work.is_due(sun, *refresh) {
         let pool = AsyncComputeTaskPool::try_get();
         match (refresh, pool) {
-            // The first light is waited for: without one nothing is drawn.
+            // Wait for the first light: without it nothing is drawn.
             (SunRefresh::Background { .. }, Some(pool)) if daylight.is_some() => {
                 if work.task.is_none() {
                     let compute = work.computation(sun);
@@ -317,15 +317,15 @@ mod tests {
         let mut work = shown(&start);
         assert!(!work.is_due(&start, refresh));
         let later = |seconds| Sun { instant: start.instant + TimeDelta::seconds(seconds), ..start.clone() };
-        // A clock that runs is followed when it lags by five seconds ...
+        // The light follows a running clock when it lags by five seconds ...
         assert!(!work.is_due(&later(4), refresh) && work.is_due(&later(5), refresh));
         assert!(work.is_due(&later(1), SunRefresh::Immediate));
-        // ... and as soon as it stands still.
+        // ... and as soon as the clock stops.
         work.last = Some(later(4));
         assert!(work.is_due(&later(4), refresh));
         // Anything else is followed at once.
         assert!(work.is_due(&Sun { visibility_km: 10.0, ..start.clone() }, refresh));
-        // The rate of the clock is nothing that could be seen.
+        // The rate of the clock has no visible effect.
         assert!(!work.is_due(&start.clone().running(60.0), refresh));
     }
 

@@ -26,8 +26,8 @@ use crate::{
     render::components::Ground,
 };
 
-/// Ground, as a [`TerrainMap`] has it. Once the map is loaded the entity gets the renderer's [`Ground`] and hears
-/// [`TerrainReady`]; another map, or one that was changed, takes the place of the one before when it is loaded.
+/// The ground of a [`TerrainMap`]. Once the map is loaded, the entity gets the renderer's [`Ground`], and
+/// [`TerrainReady`] is triggered on it. Another map, or a changed one, replaces the previous map when it is loaded.
 #[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
 #[reflect(Component, Default)]
 #[require(Transform, Visibility, TerrainSettings)]
@@ -37,9 +37,9 @@ pub struct Terrain3d(pub Handle<TerrainMap>);
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Default)]
 pub struct TerrainSettings {
-    /// Greatest distance in pixels between the drawn and the true surface, 0.25 to 32. Lower: more triangles.
+    /// Maximum distance in pixels between the drawn and the true surface, 0.25 to 32. Lower: more triangles.
     pub error_pixels: f64,
-    /// Metres to which the ground is drawn, over its mirrored surroundings too.
+    /// Distance in metres to which the ground is drawn, its mirrored surroundings included.
     pub view_distance: f64,
 }
 
@@ -49,14 +49,14 @@ impl Default for TerrainSettings {
     }
 }
 
-/// A [`Terrain3d`] is shown, or shown anew with another map. Its entity's observers hear it.
+/// A [`Terrain3d`] is shown, or shown again with another map. Triggered on its entity.
 #[derive(EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TerrainReady {
     /// The terrain.
     pub entity: Entity,
 }
 
-/// The map of a [`Terrain3d`] cannot be loaded; what is shown stays. Its entity's observers hear it, and the log has it.
+/// The map of a [`Terrain3d`] cannot be loaded; the previous one stays. Triggered on its entity, and logged.
 #[derive(EntityEvent, Clone, Debug, PartialEq, Eq)]
 pub struct TerrainFailed {
     /// The terrain.
@@ -65,7 +65,7 @@ pub struct TerrainFailed {
     pub error: String,
 }
 
-/// Gives each terrain its [`Ground`].
+/// Updates the [`Ground`] of each terrain.
 pub fn show_terrains(
     mut commands: Commands,
     terrains: Query<(Entity, Ref<Terrain3d>, Ref<TerrainSettings>, Option<&Ground>)>,

@@ -1,4 +1,4 @@
-//! What a Bevy program writes into its world to have a forest: a handful of components and resources.
+//! The components and resources that a Bevy program needs to draw a forest.
 
 use std::sync::Arc;
 
@@ -27,20 +27,20 @@ use crate::{
 
 pub use crate::bake::lighting::SunLight;
 
-/// From the camera's exposed radiance to what a screen shows: the tone curve for which Canopy's light is made.
+/// The tone curve for which Canopy's light is made: from the camera's exposed radiance to display values.
 pub const TONEMAPPING: Tonemapping = Tonemapping::BlenderFilmic;
 
-/// A camera that sees Canopy's sky, ground and forests. One camera at a time; a second one is refused with a message.
+/// A camera that draws Canopy's sky, ground and forests. One camera at a time; a second one is rejected with a message.
 ///
-/// Its exposure follows the light of the moment, its [`Tonemapping`] is [`TONEMAPPING`] unless the program gives another. It
-/// brings its [`Camera3d`] along; one that stands before it in a bundle brings Bevy's own default tone curve.
+/// Its exposure follows the current light. Its [`Tonemapping`] is [`TONEMAPPING`] unless the program inserts another.
+/// It requires a [`Camera3d`]; an explicit one in the same bundle brings Bevy's own default tone curve.
 #[derive(Component, Clone, Copy, Debug, Default, ExtractComponent, Reflect)]
 #[reflect(Component, Default)]
 #[require(Camera3d, Hdr, Exposure, Tonemapping = TONEMAPPING, ViewOptions)]
 #[component(on_add = set_tone_curve)]
 pub struct CanopyCamera;
 
-/// A `Camera3d` in the same bundle brings Bevy's default curve, which goes before what [`CanopyCamera`] requires.
+/// A `Camera3d` in the same bundle brings Bevy's default curve, which takes precedence over [`CanopyCamera`]'s.
 fn set_tone_curve(mut world: DeferredWorld, context: HookContext) {
     if let Some(mut curve) = world.get_mut::<Tonemapping>(context.entity)
         && *curve == Tonemapping::default()
@@ -51,15 +51,15 @@ fn set_tone_curve(mut world: DeferredWorld, context: HookContext) {
 
 /// The scene position, in f64 metres, of the Bevy world's origin.
 ///
-/// Bevy's transforms are f32. A program that roams far moves this origin along with the camera, so that what Bevy
-/// sees stays small ([`FloatingOrigin`](crate::components::FloatingOrigin) does it); Canopy's own positions are f64 up to
-/// the camera and never jitter.
+/// Bevy's transforms are f32. A program whose camera travels far moves this origin with the camera, so that Bevy's
+/// coordinates stay small ([`FloatingOrigin`](crate::components::FloatingOrigin) does it). Canopy's own positions are
+/// f64 up to the camera and never jitter.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Reflect)]
 #[reflect(Resource, Default)]
 pub struct CanopyOrigin(pub DVec3);
 
 impl CanopyOrigin {
-    /// Metres to which [`near`](Self::near) rounds: f32 has steps of 0.06 mm there.
+    /// Step in metres to which [`near`](Self::near) rounds: within it, f32 has steps of at most 0.06 mm.
     const STEP: f64 = 1024.0;
 
     /// An origin near `position` (scene metres).
@@ -75,16 +75,16 @@ impl CanopyOrigin {
 
 /// A forest: trees of one packed stand, each an instance of one of the baked plants.
 ///
-/// Its global translation, in the scene's frame (not moved by [`CanopyOrigin`]), is added to `origin`; it is drawn where its
-/// inherited visibility and its render layers let the camera see it. Rotation and scale have no effect.
+/// Its global translation, in the scene's frame (not moved by [`CanopyOrigin`]), is added to `origin`; it is drawn if
+/// its inherited visibility and its render layers let the camera see it. Rotation and scale have no effect.
 #[derive(Component, Clone, Debug)]
 #[require(Transform, Visibility)]
 pub struct Forest {
-    /// Where the trees stand.
+    /// The trees and their positions.
     pub stand: Arc<PackedStand>,
     /// The plants, indexed by the trees' variant; at most 1,024.
     pub plants: Arc<Vec<BakedPlant>>,
-    /// How the sun lights each plant; [`SunLight::LeafShader`] where the list ends.
+    /// How the sun lights each plant; [`SunLight::LeafShader`] beyond the end of the list.
     pub suns: Arc<[SunLight]>,
     /// Scene position in metres of the stand's own origin.
     pub origin: DVec3,
@@ -94,7 +94,7 @@ pub struct Forest {
     pub view_distance: f32,
 }
 
-/// The ground under everything. One at a time is drawn, the first that can be seen.
+/// The ground under everything. Only one is drawn at a time: the first visible one.
 ///
 /// As for a [`Forest`], its global translation, inherited visibility and render layers take effect.
 #[derive(Component, Clone, Debug)]
@@ -102,46 +102,48 @@ pub struct Forest {
 pub struct Ground {
     /// Heights; scene metres, origin at the terrain's centre.
     pub terrain: Arc<Terrain>,
-    /// Share of ground under crowns, where a forest stands on it.
+    /// Canopy cover, if a forest stands on it.
     pub cover: Option<Arc<CoverMap>>,
-    /// Greatest distance in pixels between the drawn and the true surface, 0.25 to 32. Lower: more triangles.
+    /// Maximum distance in pixels between the drawn and the true surface, 0.25 to 32. Lower: more triangles.
     pub error_pixels: f64,
-    /// Metres to which the ground is drawn, over its mirrored surroundings too.
+    /// Distance in metres to which the ground is drawn, its mirrored surroundings included.
     pub view_distance: f64,
 }
 
-/// The light of the moment. Set it whenever the sun moves; while it stays the same [`Arc`], nothing is computed anew.
+/// The current light. Replace it whenever the sun moves; while it stays the same [`Arc`], nothing is computed again.
 #[derive(Resource, Clone, Debug)]
 pub struct Daylight(pub Arc<LightState>);
 
-/// The shadow maps of the sun and the moon: beside a [`Sun`](crate::components::Sun), which has the defaults.
+/// Settings of the shadow maps of sun and moon, on the entity of the [`Sun`](crate::components::Sun), which requires
+/// it.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Default)]
 pub struct SunShadowSettings {
-    /// Texels along a side of each map, 256 to 8192. Twice the size halves the texel and quadruples the fill.
+    /// Texels along a side of each map, 256 to 8192. Twice the size halves the texel and quadruples the fill cost.
     pub map_size: u32,
     /// Number of cascades, 1 to 4; 0 switches the maps off (the terrain's own shadow stays).
     pub cascades: usize,
-    /// Metres around the camera that the finest cascade serves.
+    /// Radius in metres around the camera that the finest cascade covers.
     pub finest_radius: f64,
-    /// Metres around the camera that the widest cascade serves; beyond it the ground is darkened by its canopy cover.
+    /// Radius in metres around the camera that the widest cascade covers. Beyond it the canopy cover darkens the
+    /// ground.
     pub distance: f64,
-    /// Metres around the camera within which casters are the plants' shadow proxies instead of billboards.
+    /// Radius in metres around the camera within which plants cast as shadow proxies instead of billboards.
     pub proxy_distance: f64,
 }
 
 impl Default for SunShadowSettings {
-    /// As a scene with the default quality has them.
+    /// The settings of a scene with the default quality.
     fn default() -> Self {
         Self { map_size: 2048, cascades: 4, finest_radius: 30.0, distance: 800.0, proxy_distance: 80.0 }
     }
 }
 
-/// How a camera draws, for looking and for measuring.
+/// Debug options of a camera.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, ExtractComponent, Reflect)]
 #[reflect(Component, Default)]
 pub struct ViewOptions {
-    /// Tints trees by their level of detail, each level in a colour of its own.
+    /// Whether trees are tinted by their level of detail, each level in its own colour.
     pub tint_levels: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What the render world learns of the main world each frame: shared pointers and a few numbers, nothing copied.
+//! Extracts the main world's data for the render world each frame: shared pointers and a few numbers, no copies.
 
 use bevy::{
     asset::{AssetEvent, AssetId},
@@ -25,7 +25,7 @@ use glam::{DVec3, Quat, Vec3};
 
 use super::components::{CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, SunShadowSettings};
 
-/// The main world's side of a frame.
+/// The data of the main world for a frame.
 #[derive(Resource, Default)]
 pub struct ExtractedScene {
     /// Scene position of the Bevy world's origin, metres.
@@ -36,7 +36,7 @@ pub struct ExtractedScene {
     pub ground: Option<(Entity, Ground, DVec3)>,
     /// The light, if it has been set.
     pub daylight: Option<Daylight>,
-    /// Meshes that cast onto Canopy's passes, with their place in the Bevy world.
+    /// Meshes that cast onto Canopy's passes, with their transform in the Bevy world.
     pub casters: Vec<(AssetId<Mesh>, Affine3A)>,
     /// How often each mesh was changed.
     pub mesh_revisions: HashMap<AssetId<Mesh>, u64>,
@@ -46,7 +46,7 @@ pub struct ExtractedScene {
     pub shadow: SunShadowSettings,
 }
 
-/// What decides where an entity is drawn, and whether.
+/// The components that decide where an entity is drawn, and whether.
 type Placed = (&'static GlobalTransform, &'static InheritedVisibility, Option<&'static RenderLayers>);
 
 /// Fills [`ExtractedScene`].
@@ -63,7 +63,7 @@ pub fn extract_scene(
     lights: Extract<Query<&DirectionalLight>>,
 ) {
     scene.origin = origin.0;
-    // The camera that is drawn: the order is that of `prepare_view`.
+    // The camera that is drawn, in the same order as in `prepare_view`.
     let camera = cameras
         .iter()
         .filter(|(_, camera, _)| camera.is_active)
@@ -80,7 +80,7 @@ pub fn extract_scene(
     scene.forests.sort_by_key(|(entity, _)| *entity);
     let visible = || grounds.iter().filter(|(.., placed)| seen(placed));
     if visible().count() > 1 {
-        error_once!("{} grounds can be seen, but one is drawn: hide or despawn the others", visible().count());
+        error_once!("{} grounds are visible, but only one is drawn: hide or despawn the others", visible().count());
     }
     let ground = visible().min_by_key(|(entity, ..)| *entity);
     scene.ground = ground.map(|(entity, ground, placed)| (entity, ground.clone(), translation(placed.0)));
@@ -99,15 +99,15 @@ pub fn extract_scene(
     scene.shadow = shadow.map(|(_, settings)| *settings).unwrap_or_default();
 }
 
-/// Where a transform moves the origin of what has it; nowhere where that is not finite.
+/// The translation of a transform; zero if it is not finite.
 fn translation(transform: &GlobalTransform) -> DVec3 {
     let (scale, rotation, translation) = transform.to_scale_rotation_translation();
     if !translation.is_finite() {
-        warn_once!("the transform of a forest or a ground is not finite: it is drawn where it would be without");
+        warn_once!("the transform of a forest or a ground is not finite: it is ignored");
         return DVec3::ZERO;
     }
     if !scale.abs_diff_eq(Vec3::ONE, 1e-4) || rotation.angle_between(Quat::IDENTITY) > 1e-3 {
-        warn_once!("a forest or a ground is rotated or scaled, which has no effect: only its translation has");
+        warn_once!("a forest or a ground is rotated or scaled, which has no effect: only its translation counts");
     }
     translation.as_dvec3()
 }

@@ -17,14 +17,14 @@ use bytemuck::Pod;
 
 use crate::math::MipChain;
 
-/// The device, and what makes bind groups on it.
+/// The device, its queue and the pipeline cache: what an upload needs.
 #[derive(SystemParam)]
 pub struct Gpu<'w> {
     /// The device.
     pub device: Res<'w, RenderDevice>,
     /// Its queue.
     pub queue: Res<'w, RenderQueue>,
-    /// Where layouts and pipelines come from.
+    /// The cache of layouts and pipelines.
     pub pipelines: Res<'w, PipelineCache>,
 }
 
@@ -55,7 +55,7 @@ pub fn uniform_slots(device: &RenderDevice, label: &str, slots: u64) -> Buffer {
     })
 }
 
-/// A storage buffer that is made anew, larger, when a write does not fit.
+/// A storage buffer that is replaced by a larger one when a write does not fit.
 #[derive(Debug)]
 pub struct GrowingBuffer {
     label: &'static str,
@@ -77,12 +77,12 @@ impl GrowingBuffer {
         })
     }
 
-    /// The buffer to bind; another one after a [`write`](Self::write) that returned `true`.
+    /// The buffer to bind. It is a new one after a [`write`](Self::write) that returned `true`.
     pub fn buffer(&self) -> &Buffer {
         &self.buffer
     }
 
-    /// Makes room for `size` bytes; `true` where the buffer is a new one (and empty).
+    /// Reserves `size` bytes; `true` if the buffer is a new one (and empty).
     pub fn reserve(&mut self, device: &RenderDevice, size: u64) -> bool {
         let grow = size > self.buffer.size();
         if grow {
@@ -91,7 +91,7 @@ impl GrowingBuffer {
         grow
     }
 
-    /// Writes `data` from the start; `true` where the buffer had to be replaced.
+    /// Writes `data` from the start; `true` if the buffer had to be replaced.
     pub fn write<T: Pod>(&mut self, device: &RenderDevice, queue: &RenderQueue, data: &[T]) -> bool {
         let bytes: &[u8] = bytemuck::cast_slice(data);
         let grown = self.reserve(device, bytes.len() as u64);
@@ -102,7 +102,7 @@ impl GrowingBuffer {
     }
 }
 
-/// A table of `size` half-float texels that shaders sample and each new light fills.
+/// A texture of `size` half-float texels that shaders sample; it is filled again for each new light.
 pub fn table(device: &RenderDevice, label: &str, size: (u32, u32)) -> (Texture, TextureView) {
     let texture = device.create_texture(&TextureDescriptor {
         label: Some(label),
@@ -118,8 +118,8 @@ pub fn table(device: &RenderDevice, label: &str, size: (u32, u32)) -> (Texture, 
     (texture, view)
 }
 
-/// Smallest mip of an alpha-tested texture, texels along a side. In a single texel the alpha test is all or nothing: leaves
-/// that cover less than half of their picture would vanish with the distance.
+/// Smallest mip of an alpha-tested texture, texels along a side. In a single texel the alpha test is all or nothing:
+/// leaves that cover less than half of their texture would vanish in the distance.
 pub const SMALLEST_TESTED_MIP: u32 = 8;
 
 /// Number of levels of `chain` down to `smallest` texels along the shorter side (at least one).
@@ -129,7 +129,8 @@ pub fn levels_down_to(chain: &MipChain, smallest: u32) -> usize {
     wanted.min(chain.levels.len().max(1))
 }
 
-/// A texture array of RGBA8 layers with their mip chains down to `smallest` texels; all chains have the size of the first.
+/// A texture array of RGBA8 layers with their mip chains down to `smallest` texels; all chains have the size of the
+/// first.
 pub fn texture_array(
     device: &RenderDevice,
     queue: &RenderQueue,
@@ -159,7 +160,7 @@ pub fn texture_array(
     (texture, view)
 }
 
-/// Writes all levels that an RGBA8 `texture` has of `chain` into one of its layers; those of another size are left out.
+/// Writes all levels that an RGBA8 `texture` has of `chain` into one of its layers; levels of another size are skipped.
 pub fn write_layer(queue: &RenderQueue, texture: &Texture, layer: u32, chain: &MipChain) {
     let (width, height) = (texture.width(), texture.height());
     for (level, texels) in (0..texture.mip_level_count()).zip(&chain.levels) {

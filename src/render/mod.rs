@@ -1,6 +1,6 @@
-//! One folder a GPU pass, each a plugin; what they share stands beside them.
+//! The GPU passes: one folder and one plugin per pass. Shared code is next to the folders.
 //!
-//! The way of a frame:
+//! The steps of a frame:
 //!
 //! ```text
 //! extract ── view (camera in f64) ── cull (lists of trees) ── bindings (group 0)
@@ -10,11 +10,11 @@
 //!              ├─ (Bevy's own opaque meshes)
 //!              ├─ forest       full models, crosses                  MainPass, after main_opaque_pass_3d
 //!              ├─ terrain      tiles                                 after forest
-//!              └─ sky          what is left                          before main_transparent_pass_3d
+//!              └─ sky          the rest of the image                 before main_transparent_pass_3d
 //! ```
 //!
-//! The order is that of the public system [`sets`]. What one pass has for the others it writes into
-//! [`bindings::SharedTextures`]; no pass names another one's systems.
+//! The public system [`sets`] define the order. A pass that produces something for other passes writes it into
+//! [`bindings::SharedTextures`]. No pass refers to the systems of another.
 
 pub mod bindings;
 pub mod components;
@@ -43,7 +43,8 @@ use bevy::{
     render::{ExtractSchedule, Render, RenderApp, RenderSystems},
 };
 
-/// All passes. May stand before or after Bevy's own plugins; where one of them is missing, it says so and draws nothing.
+/// All passes. May be added before or after Bevy's own plugins. If one of those is missing, it logs an error and draws
+/// nothing.
 pub struct CanopyRenderPlugin;
 
 impl Plugin for CanopyRenderPlugin {
@@ -51,7 +52,7 @@ impl Plugin for CanopyRenderPlugin {
         app.init_resource::<report::FrameReport>();
     }
 
-    // Here all other plugins are built, in whatever order they were added.
+    // All other plugins are built by now, in whatever order they were added.
     fn finish(&self, app: &mut App) {
         app.add_plugins(components::ComponentsPlugin);
         let has_pipeline = app.is_plugin_added::<CorePipelinePlugin>();

@@ -1,4 +1,4 @@
-//! The pixels of a finished picture, brought back from the device.
+//! Reads the pixels of a finished frame back from the device.
 
 use std::sync::{Arc, Mutex};
 
@@ -10,25 +10,25 @@ use bevy::render::{
     renderer::{RenderDevice, RenderQueue},
 };
 
-/// Why a picture could not be read back.
+/// Why an image could not be read back.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadbackError {
-    /// The device could not be waited for.
-    #[error("the picture could not be read back: {0}")]
+    /// Waiting for the device failed.
+    #[error("the image could not be read back: {0}")]
     Wait(#[from] wgpu::PollError),
     /// The device refused to map the buffer.
-    #[error("the picture could not be read back: {0}")]
+    #[error("the image could not be read back: {0}")]
     Map(#[from] BufferAsyncError),
     /// The device finished without an answer.
-    #[error("the picture could not be read back: the device did not answer")]
+    #[error("the image could not be read back: the device did not answer")]
     NoAnswer,
 }
 
-/// The first layer of `texture`, whose format has four bytes a pixel, without its fourth channel: three bytes a pixel,
-/// row by row from the top. Waits until the device has finished everything that was submitted.
+/// The first layer of `texture`, whose format has four bytes per pixel, without its fourth channel: three bytes per
+/// pixel, row by row from the top. Waits until the device has finished everything that was submitted.
 ///
 /// # Errors
-/// [`ReadbackError`], where the device is lost or out of memory.
+/// [`ReadbackError`] if the device is lost or out of memory.
 pub fn read_rgb(device: &RenderDevice, queue: &RenderQueue, texture: &Texture) -> Result<Vec<u8>, ReadbackError> {
     let (width, height) = (texture.width(), texture.height());
     let row = RenderDevice::align_copy_bytes_per_row(4 * width as usize);
@@ -49,10 +49,10 @@ pub fn read_rgb(device: &RenderDevice, queue: &RenderQueue, texture: &Texture) -
     );
     queue.submit([encoder.finish()]);
     let outcome = Arc::new(Mutex::new(None));
-    let told = outcome.clone();
+    let shared = outcome.clone();
     let slice = buffer.slice(..);
     slice.map_async(MapMode::Read, move |result| {
-        if let Ok(mut slot) = told.lock() {
+        if let Ok(mut slot) = shared.lock() {
             *slot = Some(result);
         }
     });

@@ -1,4 +1,4 @@
-//! What the last frame ran and what it skipped, and why: for the overlay and for `--explain`.
+//! Which passes the last frame ran or skipped, and why: for the overlay and for `--explain`.
 
 use std::{
     collections::BTreeMap,
@@ -7,7 +7,7 @@ use std::{
 
 use bevy::ecs::{resource::Resource, system::Res};
 
-/// What became of a pass in the last frame.
+/// The outcome of a pass in the last frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PassOutcome {
     /// It ran; the text says on what.
@@ -18,7 +18,7 @@ pub enum PassOutcome {
 
 type Outcomes = BTreeMap<String, PassOutcome>;
 
-/// The frame being made, and the last whole one.
+/// The current frame, and the last complete one.
 #[derive(Debug, Default)]
 struct Pages {
     open: Outcomes,
@@ -40,12 +40,12 @@ impl FrameReport {
         self.pages().open.insert(pass.into(), PassOutcome::Skipped(why.into()));
     }
 
-    /// All outcomes of the last whole frame, by the passes' names.
+    /// All outcomes of the last complete frame, by pass name.
     pub fn outcomes(&self) -> Vec<(String, PassOutcome)> {
         self.pages().last.iter().map(|(pass, outcome)| (pass.clone(), outcome.clone())).collect()
     }
 
-    /// Ends a frame: what was recorded becomes what [`outcomes`](Self::outcomes) gives.
+    /// Ends a frame: [`outcomes`](Self::outcomes) returns what was recorded.
     fn turn(&self) {
         let mut pages = self.pages();
         pages.last = std::mem::take(&mut pages.open);
@@ -56,7 +56,7 @@ impl FrameReport {
     }
 }
 
-/// Ends the frame's page.
+/// Ends the report of the frame.
 pub fn finish_report(report: Res<FrameReport>) {
     report.turn();
 }

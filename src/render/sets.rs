@@ -1,5 +1,5 @@
 //! The order of Canopy's work in the render world, as public system sets. A program orders its own systems against
-//! these; the passes name no system of each other.
+//! these sets. The passes do not refer to each other's systems.
 
 use bevy::{
     app::SubApp,
@@ -16,11 +16,11 @@ use bevy::{
 pub enum CanopyRenderSystems {
     /// The view is found: its camera in f64, its frustum, its exposure.
     View,
-    /// Plants, trees and textures that are new or have changed go to the device.
+    /// New or changed plants, trees and textures are uploaded.
     Upload,
     /// Trees, casters and terrain tiles are chosen.
     Cull,
-    /// Tables of light follow the sun and the exposure.
+    /// Tables of light are updated for the sun and the exposure.
     Light,
     /// Pipelines are requested.
     Pipelines,
@@ -35,7 +35,7 @@ pub enum CanopyPasses {
     Forest,
     /// The ground.
     Terrain,
-    /// What is left of the picture, before Bevy's transparent meshes.
+    /// The sky, where nothing else was drawn, before Bevy's transparent meshes.
     Sky,
 }
 

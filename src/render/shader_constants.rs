@@ -1,7 +1,7 @@
 //! Constants that Rust and the shaders share: the WGSL module `canopy::constants`, written from the Rust constants.
 //!
-//! A number stands once, in the room that it belongs to. Shaders import it by its name here; the test that validates every
-//! shader composes them with the same text.
+//! Each number is defined once, in the module that it belongs to. Shaders import it by its name here. The test that
+//! validates every shader composes them with the same text.
 
 use std::fmt::Write as _;
 
@@ -40,7 +40,7 @@ impl From<u32> for Value {
     }
 }
 
-/// All shared constants: name in WGSL, what it is, value.
+/// All shared constants: name in WGSL, description, value.
 pub fn constants() -> Vec<(&'static str, &'static str, Value)> {
     let uint = |value: usize| Value::Uint(value as u32);
     let float = |value: usize| Value::Float(value as f32);
@@ -81,7 +81,7 @@ pub fn constants() -> Vec<(&'static str, &'static str, Value)> {
         ("CASTER_VERTICES", "Vertices of a tree's cross as a caster.", forest::CROSS_CASTER_VERTICES.into()),
         ("SPREAD_LEVELS", "Mips for which the isotropic fraction is known.", uint(cross::SPREAD_LEVELS)),
         ("SPREAD_VECTORS", "Vectors of four of them.", uint(cross::SPREAD_LEVELS / 4)),
-        ("LIGHT_SCALE", "What 1 stands for in lighting textures.", cross::LIGHT_SCALE.into()),
+        ("LIGHT_SCALE", "Scale of lighting textures: the value of 1.", cross::LIGHT_SCALE.into()),
         ("NORMAL_STEPS", "Steps of a packed normal on either side of 0.", packing::STEPS.into()),
         ("NORMAL_LEAST_LENGTH", "Its length where the ambient visibility is 0.", packing::LEAST_LENGTH.into()),
         ("TRANSFER_WORDS", "Words of four coefficients after the first, of all bands.", uint(forest::WORDS)),
@@ -116,7 +116,7 @@ mod tests {
     #[test]
     fn shaders_read_the_values_to_the_bit() {
         let module = naga::front::wgsl::parse_str(&source().replace("#define_import_path", "//")).expect("valid WGSL");
-        assert_eq!(module.constants.len(), constants().len(), "a name stands twice");
+        assert_eq!(module.constants.len(), constants().len(), "a name is defined twice");
         for (name, _, value) in constants() {
             let found = module.constants.iter().find(|(_, constant)| constant.name.as_deref() == Some(name));
             let (_, constant) = found.unwrap_or_else(|| panic!("{name} is missing"));

@@ -1,11 +1,11 @@
 //! The WGSL files: embedded in the library, loaded as Bevy assets.
 //!
-//! The files are those of the package's folder `shaders/`; [`ShaderFile`] is their one table, for the plugin and for the test
-//! that validates every shader without a GPU. Each is the embedded asset `embedded://canopy/PATH`. With Bevy's feature
-//! `embedded_watcher` a file that is saved takes effect in the running program: `cargo run --features bevy/embedded_watcher`.
+//! The files are in the package's folder `shaders/`. [`ShaderFile`] lists them for the plugin and for the test that
+//! validates every shader without a GPU. Each is the embedded asset `embedded://canopy/PATH`. With Bevy's feature
+//! `embedded_watcher` a saved file takes effect in the running program: `cargo run --features bevy/embedded_watcher`.
 //!
-//! Assets are loaded beside the frames, in a few of them. Until then the passes draw nothing, as Bevy's own do; who keeps
-//! every frame waits until [`CanopyShaders::loaded`], as `app/headless.rs` does.
+//! Assets are loaded in the background within a few frames. Until then the passes draw nothing, like Bevy's own. A
+//! program that keeps every frame waits for [`CanopyShaders::loaded`], as `app/headless.rs` does.
 
 use std::{
     borrow::Cow,
@@ -35,7 +35,7 @@ macro_rules! shader_files {
         }
 
         impl ShaderFile {
-            /// All of them; libraries stand before those that import them.
+            /// All files; libraries come before the files that import them.
             pub const ALL: [Self; [$($path),+].len()] = [$(Self::$name),+];
 
             /// Path below `shaders/`.
@@ -75,7 +75,7 @@ shader_files! {
     Terrain = "terrain/terrain.wgsl",
 }
 
-/// Path of the module that [`shader_constants`] writes, beside those of [`ShaderFile`].
+/// Path of the module that [`shader_constants`] writes, next to those of [`ShaderFile`].
 const CONSTANTS: &str = "common/constants.wgsl";
 
 /// Every WGSL module as `(path, text)`: the shared constants, then [`ShaderFile::ALL`].
@@ -93,7 +93,7 @@ pub struct CanopyShaders {
 }
 
 impl CanopyShaders {
-    /// Embeds all files and begins to load them.
+    /// Embeds all files and starts to load them.
     pub fn load(registry: &EmbeddedAssetRegistry, server: &AssetServer) -> Self {
         let base = FileAssetReader::get_base_path();
         let load = |path: &str| server.load(format!("embedded://canopy/{path}"));
@@ -128,8 +128,8 @@ impl CanopyShaders {
     }
 }
 
-/// The file of the shader at `path` as Bevy's watcher names it: from the folder `base` that it watches, if the package is in
-/// there.
+/// The file of the shader at `path` as Bevy's watcher names it: from the folder `base` that it watches, if the package
+/// is in there.
 fn watched_path(base: &Path, path: &str) -> PathBuf {
     let full = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders").join(path);
     full.strip_prefix(base).map(Path::to_owned).unwrap_or(full)

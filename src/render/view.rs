@@ -1,7 +1,8 @@
 //! The view of a frame: its camera in f64, its frustum and its exposure.
 //!
 //! Positions on the GPU are relative to the camera: the view matrix here has no translation, and every pass subtracts
-//! the camera's f64 position on the CPU. A scene a million metres from the origin draws as steadily as one at it.
+//! the camera's f64 position on the CPU. A scene a million metres from the origin is drawn as precisely as one at the
+//! origin.
 
 use bevy::{
     app::{App, Plugin},
@@ -40,12 +41,13 @@ use crate::cull::Frustum;
 pub struct ViewFormat {
     /// Format of a texel.
     pub color: TextureFormat,
-    /// Samples a pixel, 1 or 4.
+    /// Samples per pixel, 1 or 4.
     pub samples: u32,
 }
 
 impl ViewFormat {
-    /// A pipeline that draws into the attachment with the entry points `vertex` and `fragment` of `shader`, under `defs`.
+    /// A pipeline that draws into the attachment with the entry points `vertex` and `fragment` of `shader`, under
+    /// `defs`.
     pub fn pipeline(
         self,
         shader: &Handle<Shader>,
@@ -82,17 +84,17 @@ pub struct PreparedView {
     pub clip_from_relative: Mat4,
     /// Planes for culling, camera-relative.
     pub frustum: Frustum,
-    /// What its pipelines draw into.
+    /// The attachment that its pipelines draw into.
     pub attachment: ViewFormat,
     /// Focal length in pixels (vertical).
     pub focal_pixels: f32,
     /// Factor from radiance to the attachment's values.
     pub exposure: f32,
-    /// How the camera draws.
+    /// Options of the camera.
     pub options: ViewOptions,
 }
 
-/// The one view that Canopy draws, if a camera asks for it.
+/// The one view that Canopy draws, if there is one.
 #[derive(Resource, Default)]
 pub struct PreparedFrame {
     /// `None` while no camera has a [`CanopyCamera`].
@@ -109,7 +111,7 @@ impl Plugin for ViewPlugin {
     }
 }
 
-/// Finds the camera, refuses what cannot be drawn right, and fixes the camera's f64 place.
+/// Finds the camera, rejects what cannot be drawn correctly, and computes the camera's f64 position.
 fn prepare_view(
     scene: Res<ExtractedScene>,
     cameras: Query<

@@ -9,7 +9,7 @@ use super::check::Check;
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Camera {
-    /// Where it stands at first. Default: 20 m above the terrain's centre, looking north.
+    /// The start. Default: 20 m above the terrain's centre, looking north.
     pub start: Pose,
     /// The scripted flight, at least two keys in the order of time, or none. Default: none.
     pub path: Vec<PathKey>,
@@ -23,12 +23,12 @@ impl Default for Camera {
     }
 }
 
-/// A place and a direction, as users state them.
+/// A position and a direction, as users write them.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Pose {
     /// `(x, y, z)` in metres: x east and z **south** of the terrain's centre (north is negative), each -10000000 to
-    /// 10000000; y above the **ground** at that place, 0 to 100000. Default (0, 20, 0).
+    /// 10000000; y above the **ground** at that position, 0 to 100000. Default (0, 20, 0).
     pub position: (f64, f64, f64),
     /// Compass bearing of the view in degrees, clockwise from north: 0 north, 90 east. -36000 to 36000. Default 0.
     pub yaw: f64,
@@ -50,14 +50,14 @@ pub struct PathKey {
     pub seconds: f64,
     /// As [`Pose::position`]: y is the height above the ground. Required.
     pub position: (f64, f64, f64),
-    /// As [`Pose::yaw`]. The camera turns the shorter way from key to key. Required.
+    /// As [`Pose::yaw`]. The camera rotates the shorter way from key to key. Required.
     pub yaw: f64,
     /// As [`Pose::pitch`]. Required.
     pub pitch: f64,
 }
 
 impl PathKey {
-    /// Place and direction of the key.
+    /// Position and direction of the key.
     pub fn pose(&self) -> Pose {
         Pose { position: self.position, yaw: self.yaw, pitch: self.pitch }
     }
@@ -95,7 +95,7 @@ impl Pose {
         let (x, y, z) = self.position;
         Viewpoint {
             position: DVec3::new(x, ground + y, z),
-            // A compass turns clockwise, a right-handed rotation about +Y counter-clockwise.
+            // Compass bearings grow clockwise; a right-handed rotation about +Y is counter-clockwise.
             yaw: (-self.yaw).rem_euclid(360.0).to_radians(),
             pitch: self.pitch.to_radians(),
             field_of_view: field_of_view.to_radians(),

@@ -1,4 +1,4 @@
-//! What can be wrong with a scene file, said with file, line, column and remedy.
+//! Errors of scene files, with file, line, column and remedy.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -15,7 +15,7 @@ pub enum SceneError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the operating system said.
+        /// The operating system's reason.
         source: std::io::Error,
     },
     /// The file is larger than any scene file.
@@ -31,7 +31,7 @@ pub enum SceneError {
         /// The largest size read, in bytes.
         limit: u64,
     },
-    /// The text is no RON, or holds a field, a variant or a type that scenes do not know.
+    /// The text is not RON, or has a field, a variant or a type that scenes do not have.
     #[error("{}:{position}: {message}; {remedy}", path.display())]
     Syntax {
         /// The file.
@@ -56,8 +56,8 @@ pub enum SceneError {
 /// One value of a scene that is out of range.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
-    /// Where the value is in the file (or, for one that is missing, the structure that lacks it). `None` for a scene that
-    /// was built in code.
+    /// Where the value is in the file (or, for one that is missing, the structure that lacks it). `None` for a scene
+    /// that was built in code.
     pub position: Option<Position>,
     /// The path of the field, such as `species[1].height`.
     pub field: String,
@@ -77,7 +77,7 @@ impl fmt::Display for Problem {
 }
 
 fn problem_lines(scene: &str, problems: &[Problem]) -> String {
-    // `file:line:column: ` is what editors and terminals take for a link.
+    // Editors and terminals recognise `file:line:column: ` as a link.
     let colon = |problem: &Problem| if problem.position.is_some() { ":" } else { ": " };
     let lines: Vec<String> = problems.iter().map(|problem| format!("{scene}{}{problem}", colon(problem))).collect();
     lines.join("\n")
@@ -127,7 +127,7 @@ pub(super) fn from_ron(error: SpannedError, text: &str, path: PathBuf) -> SceneE
             "write a smaller, non-negative integer".to_owned(),
         ),
         code => match outline.as_ref().and_then(|outline| outline.leaf_around(start)) {
-            // RON reads the 5 of `5.5` and then misses a comma.
+            // RON reads the 5 of `5.5` and then expects a comma.
             Some((position, written)) if matches!(code, RonError::ExpectedComma) => (
                 position,
                 format!("expected a whole number but found {written}"),
@@ -138,7 +138,7 @@ pub(super) fn from_ron(error: SpannedError, text: &str, path: PathBuf) -> SceneE
     };
     let remedy = match &outline {
         Some(outline) if outline.is_within("Some", start) => {
-            "leave `Some` out: optional values are written as they are".to_owned()
+            "remove `Some`: optional values are written without it".to_owned()
         }
         _ => remedy,
     };
@@ -168,8 +168,8 @@ fn remedy_for_syntax(code: &RonError) -> &'static str {
         RonError::ExpectedComma
         | RonError::ExpectedArrayEnd
         | RonError::ExpectedStructLikeEnd
-        | RonError::ExpectedMapEnd => "look for a missing comma or bracket just before this place",
-        RonError::ExpectedString => "texts stand between double quotes",
+        | RonError::ExpectedMapEnd => "look for a missing comma or bracket just before this position",
+        RonError::ExpectedString => "texts are written in double quotes",
         RonError::ExpectedArray => "lists are written `[first, second]`",
         RonError::ExpectedInteger => "write a whole number that is not negative",
         RonError::ExpectedFloat => "write a number such as 12 or 0.5",
@@ -188,7 +188,7 @@ fn suggestion(found: &str, known: &[&str], kind: &str) -> String {
 }
 
 /// The name of `known` that `found` most likely means: the least edit distance (Damerau 1964, adjacent swaps count
-/// once), at most a third of the longer name's length but always allowing one slip; letter case counts nothing.
+/// once), at most a third of the longer name's length but always allowing one slip; letter case is ignored.
 pub(super) fn nearest<'a>(found: &str, known: &[&'a str]) -> Option<&'a str> {
     let found: Vec<char> = found.to_lowercase().chars().collect();
     known

@@ -1,4 +1,4 @@
-//! The ground of a scene: a terrain file, a picture of heights, fractal noise or a plane.
+//! The ground of a scene: a terrain file, a height image, fractal noise or a plane.
 
 use std::path::{Path, PathBuf};
 
@@ -30,11 +30,11 @@ pub struct GroundFile {
     /// geographic files, metres (or feet) for projected ones. Default: all of it.
     #[serde(default)]
     pub crop: Option<Crop>,
-    /// What the file's coordinates are, instead of what the file says or, as ESRI ASCII grids, does not say.
-    /// Default: what the file says.
+    /// The coordinate system of the file, which overrides the one in the file; ESRI ASCII grids have none.
+    /// Default: the file's own.
     #[serde(default)]
     pub coordinates: Option<CoordinateSystem>,
-    /// How the land goes on beyond the file. Default `Mirror`.
+    /// How the terrain continues beyond the file. Default `Mirror`.
     #[serde(default)]
     pub surroundings: Surroundings,
     /// Factor on the heights, 0.01 to 100. Default 1: as measured.
@@ -42,7 +42,7 @@ pub struct GroundFile {
     pub exaggeration: f64,
 }
 
-/// A greyscale picture of heights; the top of the picture is north. It has no place on earth: `place` must state one.
+/// A greyscale height image; its top is north. It has no location on earth: `place` must state one.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GroundImage {
@@ -57,7 +57,7 @@ pub struct GroundImage {
     pub high: f64,
 }
 
-/// Ground made of fractal noise. It has no place on earth: `place` must state one.
+/// Ground made of fractal noise. It has no location on earth: `place` must state one.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct GroundNoise {
@@ -126,7 +126,7 @@ impl GroundFile {
 }
 
 impl GroundImage {
-    /// The greyscale picture `path` with `spacing` metres between pixels; black is at 0 m, white at `high` metres.
+    /// The greyscale image `path` with `spacing` metres between pixels; black is at 0 m, white at `high` metres.
     pub fn new(path: impl Into<PathBuf>, spacing: f64, high: f64) -> Self {
         Self { path: path.into(), spacing, low: 0.0, high }
     }

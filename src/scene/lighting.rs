@@ -9,28 +9,28 @@ use crate::bake::lighting::{
     transfer::{Channels, Interior, TransferSettings},
 };
 
-/// The light of a species' foliage. Each choice has its own fields, all of which may be left out: `Transfer()`.
+/// The lighting of a species' foliage. Each choice has its own fields, all of them optional: `Transfer()`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub enum Lighting {
-    /// Each leaf by its own normal, the sky unhindered: nothing is baked. To compare with.
+    /// Each leaf by its own normal, without occlusion of the sky: nothing is baked. For comparison.
     Local,
-    /// By the implicit surface of the crown [Luft 2007]: light follows the crown's shape, its inside is dark.
+    /// By the implicit surface of the crown [Luft 2007]: shading follows the crown's shape, and its inside is dark.
     Expressive(ImplicitSettings),
-    /// The sky by radiance transfer, the sun by shadow maps [Franzke 2005]: nearest to the truth.
+    /// The sky by radiance transfer, the sun by shadow maps [Franzke 2005]: closest to the ground truth.
     Transfer(Transfer),
 }
 
-/// Radiance transfer, in a user's words: [`TransferSettings`] tells more apart than a scene needs to.
+/// Radiance transfer, in a user's terms: [`TransferSettings`] has more options than a scene needs.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Transfer {
-    /// Bands of spherical harmonics, 2 to 6. More: truer, and memory grows with the square. Default 4.
+    /// Bands of spherical harmonics, 2 to 6. More: more accurate, and memory grows with the square. Default 4.
     pub bands: u32,
-    /// Whether light takes on colour on its way through the crown; three times the memory. Default false.
+    /// Whether light takes on the colour of the leaves inside the crown; three times the memory. Default false.
     pub color: bool,
-    /// Rays of a vertex, 16 to 16384. More: a slower bake with less noise. Default 1024.
+    /// Rays per vertex, 16 to 16384. More: a slower bake with less noise. Default 1024.
     pub rays: u32,
-    /// How often light is followed from leaf to leaf, 0 to 8; 0: straight through leaves only. Default 3.
+    /// Number of bounces between leaves, 0 to 8; 0: only light that passes straight through leaves. Default 3.
     pub bounces: u32,
     /// How the sun lights full models, `LeafShader` or `Harmonics`; costs no bake of its own. Default `LeafShader`.
     pub sun: SunLight,
@@ -43,7 +43,7 @@ impl Default for Transfer {
 }
 
 impl Transfer {
-    /// What the light asks of the bake.
+    /// The bake settings of the lighting.
     pub fn settings(&self) -> TransferSettings {
         let byte = |value: u32| value.min(u8::MAX.into()) as u8;
         TransferSettings {
@@ -65,11 +65,11 @@ pub(crate) fn word(choice: &impl Serialize) -> String {
 }
 
 impl Lighting {
-    /// What the light asks of the bake of a single plant.
+    /// The bake settings of the lighting, for a single plant.
     pub fn settings(&self) -> LightingSettings {
         match self {
             Self::Local => LightingSettings::Local,
-            // Plants that are lit together are baked one by one first, as any others.
+            // Plants that are lit together are first baked one by one, like all others.
             Self::Expressive(settings) => {
                 LightingSettings::Expressive(ImplicitSettings { together: false, ..*settings })
             }
@@ -85,8 +85,9 @@ impl Lighting {
         }
     }
 
-    /// The light as a scene file writes it behind `lighting:`, as in `Expressive(radius: 0.8, normals: Smooth)`. What is as
-    /// it is when left out is left out. A scene that has it gets the same light, to the last bit.
+    /// The lighting in the syntax of a scene file after `lighting:`, such as `Expressive(radius: 0.8, normals:
+    /// Smooth)`. Fields with their default values are left out. A scene with this text gets the same lighting, bit for
+    /// bit.
     pub fn to_ron(&self) -> String {
         let mut fields = Vec::new();
         let name = match self {

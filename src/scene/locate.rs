@@ -1,15 +1,16 @@
-//! Where in a RON text a field's value stands.
+//! Finds the position of a field's value in a RON text.
 //!
 //! `serde` hands over values without their positions, so a value that parses but is impossible (a latitude of 100
-//! degrees) could only be reported by name. [`Outline`] is a second, independent look at the same text: it knows
-//! RON's brackets, names, texts and comments, nothing about scenes, and answers "where is `species[1].height[0]`?".
+//! degrees) could only be reported by name. [`Outline`] is a second, independent parse of the same text: it
+//! handles RON's brackets, names, strings and comments, is independent of scenes, and answers "where is
+//! `species[1].height[0]`?".
 
 use std::fmt;
 
 /// Nesting deeper than any scene; a text beyond it gets no outline rather than a full stack.
 const MAX_DEPTH: usize = 128;
 
-/// A place in a text. Lines and columns count from 1, columns in characters.
+/// A position in a text. Lines and columns count from 1, columns in characters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Position {
     /// Line, from 1.
@@ -31,7 +32,7 @@ impl Position {
         })
     }
 
-    /// This position, moved over blanks to what follows them.
+    /// This position, moved past blanks.
     pub(super) fn past_blanks(self, text: &str) -> Self {
         let offset = self.offset_in(text);
         let rest = text.get(offset..).unwrap_or("");
@@ -56,7 +57,7 @@ impl fmt::Display for Position {
 #[derive(Debug)]
 struct Node {
     start: usize,
-    /// Behind its last character.
+    /// After its last character.
     end: usize,
     /// The name before a bracket, or a bare name: `Scattered`, `Some`, `true`.
     tag: Option<String>,
@@ -76,7 +77,7 @@ pub struct Outline<'a> {
 }
 
 impl<'a> Outline<'a> {
-    /// Reads `text`; `None` where its brackets or quotes do not match.
+    /// Reads `text`; `None` if its brackets or quotes do not match.
     pub fn of(text: &'a str) -> Option<Self> {
         let mut scanner = Scanner { text, at: 0 };
         scanner.skip_blank()?;
@@ -140,7 +141,7 @@ impl<'a> Outline<'a> {
         self.around(at).iter().any(|node| node.group && node.tag.as_deref() == Some(tag))
     }
 
-    /// The values that contain `at` behind their first character, from the outermost to the innermost.
+    /// The values that contain `at` after their first character, from the outermost to the innermost.
     fn around(&self, at: Position) -> Vec<&Node> {
         let at = at.offset_in(self.text);
         let contains = |node: &&Node| node.start < at && at < node.end;
@@ -318,7 +319,7 @@ impl Scanner<'_> {
         Some(())
     }
 
-    /// Skips `r"..."`, `r#"..."#` and their byte forms; false where none starts here.
+    /// Skips `r"..."`, `r#"..."#` and their byte forms; false if none starts here.
     fn raw_text(&mut self) -> Option<bool> {
         let rest = self.rest();
         let Some(after) = rest.strip_prefix("br").or_else(|| rest.strip_prefix('r')) else { return Some(false) };
@@ -376,7 +377,7 @@ impl Scanner<'_> {
         }
     }
 
-    /// The value behind a map's key: a field named as the key is written, without its quotes.
+    /// The value after a map's key: a field named as the key is written, without its quotes.
     fn map_value(&mut self, key_start: usize, key: Node, node: &mut Node, depth: usize) -> Option<()> {
         let written = self.text.get(key.start..self.at)?.trim_end_matches(':').trim_end();
         let name = written.trim_matches('"').to_owned();

@@ -1,4 +1,4 @@
-//! What a user writes: scene files, times and poses, validated.
+//! Scene files, times and poses that a user writes, validated.
 //!
 //! A scene file is [RON](https://docs.rs/ron): structures are `(field: value, ...)`, choices `Name(field: value, ...)`,
 //! lists `[a, b]`, comments `//`. Optional values need no `Some`. Only `terrain` is required; every other field has
@@ -19,7 +19,7 @@
 //! # Ok::<(), canopy::scene::SceneError>(())
 //! ```
 //!
-//! A scene can be built in code as well, where a file is only one of the ways to get a [`Scene`]:
+//! A scene can also be built in code:
 //!
 //! ```
 //! use canopy::scene::{GroundNoise, GrownPlants, Scene, ScatteredTrees, Species};
@@ -34,10 +34,10 @@
 //! ```
 //!
 //! Positions are metres from the terrain's centre: +X east, −Z north. Angles in scene files and on the command line
-//! are degrees, yaw is a compass bearing; [`Viewpoint`] turns both into the renderer's frame.
+//! are degrees, yaw is a compass bearing; [`Viewpoint`] converts both into the renderer's frame.
 //!
-//! Settings that belong to another room are that room's own types (a `Crop` of `terrain`, a `Gloss` of `plant`, ...), which
-//! say themselves how a scene file writes them.
+//! Settings of other modules are those modules' own types (`Crop` of `terrain`, `Gloss` of `plant`, ...), which
+//! document how a scene file writes them.
 
 mod camera;
 mod check;
@@ -78,14 +78,14 @@ use serde::Deserialize;
 
 use check::Check;
 
-/// A scene: terrain, trees, place, camera and quality.
+/// A scene: terrain, trees, location, camera and quality.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// Name for titles and messages. Default: the file's name without its ending.
     #[serde(default)]
     pub name: String,
-    /// Seed of everything random: places, species, yaw, scale and tint of trees; any integer from 0 to
+    /// Seed of everything random: positions, species, yaw, scale and tint of trees; any integer from 0 to
     /// 18446744073709551615. Default 1.
     #[serde(default = "one")]
     pub seed: u64,
@@ -97,7 +97,7 @@ pub struct Scene {
     /// Where trees stand. Default `None`.
     #[serde(default)]
     pub trees: Trees,
-    /// Place on earth, date and air. Default: the terrain file's place, summer solstice 2026, noon UTC.
+    /// Location on earth, date and air. Default: the terrain file's location, summer solstice 2026, noon UTC.
     #[serde(default)]
     pub place: Place,
     /// Camera. Default: 20 m above the terrain's centre, looking north.
@@ -106,12 +106,12 @@ pub struct Scene {
     /// Drawing quality.
     #[serde(default)]
     pub quality: Quality,
-    /// The file that the scene was read from; `None` for a scene that was built in code. No field of a scene file.
+    /// The file that the scene was read from; `None` for a scene that was built in code. Not a field of a scene file.
     #[serde(skip)]
     pub file: Option<PathBuf>,
 }
 
-/// No scene file is larger; what is, is something else (a terrain, a plant), and would only waste memory.
+/// Maximum size of a scene file. A larger file is something else (a terrain, a plant), and would only waste memory.
 const LARGEST_FILE: u64 = 4 << 20;
 
 fn one() -> u64 {
@@ -126,8 +126,8 @@ impl Default for Scene {
 }
 
 impl Scene {
-    /// A scene of this ground without trees; all else has the defaults of a scene file. A ground that does not know where on
-    /// earth it lies is placed at 47.5° N, 9.2° E; a terrain file keeps its own place.
+    /// A scene of this ground without trees; everything else has the defaults of a scene file. A ground without a
+    /// location on earth is placed at 47.5° N, 9.2° E; a terrain file keeps its own location.
     pub fn new(terrain: impl Into<Ground>) -> Self {
         let terrain = terrain.into();
         let place = if terrain.may_know_its_place() { Place::default() } else { Place::at(47.5, 9.2) };
@@ -144,7 +144,7 @@ impl Scene {
         }
     }
 
-    /// What messages call the scene: its file, or "the scene `name`" where it was built in code.
+    /// The scene's name in messages: its file, or "the scene `name`" if it was built in code.
     pub fn label(&self) -> String {
         match &self.file {
             Some(file) => file.display().to_string(),
@@ -153,8 +153,8 @@ impl Scene {
     }
 
     /// Checks that all values are in the ranges that their documentation names. [`read`](Self::read) and
-    /// [`parse`](Self::parse) have done so, with the position of each value; for a scene that was built in code, or
-    /// changed after it was read, whoever builds it does.
+    /// [`parse`](Self::parse) have done so, with the position of each value. The build does it for a scene that was
+    /// built in code or changed after it was read.
     ///
     /// # Errors
     /// [`SceneError::Invalid`], which lists every value that is out of range.
@@ -172,8 +172,8 @@ impl Scene {
         check.finish(label)
     }
 
-    /// Puts `folder` before every relative path in the scene. What is read from a file has this done already; a scene that
-    /// was built in code has its paths relative to the working directory.
+    /// Prepends `folder` to every relative path in the scene. A scene from a file already has this done; the paths of a
+    /// scene that was built in code are relative to the working directory.
     pub fn resolve_paths(&mut self, folder: &FilePath) {
         self.terrain.resolve(folder);
         self.trees.resolve(folder);
@@ -184,7 +184,7 @@ impl Scene {
     /// ready to open.
     ///
     /// # Errors
-    /// [`SceneError`]: the file cannot be read, is larger than 4 MiB, is no RON, has an unknown field, or values that
+    /// [`SceneError`]: the file cannot be read, is larger than 4 MiB, is not RON, has an unknown field, or values that
     /// are impossible (all of them are listed).
     pub fn read(path: &FilePath) -> Result<Self, SceneError> {
         let failed = |source| SceneError::Read { path: path.to_owned(), source };
@@ -210,8 +210,8 @@ impl Scene {
         }
     }
 
-    /// Validates the text of a scene file; `path` is where it comes from: for messages, for relative paths, and for
-    /// the default name.
+    /// Validates the text of a scene file; `path` is its source, for messages, for relative paths, and for the
+    /// default name.
     ///
     /// # Errors
     /// [`SceneError::Syntax`] or [`SceneError::Invalid`].

@@ -1,4 +1,4 @@
-//! What a request says instead of a scene file.
+//! Values of a request that replace those of a scene file.
 
 use super::{Lighting, Scene};
 
@@ -9,19 +9,19 @@ pub struct Overrides {
     pub seed: Option<u64>,
     /// Samples per pixel, 1 or 4.
     pub msaa: Option<u32>,
-    /// The light of all species. A species that has this kind of light already keeps its own values, but for how the sun
-    /// lights it.
+    /// The lighting of all species. A species that already has this kind of lighting keeps its own values, except for
+    /// how the sun lights it.
     pub lighting: Option<Lighting>,
 }
 
 impl Overrides {
-    /// `scene` with the values in their places.
+    /// `scene` with the values replaced.
     pub fn applied(&self, mut scene: Scene) -> Scene {
         self.apply(&mut scene);
         scene
     }
 
-    /// Puts the values in their places.
+    /// Replaces the values in `scene`.
     pub fn apply(&self, scene: &mut Scene) {
         scene.seed = self.seed.unwrap_or(scene.seed);
         scene.quality.msaa = self.msaa.unwrap_or(scene.quality.msaa);

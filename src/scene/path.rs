@@ -29,7 +29,7 @@ struct Knot {
 
 impl Path {
     /// The path through `keys`, whose times must be finite and grow. `None` for fewer than two keys, or keys out of
-    /// order or not finite (a [`super::Scene`] that was read has none such).
+    /// order or not finite (a [`super::Scene`] that was read never has those).
     pub fn new(keys: &[PathKey]) -> Option<Self> {
         let in_order = keys.windows(2).all(|pair| matches!(pair, [a, b] if a.seconds < b.seconds));
         let mut knots: Vec<Knot> = keys.iter().map(Knot::at_rest).collect();
@@ -57,7 +57,7 @@ impl Path {
         self.knots.last().map_or(0.0, |knot| knot.seconds)
     }
 
-    /// The pose at a time; before the first key and behind the last the camera rests there.
+    /// The pose at a time; before the first key and after the last the camera does not move.
     pub fn at(&self, seconds: f64) -> Pose {
         let seconds = if seconds.is_nan() { self.start() } else { seconds.clamp(self.start(), self.end()) };
         let behind = self.knots.partition_point(|knot| knot.seconds <= seconds);
@@ -78,7 +78,7 @@ impl Knot {
     }
 }
 
-/// Adds whole turns so that no two neighbouring keys differ by more than half a turn.
+/// Adds full rotations so that neighbouring keys differ by at most half a rotation.
 fn unwrap_yaw(knots: &mut [Knot]) {
     let mut before: Option<f64> = None;
     for knot in knots {

@@ -1,4 +1,4 @@
-//! Where on earth and when: what the sun, the moon and the air depend on.
+//! Location on earth and time, on which the sun, the moon and the air depend.
 
 use serde::Deserialize;
 
@@ -7,12 +7,12 @@ use super::ground::Ground;
 use super::time::LocalTime;
 use crate::light::MoonSetting;
 
-/// Place and time of a scene.
+/// Location and time of a scene.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Place {
     /// Degrees north of the equator, -90 to 90. Default: the middle of the terrain file; required for terrain that is
-    /// no file with a coordinate system.
+    /// not a file with a coordinate system.
     pub latitude: Option<f64>,
     /// Degrees east of Greenwich, -180 to 180. Default: as for `latitude`.
     pub longitude: Option<f64>,
@@ -39,7 +39,7 @@ impl Default for Place {
 }
 
 impl Place {
-    /// Degrees north of the equator and east of Greenwich; all else by default.
+    /// Degrees north of the equator and east of Greenwich; defaults for everything else.
     pub fn at(latitude: f64, longitude: f64) -> Self {
         Self { latitude: Some(latitude), longitude: Some(longitude), ..Self::default() }
     }
@@ -53,7 +53,7 @@ impl Place {
                 }
                 None if !ground.may_know_its_place() => check.problem(
                     &field,
-                    "is missing, and this kind of terrain does not know where on earth it lies",
+                    "is missing, and this kind of terrain has no location on earth",
                     format!("add `place: (latitude: 47.5, longitude: 9.2)` with the {name} that the sun shall have"),
                 ),
                 None => {}

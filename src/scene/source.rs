@@ -1,4 +1,4 @@
-//! A scene by its file or by its value.
+//! The source of a scene: a file or a value.
 
 use std::{
     fmt,
@@ -8,7 +8,7 @@ use std::{
 
 use super::{Scene, SceneError};
 
-/// A scene that somebody asks for: a file to read, or a scene that is there already.
+/// The source of a scene: a file to read, or an existing scene.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SceneSource {
     /// A scene file.
@@ -18,7 +18,7 @@ pub enum SceneSource {
 }
 
 impl SceneSource {
-    /// The scene, read from its file where it has one.
+    /// The scene, read from its file if it is a file.
     ///
     /// # Errors
     /// Those of [`Scene::read`].

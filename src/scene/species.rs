@@ -1,4 +1,4 @@
-//! The species of a scene: what a tree of each looks like, how tall it is and where it grows.
+//! The species of a scene: how its trees look, how tall they are and where they grow.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -15,19 +15,20 @@ use crate::plant::{Gloss, LeafKind};
 pub struct Species {
     /// Name, unique in the scene; inventories refer to it. Required.
     pub name: String,
-    /// Share among the species that may grow at a place, relative to theirs, 0.000001 to 1000000. Default 1.
+    /// Weight relative to the other species that may grow at a position, 0.000001 to 1000000. Default 1.
     #[serde(default = "one")]
     pub weight: f64,
-    /// What its trees look like. Required.
+    /// Its plants. Required.
     pub plant: PlantSource,
-    /// How its foliage is lit. Default: what is nearest to the ground truth.
+    /// How its foliage is lit. Default: the lighting closest to the ground truth.
     #[serde(default)]
     pub lighting: Option<Lighting>,
-    /// The gloss of its leaves. Default `(share: 0.045, roughness: 0.4)`, a leaf's as measured.
+    /// The gloss of its leaves. Default `(share: 0.045, roughness: 0.4)`, as measured on leaves.
     #[serde(default)]
     pub gloss: Gloss,
-    /// What its leaves are made of, which says how much light passes: `Thin`, `Young`, `Leathery`, `Needle` or `Dead`. A glTF
-    /// material's own value goes before it. Default: what the rules of a grown plant say, `Thin` for a plant from a file.
+    /// The kind of its leaves, which determines how much light passes through them: `Thin`, `Young`, `Leathery`,
+    /// `Needle` or `Dead`. A glTF material's own value takes precedence. Default: what the rules of a grown plant say,
+    /// `Thin` for a plant from a file.
     #[serde(default)]
     pub leaf: Option<LeafKind>,
     /// Range of heights in metres, `(lowest, highest)`, each 0.1 to 150. Default (16, 26).
@@ -39,8 +40,8 @@ pub struct Species {
     /// Steepest ground it grows on, in degrees, 0 to 90. Default 90: any.
     #[serde(default = "ninety")]
     pub slope_limit: f64,
-    /// Radius of the trunk's foot, root flare included, in metres for a tree of mean height, 0.001 to 10; says how far
-    /// a trunk must reach into a slope. Default: 1.5 % of the mean height.
+    /// Radius of the trunk's foot, root flare included, in metres for a tree of mean height, 0.001 to 10; it determines
+    /// how far a trunk must extend into a slope. Default: 1.5 % of the mean height.
     #[serde(default)]
     pub trunk_radius: Option<f64>,
 }
@@ -60,7 +61,7 @@ pub enum PlantSource {
 pub struct GrownPlants {
     /// How they grow. Default `Broadleaf`.
     pub form: GrownForm,
-    /// Number of different individuals, 1 to 16. More look richer and cost memory and bake time. Default 3.
+    /// Number of different individuals, 1 to 16. More: more variety, memory and bake time. Default 3.
     pub individuals: u32,
     /// Triangles of one full model, 5000 to 100000. Default 20000.
     pub triangles: u32,
@@ -77,9 +78,9 @@ impl Default for GrownPlants {
 /// The rules by which a plant grows.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 pub enum GrownForm {
-    /// The broadleaf that the program ships.
+    /// The built-in broadleaf.
     Broadleaf,
-    /// The conifer that the program ships.
+    /// The built-in conifer.
     Conifer,
     /// Rules from a RON file, relative to the scene file: `form: File("../species/birch.ron")`.
     File(PathBuf),

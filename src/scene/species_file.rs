@@ -4,14 +4,14 @@ use std::path::Path;
 
 use super::{Position, Scene, SceneError, Species};
 
-/// What makes a scene of a species; on the first line of the text, so that all lines keep their numbers.
+/// Wraps a species into a scene; on the first line of the text, so that all lines keep their numbers.
 const BEFORE: &str = "(terrain: Flat(size: 100), place: (latitude: 0, longitude: 0), species: [";
 /// A line of its own: the text may end in a comment.
 const AFTER: &str = "\n])";
 
 impl Species {
-    /// Reads the text of a species file, which is what stands in a scene's list `species`: `(name: "oak", plant: Grown(form:
-    /// Broadleaf), height: (14, 22))`. `path` is where it comes from: for messages, and for the relative paths in it.
+    /// Reads the text of a species file, which is an entry of a scene's list `species`: `(name: "oak", plant:
+    /// Grown(form: Broadleaf), height: (14, 22))`. `path` is its source, for messages and for the relative paths in it.
     ///
     /// # Errors
     /// [`SceneError::Syntax`] or [`SceneError::Invalid`] with the position in the text.
@@ -30,7 +30,7 @@ impl Species {
     }
 }
 
-/// The error as one of the species' own text.
+/// The error, with positions in the species' own text.
 fn unwrapped(mut error: SceneError) -> SceneError {
     let moved = |position: &mut Position| {
         if position.line == 1 {

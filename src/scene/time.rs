@@ -6,18 +6,18 @@ use serde::Deserialize;
 /// First and last year that a scene may name. Solar positions are good to a few thousandths of a degree within them.
 pub const YEARS: std::ops::RangeInclusive<i32> = 1900..=2200;
 
-/// An instant with the zone that its user thinks in.
+/// An instant in the user's time zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(try_from = "String")]
 pub struct LocalTime(DateTime<FixedOffset>);
 
-/// Why a text is no instant.
+/// Why a text is not an instant.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TimeError {
-    /// A local time without its zone.
-    #[error("the time `{0}` has no zone; write the offset from UTC behind it, as in {0}+02:00, or {0}Z if it is UTC")]
+    /// A local time without a zone.
+    #[error("the time `{0}` has no zone; write the offset from UTC after it, as in {0}+02:00, or {0}Z if it is UTC")]
     MissingZone(String),
-    /// The zone is none.
+    /// The zone is not valid.
     #[error("`{zone}` in `{text}` is not a time zone (expected an offset such as +02:00 or -04:00, or Z for UTC)")]
     BadZone {
         /// What was written.
@@ -25,10 +25,10 @@ pub enum TimeError {
         /// The part that should be a zone.
         zone: String,
     },
-    /// There is a date and no time.
-    #[error("`{0}` has no time of day; write it behind the date, as in {0}T12:00Z")]
+    /// A date without a time of day.
+    #[error("`{0}` has no time of day; write it after the date, as in {0}T12:00Z")]
     MissingTime(String),
-    /// The date is none.
+    /// The date does not exist.
     #[error("the date `{date}` of `{text}` does not exist; write year-month-day, as in 2026-06-21")]
     BadDate {
         /// What was written.
@@ -36,7 +36,7 @@ pub enum TimeError {
         /// The part that should be a date.
         date: String,
     },
-    /// The time of day is none.
+    /// The time of day does not exist.
     #[error("the time of day `{time}` of `{text}` does not exist; write hours:minutes from 00:00 to 23:59")]
     BadTime {
         /// What was written.

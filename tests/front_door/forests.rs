@@ -229,7 +229,7 @@ fn another_terrain_takes_the_place_of_the_one_before() {
 }
 
 #[test]
-fn what_nobody_holds_goes() {
+fn unused_assets_are_freed() {
     let mut program = program();
     let plant = program.load::<PlantAsset>("small.species.ron");
     let forest = program.spawn(Forest3d::scatter(50.0).of(plant, 1.0));

@@ -46,7 +46,7 @@ fn crowns(stage: &Stage, name: &str) -> [(canopy::app::Picture, f64); 2] {
 }
 
 #[test]
-fn the_sun_through_the_transfer_is_another_picture_of_the_same_light() {
+fn sunlight_by_harmonics_changes_the_image_but_not_the_amount_of_light() {
     let gpu = gpu();
     let fields = |sun: &str| format!("lighting: Transfer(rays: 64, bounces: 1, sun: {sun})");
     let (leaf, harmonics) = (row(&fields("LeafShader")), row(&fields("Harmonics")));
@@ -58,12 +58,12 @@ fn the_sun_through_the_transfer_is_another_picture_of_the_same_light() {
         assert!(sharp != soft, "the option changes nothing");
         assert!((0.6..1.2).contains(&(other / light)), "{other} of {light}");
     }
-    // By night its picture is one too, and a resting one stays.
+    // At night its image is one too, and a resting one stays.
     let mut renderer = renderer(1);
     renderer.show(&harmonics);
     renderer.set_instant(&harmonics, instant(super::NIGHT));
     let night = again(&mut renderer);
-    assert!(night == again(&mut renderer), "a resting picture changes");
+    assert!(night == again(&mut renderer), "a resting image changes");
     assert_eq!(gpu.messages(), Vec::<String>::new());
 }
 

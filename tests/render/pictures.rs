@@ -1,4 +1,4 @@
-//! Whole pictures: against references, against each other, and that each depends on its arguments alone.
+//! Whole images: against references, against each other, and that each depends on its arguments alone.
 
 use canopy::{
     app::Picture,
@@ -49,7 +49,7 @@ fn noon_dusk_and_night_look_like_their_references() {
         r / b
     };
     assert!(warmth(&dusk) > 1.15 * warmth(&noon), "dusk {} noon {}", warmth(&dusk), warmth(&noon));
-    // A control: another hour is another picture.
+    // A control: another hour is another image.
     assert!(difference(&dusk, &noon) > 4.0 * SAME, "{}", difference(&dusk, &noon));
 
     for (picture, name) in [(&noon, "noon"), (&dusk, "dusk"), (&night, "night")] {
@@ -149,12 +149,13 @@ fn changing_at(stage: &Stage, distance: f32, at: &str) -> Picture {
     super::again(&mut renderer)
 }
 
-/// Crosses once had two thirds of their models' light: the mean of many leaves' cosines is not the cosine of their mean.
+/// Crosses once had two thirds of their models' light: the mean of many leaves' cosines is not the cosine of their
+/// mean.
 #[test]
 fn crosses_have_the_light_of_their_models() {
     let _gpu = gpu();
     let built = grove(1);
-    // A control: by night there is less light.
+    // A control: at night there is less light.
     let night = changing_at(&built.stage, 0.0, NIGHT);
     for (hour, at) in [NOON, "2026-06-21T18:00+01:00"].into_iter().enumerate() {
         let models = changing_at(&built.stage, 1e6, at);
@@ -173,12 +174,12 @@ fn crosses_have_the_light_of_their_models() {
         let light = |picture: &Picture| luminance(mean_color(picture, is_leaf));
         let [same, other] = [&crosses, &night].map(|picture| light(picture) / light(&models));
         assert!((0.85..1.15).contains(&same), "{at}: {same} of the models' light");
-        assert!(!(0.85..1.15).contains(&other), "{at}: {other} of the models' light by night");
+        assert!(!(0.85..1.15).contains(&other), "{at}: {other} of the models' light at night");
     }
 }
 
 #[test]
-fn a_picture_depends_on_its_arguments_alone() {
+fn an_image_depends_on_its_arguments_alone() {
     let _gpu = gpu();
     let built = grove(4);
     let stage = &built.stage;
@@ -186,8 +187,8 @@ fn a_picture_depends_on_its_arguments_alone() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let bytes = |picture: &Picture, name: &str| {
         let path = folder.path().join(name);
-        picture.save(&path, &[("Software", "test".to_owned())]).expect("a picture on disk");
-        std::fs::read(path).expect("the picture")
+        picture.save(&path, &[("Software", "test".to_owned())]).expect("an image on disk");
+        std::fs::read(path).expect("the image")
     };
     let fresh = draw(&mut showing(stage), stage, &here, DUSK);
     let twice = draw(&mut showing(stage), stage, &here, DUSK);
@@ -199,10 +200,10 @@ fn a_picture_depends_on_its_arguments_alone() {
     let after = draw(&mut travelled, stage, &here, DUSK);
     assert!(after == fresh, "the frames before show: mean FLIP {}", difference(&after, &fresh));
     let still = super::again(&mut travelled);
-    assert!(still == fresh, "a resting picture changes: mean FLIP {}", difference(&still, &fresh));
+    assert!(still == fresh, "a resting image changes: mean FLIP {}", difference(&still, &fresh));
 }
 
-/// A picture of the grove's trees alone, with the whole scene moved by `offset` metres.
+/// An image of the grove's trees alone, with the whole scene moved by `offset` metres.
 #[track_caller]
 fn moved(stage: &Stage, offset: DVec3, cascades: usize) -> Picture {
     let mut renderer = renderer(4);
@@ -230,7 +231,7 @@ fn a_million_metres_out_nothing_jitters() {
     let (near, far) = (moved(&built.stage, DVec3::ZERO, 0), moved(&built.stage, far_off, 0));
     keep(&far, "million");
     assert!(difference(&far, &near) < 0.001, "mean FLIP {}", difference(&far, &near));
-    assert!(near.pixels.chunks(3).any(|pixel| pixel[1] < 100), "no tree is in the picture");
+    assert!(near.pixels.chunks(3).any(|pixel| pixel[1] < 100), "no tree is in the image");
     // With shadows: the maps' texels lie on a grid of their own, so that leaves' edges fall otherwise.
     let (near, far) = (moved(&built.stage, DVec3::ZERO, 2), moved(&built.stage, far_off, 2));
     keep(&far, "million-shadows");
@@ -255,7 +256,7 @@ fn nothing_flickers_as_the_sun_sets() {
         let black = picture.pixels.chunks(3).filter(|pixel| *pixel == [0, 0, 0]).count() as f64
             / f64::from(picture.width * picture.height);
         assert!(light > 0.002, "{at}: mean luminance {light}");
-        assert!(black < 0.02, "{at}: {black} of the picture is black");
+        assert!(black < 0.02, "{at}: {black} of the image is black");
         if let Some((light_before, _)) = before {
             let step = light / light_before;
             assert!((0.75..1.33).contains(&step), "{at}: {step} times as light as four minutes before");

@@ -242,7 +242,7 @@ fn a_second_camera_is_refused() {
     let told = gpu.messages();
     assert!(told.iter().any(|message| message.contains("2 cameras have a CanopyCamera")), "{told:?}");
     assert_eq!(told.len(), 1, "{told:?}");
-    assert!(beside == alone, "the first camera's picture changed");
+    assert!(beside == alone, "the first camera's image changed");
 }
 
 #[test]
@@ -300,7 +300,7 @@ fn a_scene_moves_with_its_ground() {
     let _gpu = gpu();
     let built = grove(1);
     let stage = &built.stage;
-    // The ground's noise repeats after 1,024 m, so that the picture is the same there.
+    // The ground's noise repeats after 1,024 m, so that the image is the same there.
     let seen = |offset: DVec3| {
         let mut renderer = super::renderer(1);
         renderer.set_instant(stage, instant(NOON));

@@ -11,7 +11,7 @@ pub struct TreeFile {
     pub wood: bool,
     /// Leaves.
     pub leaves: bool,
-    /// The leaves' texture stands in a file that does not exist.
+    /// The leaves' texture is in a file that does not exist.
     pub absent_texture: bool,
     /// A position of the trunk that is not what it should be, to take the place of its first coordinate.
     pub first_coordinate: f32,
@@ -66,7 +66,7 @@ fn trunk() -> Mesh {
     mesh
 }
 
-/// Cards of 1.4 m on a ball of 2.4 m radius, 5.5 m over the ground, as evenly turned as a golden spiral is.
+/// Cards of 1.4 m on a ball of 2.4 m radius, 5.5 m over the ground, with evenly spread rotations (a golden spiral).
 fn crown() -> Mesh {
     let mut mesh = Mesh::default();
     for card in 0..160u32 {
@@ -92,7 +92,7 @@ fn leaf_texture() -> Vec<u8> {
         image::Rgba([shade / 2, shade, shade / 4, if inside { 255 } else { 0 }])
     });
     let mut bytes = Cursor::new(Vec::new());
-    // Writing into memory fails for no picture of this kind; an empty one would be seen as a missing texture.
+    // Writing into memory fails for no image of this kind; an empty one would be seen as a missing texture.
     let _ = image.write_to(&mut bytes, image::ImageFormat::Png);
     bytes.into_inner()
 }

@@ -1,4 +1,4 @@
-//! Pictures against references, by mean FLIP [Andersson et al. 2020]: about 0.001 for a few changed pixels, 0.03 for
+//! Images against references, by mean FLIP [Andersson et al. 2020]: about 0.001 for a few changed pixels, 0.03 for
 //! another lighting of the same scene, 0.3 for another scene.
 
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ fn failures() -> PathBuf {
     Path::new(env!("CARGO_TARGET_TMPDIR")).join("test-images")
 }
 
-/// Keeps a picture that somebody may want to look at.
+/// Keeps an image for later inspection.
 pub fn keep(picture: &Picture, name: &str) {
     let _ = picture.save(&failures().join(format!("{name}.png")), &[]);
 }
@@ -27,7 +27,7 @@ fn difference_map(actual: &Picture, reference: &Picture) -> FlipImageFloat {
     flip(image(reference), image(actual), DEFAULT_PIXELS_PER_DEGREE)
 }
 
-/// Mean FLIP between two pictures, 0 to 1; 1 where their sizes differ.
+/// Mean FLIP between two images, 0 to 1; 1 where their sizes differ.
 pub fn difference(actual: &Picture, reference: &Picture) -> f32 {
     if (actual.width, actual.height) != (reference.width, reference.height) {
         return 1.0;
@@ -41,12 +41,12 @@ fn load(path: &Path) -> Result<Picture, String> {
     Ok(Picture { width: image.width(), height: image.height(), pixels: image.into_raw() })
 }
 
-/// Compares a picture with the reference `name`; a mean FLIP above `threshold` is an error that says where the
-/// picture and the map of its differences are. With `CANOPY_BLESS=1` the picture becomes the reference.
+/// Compares an image with the reference `name`; a mean FLIP above `threshold` is an error that says where the
+/// image and the map of its differences are. With `CANOPY_BLESS=1` the image becomes the reference.
 pub fn check(actual: &Picture, name: &str, threshold: f32) -> Result<(), String> {
     let path = references().join(format!("{name}.png"));
     if actual.pixels.chunks(3).all(|pixel| pixel == &actual.pixels[..3]) {
-        return Err(format!("{name}: the picture has one colour only, which checks nothing"));
+        return Err(format!("{name}: the image has one colour only, which checks nothing"));
     }
     if std::env::var_os("CANOPY_BLESS").is_some_and(|value| value == "1") {
         return actual.save(&path, &[]).map_err(|error| error.to_string());
@@ -115,7 +115,7 @@ fn a_comparison_fails_where_it_should() {
         Picture { width, height, pixels: (0..width * height).flat_map(pixel).collect() }
     };
     assert_eq!(difference(&pattern(0), &pattern(0)), 0.0);
-    assert!(difference(&pattern(0), &pattern(4)) > 5.0 * SAME, "a shifted pattern is another picture");
+    assert!(difference(&pattern(0), &pattern(4)) > 5.0 * SAME, "a shifted pattern is another image");
     let mut darker = pattern(0);
     darker.pixels.iter_mut().for_each(|value| *value = (f32::from(*value) * 0.85) as u8);
     assert!(difference(&darker, &pattern(0)) > SAME, "{}", difference(&darker, &pattern(0)));

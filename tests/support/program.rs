@@ -14,7 +14,7 @@ pub fn canopy<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> std::io::Result<Out
 /// `canopy` with arguments, ready to be given an environment.
 pub fn command<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_canopy"));
-    // Mesa's layer that selects a device complains on its own account where there is no Wayland display.
+    // Mesa's device selection layer prints its own warning if there is no Wayland display.
     command.env("NODEVICE_SELECT", "1");
     command.args(arguments).stdin(Stdio::null());
     command

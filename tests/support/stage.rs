@@ -71,7 +71,7 @@ pub const BROADLEAF: &str =
 /// The place of all small scenes.
 pub const PLACE: &str = r#"place: (latitude: 48, longitude: 9, time: "2026-06-21T12:30+01:00")"#;
 
-/// The quality of all small scenes, with so many samples a pixel.
+/// The quality of all small scenes, with so many samples per pixel.
 pub fn quality(msaa: u32) -> String {
     format!(
         "quality: (shadow_map_size: 512, cascades: 2, shadow_distance: 120, near_distance: 35, fade_band: 10, \

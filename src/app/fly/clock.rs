@@ -1,4 +1,4 @@
-//! The scene's clock: it stands, runs at a multiple of real time, and is set by steps. Pure.
+//! The scene's clock: it is stopped or runs at a multiple of real time, and can be moved in steps. Pure.
 
 use chrono::{DateTime, Datelike, Days, FixedOffset, Months, TimeDelta};
 
@@ -6,28 +6,28 @@ use crate::scene::{LocalTime, YEARS};
 
 /// Speeds that the keys choose, in simulated seconds per second.
 pub const RATES: [f64; 5] = [0.0, 1.0, 60.0, 600.0, 3600.0];
-/// Fastest clock, a month per second; faster ones would be a flicker of days and nights.
+/// Fastest clock, a month per second; at a higher speed days and nights would flicker.
 const FASTEST: f64 = 30.0 * 86_400.0;
 /// Longest step of real time in seconds, as for the flight.
 const LONGEST_STEP: f64 = 1.0;
 
-/// A clock with the zone that its user thinks in. Its year stays within [`YEARS`]: behind the last follows the first.
+/// A clock in the user's time zone. Its year stays within [`YEARS`]: after the last year it continues in the first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SceneClock {
     now: DateTime<FixedOffset>,
-    /// Part of a millisecond that `now` has not taken up yet.
+    /// Fraction of a millisecond that is not in `now` yet.
     rest: f64,
     rate: f64,
 }
 
 impl SceneClock {
-    /// A clock that shows `time` and runs `rate` simulated seconds per second (0 to a month; what is beyond is cut).
+    /// A clock that shows `time` and runs `rate` simulated seconds per second (clamped to 0 to a month).
     pub fn new(time: LocalTime, rate: f64) -> Self {
         let rate = if rate.is_finite() { rate.clamp(0.0, FASTEST) } else { 0.0 };
         Self { now: within_years(time.zoned()), rest: 0.0, rate }
     }
 
-    /// What it shows.
+    /// The time that the clock shows.
     pub fn now(&self) -> DateTime<FixedOffset> {
         self.now
     }
@@ -37,12 +37,12 @@ impl SceneClock {
         self.rate
     }
 
-    /// Shows `time`; the speed stays.
+    /// Sets the clock to `time`; the speed stays.
     pub fn set(&mut self, time: LocalTime) {
         *self = Self { rate: self.rate, ..Self::new(time, 0.0) };
     }
 
-    /// Runs for `seconds` of real time, at most one second at once.
+    /// Advances by `seconds` of real time, at most one second per call.
     pub fn advance(&mut self, seconds: f64) {
         if !(seconds > 0.0 && self.rate > 0.0) {
             return;
@@ -64,19 +64,19 @@ impl SceneClock {
         self.show(if days < 0 { now.checked_sub_days(count) } else { now.checked_add_days(count) });
     }
 
-    /// Steps by months of the calendar; a day that the month lacks becomes its last.
+    /// Steps by months of the calendar; a day that the month does not have becomes its last one.
     pub fn step_months(&mut self, months: i32) {
         let count = Months::new(months.unsigned_abs());
         let now = self.now;
         self.show(if months < 0 { now.checked_sub_months(count) } else { now.checked_add_months(count) });
     }
 
-    /// Runs at the next faster of [`RATES`].
+    /// Switches to the next faster of [`RATES`].
     pub fn faster(&mut self) {
         self.rate = RATES.into_iter().find(|rate| *rate > self.rate).unwrap_or(self.rate);
     }
 
-    /// Runs at the next slower of [`RATES`].
+    /// Switches to the next slower of [`RATES`].
     pub fn slower(&mut self) {
         self.rate = RATES.into_iter().rev().find(|rate| *rate < self.rate).unwrap_or(0.0);
     }
@@ -88,7 +88,7 @@ impl SceneClock {
     }
 }
 
-/// The same day and hour in a year of [`YEARS`]; the leap day of a year that leaps becomes the 28th in one that does not.
+/// The same day and hour in a year of [`YEARS`]; 29 February becomes the 28th in a year that is not a leap year.
 fn within_years(time: DateTime<FixedOffset>) -> DateTime<FixedOffset> {
     if YEARS.contains(&time.year()) {
         return time;
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn behind_the_last_year_follows_the_first() {
+    fn after_the_last_year_comes_the_first() {
         let mut clock = clock("2200-12-31T23:59:00Z", 0.0);
         clock.step(TimeDelta::minutes(2));
         assert_eq!(shows(&clock), "1900-01-01T00:01:00Z");

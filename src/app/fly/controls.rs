@@ -1,74 +1,74 @@
-//! Which key does what. The help of the overlay is made of the same table.
+//! The keys and what they do. The help of the overlay uses the same table.
 
 use bevy::input::keyboard::{Key, KeyCode};
 use glam::{DVec2, DVec3};
 
 use super::motion::Controls;
 
-/// Radians that the view turns for one pixel of the mouse's way.
-const TURN_A_PIXEL: f64 = 0.0022;
-/// Radians per second that the view turns with the arrow keys.
-const TURN_A_SECOND: f64 = 1.0;
+/// Rotation of the view in radians per pixel of mouse motion.
+const ROTATION_PER_PIXEL: f64 = 0.0022;
+/// Rotation of the view in radians per second of a held arrow key.
+const ROTATION_PER_SECOND: f64 = 1.0;
 
-/// Something that a key press asks for, once.
+/// A command that a key press gives, once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
     /// Free the mouse, or quit.
     Leave,
-    /// Begin or leave the scripted flight.
+    /// Start or leave the scripted flight.
     Tour,
-    /// Stop or go on with clock and scripted flight.
+    /// Pause or resume the clock and the scripted flight.
     Pause,
     /// Tint trees by level of detail.
     Tint,
-    /// Let the camera go under the ground.
+    /// Let the camera go below the ground.
     Underground,
-    /// Save a picture.
-    Picture,
+    /// Save an image.
+    SaveImage,
     /// Show all keys.
     Help,
     /// Show the small overlay.
     Overlay,
-    /// Open or close the panel of the leaves' light.
+    /// Open or close the light panel.
     Light,
-    /// Back to where and when the flight began.
+    /// Return to the start of the flight, position and time.
     Home,
-    /// Set the clock by this many minutes.
+    /// Move the clock by this many minutes.
     Minutes(i64),
-    /// Set the calendar by this many days.
+    /// Move the calendar by this many days.
     Days(i32),
-    /// Set the calendar by this many months.
+    /// Move the calendar by this many months.
     Months(i32),
-    /// Let the clock run faster.
+    /// Speed the clock up.
     Faster,
-    /// Let the clock run slower.
+    /// Slow the clock down.
     Slower,
 }
 
 impl Command {
-    /// Whether a key that is held asks for it again and again.
+    /// Whether a held key repeats the command.
     fn repeats(self) -> bool {
         matches!(self, Self::Minutes(_) | Self::Days(_) | Self::Months(_))
     }
 }
 
-/// Something that a key asks of the open panel of the leaves' light.
+/// A key press for the open light panel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Turn {
-    /// Choose the next line, downwards or upwards.
+pub enum PanelInput {
+    /// Select the next line, downwards if `true`, else upwards.
     Line(bool),
-    /// Choose the next species, forwards or backwards.
+    /// Select the next species, forwards if `true`, else backwards.
     Species(bool),
-    /// Turn the chosen line.
+    /// Adjust the selected line.
     Value {
-        /// Whether up.
+        /// Whether to increase it.
         up: bool,
-        /// Whether by a small step.
+        /// Whether to use a small step.
         fine: bool,
     },
-    /// Take the chosen line back to what it is of itself.
+    /// Reset the selected line to its automatic value.
     Reset,
-    /// Write the values for a scene file.
+    /// Print the values for a scene file.
     Write,
 }
 
@@ -76,28 +76,28 @@ pub enum Turn {
 pub const HELP: [(&str, &str); 20] = [
     ("W A S D", "fly forward, left, back, right"),
     ("E  Q", "up, down"),
-    ("Shift", "five times as fast"),
+    ("Shift", "five times faster"),
     ("wheel", "faster, slower"),
-    ("mouse", "look; a click catches it, Esc frees it"),
-    ("arrows", "look without a mouse"),
-    ("F", "fly the scene's path; W A S D Q E leave it"),
-    ("Space", "pause clock and path"),
-    (",  .", "an hour back, on"),
-    ("[  ]", "ten minutes back, on"),
-    ("Page Up, Down", "a day on, back; with Shift a month"),
-    ("+  -", "clock: stands, 1x, 60x, 600x, 3600x"),
-    ("Home", "back to the start, place and time"),
-    ("U", "under the ground or not"),
+    ("mouse", "look around; click to capture it, Esc to release it"),
+    ("arrows", "look around without a mouse"),
+    ("F", "fly the scene's path; W A S D Q E leaves it"),
+    ("Space", "pause the clock and the path"),
+    (",  .", "one hour back, forward"),
+    ("[  ]", "ten minutes back, forward"),
+    ("Page Up, Down", "one day forward, back; with Shift one month"),
+    ("+  -", "clock speed: stopped, 1x, 60x, 600x, 3600x"),
+    ("Home", "return to the start, position and time"),
+    ("U", "allow flight below the ground, or not"),
     ("T", "tint trees by level of detail"),
-    ("L", "panel: turn the light of the leaves; it takes the arrows"),
-    ("P", "save a picture into the working directory"),
-    ("O", "overlay"),
+    ("L", "light panel: adjust the lighting of the leaves with the arrows"),
+    ("P", "save an image in the working directory"),
+    ("O", "show or hide the overlay"),
     ("H", "this help"),
-    ("Esc", "free the mouse, close the panel, then quit"),
+    ("Esc", "release the mouse, then close the panel, then quit"),
 ];
 
-/// The physical keys of travel, which lie where W, A, S, D, Q and E lie on an American keyboard, and their directions
-/// as [`Controls::travel`] has them.
+/// The physical keys of travel, at the positions of W, A, S, D, Q and E on an American keyboard, and their directions
+/// as in [`Controls::travel`].
 const TRAVEL: [(KeyCode, DVec3); 6] = [
     (KeyCode::KeyW, DVec3::Z),
     (KeyCode::KeyS, DVec3::NEG_Z),
@@ -107,16 +107,16 @@ const TRAVEL: [(KeyCode, DVec3); 6] = [
     (KeyCode::KeyQ, DVec3::NEG_Y),
 ];
 
-/// The keys that turn the view: x to the right, y upward.
-const TURN: [(KeyCode, DVec2); 4] = [
+/// The keys that rotate the view: x to the right, y upward.
+const ROTATION: [(KeyCode, DVec2); 4] = [
     (KeyCode::ArrowRight, DVec2::X),
     (KeyCode::ArrowLeft, DVec2::NEG_X),
     (KeyCode::ArrowUp, DVec2::Y),
     (KeyCode::ArrowDown, DVec2::NEG_Y),
 ];
 
-/// What a pressed key asks for. Commands go by what is printed on the key, since `[` and `+` move from layout to
-/// layout; keys of travel go by their place and are no commands.
+/// The command of a pressed key. Commands depend on the character of the key, because `[` and `+` are at different
+/// positions on different layouts. Keys of travel depend on the position of the key and are not commands.
 pub fn command(code: KeyCode, key: &Key, shift: bool, repeat: bool) -> Option<Command> {
     if TRAVEL.iter().any(|(travel, _)| *travel == code) {
         return None;
@@ -134,7 +134,7 @@ pub fn command(code: KeyCode, key: &Key, shift: bool, repeat: bool) -> Option<Co
             " " => Command::Pause,
             "t" => Command::Tint,
             "u" => Command::Underground,
-            "p" => Command::Picture,
+            "p" => Command::SaveImage,
             "h" => Command::Help,
             "o" => Command::Overlay,
             "l" => Command::Light,
@@ -152,35 +152,36 @@ pub fn command(code: KeyCode, key: &Key, shift: bool, repeat: bool) -> Option<Co
     (!repeat || command.repeats()).then_some(command)
 }
 
-/// What a pressed key asks of the open panel. Tab and what cannot be taken back at once do not repeat.
-pub fn turn(key: &Key, shift: bool, repeat: bool) -> Option<Turn> {
-    let turn = match key {
-        Key::ArrowDown => Turn::Line(true),
-        Key::ArrowUp => Turn::Line(false),
-        Key::ArrowRight => Turn::Value { up: true, fine: shift },
-        Key::ArrowLeft => Turn::Value { up: false, fine: shift },
+/// The input of a pressed key for the open panel. Tab, and keys that cannot be undone at once, do not repeat.
+pub fn panel_input(key: &Key, shift: bool, repeat: bool) -> Option<PanelInput> {
+    let input = match key {
+        Key::ArrowDown => PanelInput::Line(true),
+        Key::ArrowUp => PanelInput::Line(false),
+        Key::ArrowRight => PanelInput::Value { up: true, fine: shift },
+        Key::ArrowLeft => PanelInput::Value { up: false, fine: shift },
         _ if repeat => return None,
-        Key::Tab => Turn::Species(!shift),
-        Key::Backspace => Turn::Reset,
-        Key::Enter => Turn::Write,
+        Key::Tab => PanelInput::Species(!shift),
+        Key::Backspace => PanelInput::Reset,
+        Key::Enter => PanelInput::Write,
         _ => return None,
     };
-    Some(turn)
+    Some(input)
 }
 
-/// Whether a key turns the view.
-pub fn turns_view(key: KeyCode) -> bool {
-    TURN.iter().any(|(turn, _)| *turn == key)
+/// Whether a key rotates the view.
+pub fn rotates_view(key: KeyCode) -> bool {
+    ROTATION.iter().any(|(rotating, _)| *rotating == key)
 }
 
-/// The flight that the held keys and the mouse ask for within a step. `held` tells whether a key is down, `mouse` is
-/// the mouse's way in pixels (x right, y down), `notches` the wheel's turn.
+/// The controls of a step. `held`: whether a key is down. `mouse`: its motion in pixels (x right, y down). `notches`:
+/// the wheel's motion.
 pub fn controls(held: impl Fn(KeyCode) -> bool, mouse: DVec2, notches: f64, seconds: f64) -> Controls {
-    let travel = TRAVEL.iter().filter(|(key, _)| held(*key)).map(|(_, way)| *way).sum();
-    let keys: DVec2 = TURN.iter().filter(|(key, _)| held(*key)).map(|(_, way)| *way).sum();
-    let turn = DVec2::new(mouse.x, -mouse.y) * TURN_A_PIXEL + keys * (TURN_A_SECOND * seconds.clamp(0.0, 0.25));
+    let travel = TRAVEL.iter().filter(|(key, _)| held(*key)).map(|(_, direction)| *direction).sum();
+    let keys: DVec2 = ROTATION.iter().filter(|(key, _)| held(*key)).map(|(_, direction)| *direction).sum();
+    let rotation =
+        DVec2::new(mouse.x, -mouse.y) * ROTATION_PER_PIXEL + keys * (ROTATION_PER_SECOND * seconds.clamp(0.0, 0.25));
     let hurry = held(KeyCode::ShiftLeft) || held(KeyCode::ShiftRight);
-    Controls { travel, hurry, turn, notches }
+    Controls { travel, hurry, rotation, notches }
 }
 
 #[cfg(test)]
@@ -192,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn commands_go_by_what_is_printed() {
+    fn commands_depend_on_the_printed_character() {
         assert_eq!(typed(KeyCode::KeyF, "f"), Some(Command::Tour));
         assert_eq!(typed(KeyCode::KeyH, "H"), Some(Command::Help));
         assert_eq!(typed(KeyCode::Equal, "="), Some(Command::Faster));
@@ -203,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_of_travel_are_no_commands() {
+    fn keys_of_travel_are_not_commands() {
         // A Dvorak keyboard prints a comma where W is on an American one.
         assert_eq!(typed(KeyCode::KeyW, ","), None);
         assert_eq!(typed(KeyCode::Comma, ","), Some(Command::Minutes(-60)));
@@ -220,11 +221,14 @@ mod tests {
     #[test]
     fn the_panel_has_its_own_keys() {
         assert_eq!(typed(KeyCode::KeyL, "l"), Some(Command::Light));
-        assert_eq!(turn(&Key::ArrowLeft, true, true), Some(Turn::Value { up: false, fine: true }));
-        assert_eq!((turn(&Key::Tab, true, false), turn(&Key::Tab, false, true)), (Some(Turn::Species(false)), None));
+        assert_eq!(panel_input(&Key::ArrowLeft, true, true), Some(PanelInput::Value { up: false, fine: true }));
+        assert_eq!(
+            (panel_input(&Key::Tab, true, false), panel_input(&Key::Tab, false, true)),
+            (Some(PanelInput::Species(false)), None)
+        );
         // What the panel does not know goes to the flight.
-        assert_eq!(turn(&Key::Character("t".into()), false, false), None);
-        assert!(turns_view(KeyCode::ArrowUp) && !turns_view(KeyCode::KeyW));
+        assert_eq!(panel_input(&Key::Character("t".into()), false, false), None);
+        assert!(rotates_view(KeyCode::ArrowUp) && !rotates_view(KeyCode::KeyW));
     }
 
     #[test]
@@ -233,8 +237,8 @@ mod tests {
         assert!(!both.travels());
         let one = controls(|key| matches!(key, KeyCode::KeyD | KeyCode::ShiftLeft), DVec2::new(10.0, -5.0), 2.0, 0.1);
         assert!(one.travels() && one.hurry && one.travel == DVec3::X && one.notches == 2.0);
-        assert!(one.turn.x > 0.0 && one.turn.y > 0.0);
+        assert!(one.rotation.x > 0.0 && one.rotation.y > 0.0);
         let arrow = controls(|key| key == KeyCode::ArrowLeft, DVec2::ZERO, 0.0, 0.1);
-        assert!(arrow.turn.x < 0.0 && !arrow.travels());
+        assert!(arrow.rotation.x < 0.0 && !arrow.travels());
     }
 }

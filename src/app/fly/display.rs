@@ -4,10 +4,10 @@ use std::panic::{self, AssertUnwindSafe};
 
 use super::AppError;
 
-/// Finds out before the long work whether a window is possible at all.
+/// Checks before the long work whether a window can be opened.
 ///
 /// # Errors
-/// [`AppError::NoDisplay`] where the environment names none.
+/// [`AppError::NoDisplay`] if the environment names no display.
 pub fn check() -> Result<(), AppError> {
     if cfg!(any(not(unix), target_vendor = "apple", target_os = "android")) {
         return Ok(());
@@ -26,8 +26,8 @@ fn named_display(x11: bool, wayland: bool) -> Result<(), AppError> {
     Err(AppError::NoDisplay { details: details.to_owned() })
 }
 
-/// Builds a Bevy app with a window. Bevy's window plugin panics where the display that the environment names does not
-/// answer or a library of it is missing; that becomes an error here.
+/// Builds a Bevy app with a window. Bevy's window plugin panics if the display that the environment names does not
+/// answer or if one of its libraries is missing; the panic becomes an error here.
 ///
 /// # Errors
 /// [`AppError::NoDisplay`].

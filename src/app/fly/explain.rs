@@ -1,4 +1,4 @@
-//! `--explain`: what the frames ran and skipped, on the standard output.
+//! `--explain`: prints which passes the frames ran and skipped, on the standard output.
 
 use std::{
     io::Write,
@@ -10,10 +10,10 @@ use bevy::ecs::system::{Local, Res};
 use super::session::Session;
 use crate::render::report::{FrameReport, PassOutcome};
 
-/// Least time between two reports.
+/// Minimum time between two reports.
 const INTERVAL: Duration = Duration::from_secs(1);
 
-/// A pass and what became of it, in one line.
+/// A pass and its outcome, in one line.
 fn line(pass: &str, outcome: &PassOutcome) -> String {
     match outcome {
         PassOutcome::Ran(on) => format!("{pass}: ran ({on})"),
@@ -21,11 +21,11 @@ fn line(pass: &str, outcome: &PassOutcome) -> String {
     }
 }
 
-/// What was printed last, and when.
+/// The last printed report and its time.
 #[derive(Default)]
 pub struct Printed(Option<(Instant, Vec<(String, PassOutcome)>)>);
 
-/// Prints the report of the last frame where it differs from the last printed one, at most once a second.
+/// Prints the report of the last frame if it differs from the last printed one, at most once per second.
 pub fn explain(session: Res<Session>, report: Res<FrameReport>, mut printed: Local<Printed>) {
     if printed.0.as_ref().is_some_and(|(when, _)| when.elapsed() < INTERVAL) {
         return;
@@ -38,7 +38,7 @@ pub fn explain(session: Res<Session>, report: Res<FrameReport>, mut printed: Loc
     for (pass, outcome) in &outcomes {
         text.push_str(&format!("  {}\n", line(pass, outcome)));
     }
-    // Nobody listens any more: no reason to stop the flight.
+    // A closed output does not stop the flight.
     let mut out = std::io::stdout();
     let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
     printed.0 = Some((Instant::now(), outcomes));

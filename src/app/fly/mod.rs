@@ -1,8 +1,8 @@
 //! The interactive flight: a window onto a scene.
 //!
-//! `motion`, `tour`, `clock` and `session` are the flight itself and know neither window nor renderer; `controls`
-//! says which key does what; `window` brings both together; `overlay`, `picture` and `explain` show and keep what is
-//! seen; `light` turns the light of the leaves while looking; `timing` measures.
+//! `motion`, `tour`, `clock` and `session` are the flight itself and use neither window nor renderer; `controls` maps
+//! keys to commands; `window` connects both; `overlay`, `picture` and `explain` show and save what is seen; `light`
+//! adjusts the lighting of the leaves during the flight; `timing` measures.
 
 mod clock;
 mod controls;
@@ -35,11 +35,11 @@ use super::{FlyOptions, adapter, error::AppError};
 use crate::{assets::Stage, plugin::CanopyPlugins, progress::Progress};
 use session::Session;
 
-/// Opens a window and flies until the user has enough. Blocks; must be called on the program's main thread.
+/// Opens a window and flies until the user quits. Blocks; must be called on the program's main thread.
 ///
 /// # Errors
-/// [`AppError`] for anything in the scene that cannot be used, where there is no display or no graphics adapter, and
-/// where the device fails during the flight.
+/// [`AppError`] if the scene cannot be used, if there is no display or no graphics adapter, or if the device fails
+/// during the flight.
 pub fn fly(options: &FlyOptions, progress: &mut dyn Progress) -> Result<(), AppError> {
     display::check()?;
     let settings = adapter::settings(options.adapter.as_deref())?;
@@ -83,17 +83,17 @@ fn build(session: Session, options: &FlyOptions, settings: WgpuSettings) -> App 
         .add_systems(
             Update,
             (
-                window::catch_mouse,
-                window::obey,
-                light::follow_light,
+                window::capture_mouse,
+                window::handle_keys,
+                light::apply_bakes,
                 window::fly,
                 window::follow,
-                picture::take_picture,
+                picture::save_image,
             )
                 .chain(),
         )
         .add_systems(EguiPrimaryContextPass, overlay::draw_overlays);
-    // Letters that the overlay shows for the first time must reach the device with the frame that shows them.
+    // Glyphs that the overlay shows for the first time must be uploaded in the same frame.
     app.configure_sets(PostUpdate, AssetEventSystems.after(EguiPostUpdateSet::PostProcessOutput));
     if options.explain {
         app.add_systems(Update, explain::explain.after(window::follow));

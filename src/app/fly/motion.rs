@@ -1,5 +1,5 @@
-//! How the camera flies: from what the user's hands do to a place and a direction. Pure, and exact in time: the way
-//! flown in a second does not depend on how many frames the second had.
+//! How the camera flies: from the user's input to a position and a direction. Pure, and exact in time: the distance
+//! flown in a second does not depend on the number of frames in it.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -7,34 +7,35 @@ use glam::{DQuat, DVec2, DVec3};
 
 use crate::scene::Viewpoint;
 
-/// Least metres between the camera and the ground below it: the eyes of someone who stands.
+/// Minimum metres between the camera and the ground below it: the eye height of a standing person.
 pub const EYE_HEIGHT: f64 = 1.7;
 /// Slowest and fastest flight in metres per second, before hurry.
 pub const SPEEDS: std::ops::RangeInclusive<f64> = 0.2..=2000.0;
 /// Speed at the start in metres per second.
 const FIRST_SPEED: f64 = 15.0;
-/// How much faster a hurried flight is.
+/// Factor on the speed while Shift is held.
 const HURRY: f64 = 5.0;
 /// Factor on the speed of one notch of the wheel.
 const NOTCH: f64 = 1.25;
-/// Seconds in which the velocity comes within 1/e of the wanted one.
+/// Seconds in which the difference between the velocity and the wanted one falls to 1/e.
 const INERTIA: f64 = 0.12;
-/// Longest step in seconds: behind a longer pause (a stalled driver, a suspended computer) nobody wants to be far away.
+/// Longest step in seconds: after a longer pause (a stalled driver, a suspended computer) the camera must not be far
+/// away.
 const LONGEST_STEP: f64 = 1.0;
 /// Metres from the terrain's centre within which scenes may place things; the flight ends there too.
-const REACH: f64 = 1e7;
+const MAX_DISTANCE: f64 = 1e7;
 /// Lowest and highest flight in metres above the datum.
 const HEIGHTS: (f64, f64) = (-2e4, 1e5);
 
-/// What the user's hands do during a step.
+/// The user's input during a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Controls {
     /// Wanted travel in the camera's frame, each -1 to 1: x to its right, y up to the zenith, z forward.
     pub travel: DVec3,
     /// Whether to hurry: five times the speed.
     pub hurry: bool,
-    /// Turn of the view within the step in radians: x to the right, y upward.
-    pub turn: DVec2,
+    /// Rotation of the view within the step in radians: x to the right, y upward.
+    pub rotation: DVec2,
     /// Notches of the wheel; positive is faster.
     pub notches: f64,
 }
@@ -67,7 +68,7 @@ impl Pilot {
         Self { position: view.position, velocity: DVec3::ZERO, yaw: view.yaw, pitch: view.pitch, speed: FIRST_SPEED }
     }
 
-    /// Takes the place and direction of `view` and rests there; the speed that the user chose stays.
+    /// Takes the position and direction of `view` and stops there; the speed that the user chose stays.
     pub fn rest_at(&mut self, view: &Viewpoint) {
         *self = Self { speed: self.speed, ..Self::at(view) };
     }
@@ -82,15 +83,15 @@ impl Pilot {
         (-self.yaw.to_degrees()).rem_euclid(360.0)
     }
 
-    /// Flies for `seconds`, at most one second at once.
+    /// Flies for `seconds`, at most one second per call.
     ///
-    /// The velocity follows the wanted one like a body in a viscous medium, `v' = (w - v) / inertia`; place and
-    /// velocity are the exact solution over the step, so that steps can be divided at will.
+    /// The velocity follows the wanted one like a body in a viscous medium, `v' = (w - v) / inertia`. Position
+    /// and velocity are the exact solution over the step, so the size of the steps does not matter.
     pub fn fly(&mut self, controls: &Controls, seconds: f64) {
         let seconds = if seconds.is_finite() { seconds.clamp(0.0, LONGEST_STEP) } else { 0.0 };
-        if controls.turn.is_finite() {
-            self.yaw = (self.yaw - controls.turn.x).rem_euclid(TAU);
-            self.pitch = (self.pitch + controls.turn.y).clamp(-FRAC_PI_2, FRAC_PI_2);
+        if controls.rotation.is_finite() {
+            self.yaw = (self.yaw - controls.rotation.x).rem_euclid(TAU);
+            self.pitch = (self.pitch + controls.rotation.y).clamp(-FRAC_PI_2, FRAC_PI_2);
         }
         if controls.notches.is_finite() {
             self.speed = (self.speed * NOTCH.powf(controls.notches)).clamp(*SPEEDS.start(), *SPEEDS.end());
@@ -101,7 +102,8 @@ impl Pilot {
         let position = self.position + wanted * seconds + lag * (INERTIA * (1.0 - kept));
         if position.is_finite() {
             let (low, high) = HEIGHTS;
-            self.position = position.clamp(DVec3::new(-REACH, low, -REACH), DVec3::new(REACH, high, REACH));
+            self.position = position
+                .clamp(DVec3::new(-MAX_DISTANCE, low, -MAX_DISTANCE), DVec3::new(MAX_DISTANCE, high, MAX_DISTANCE));
             self.velocity = wanted + lag * kept;
         } else {
             self.velocity = DVec3::ZERO;
@@ -119,7 +121,7 @@ impl Pilot {
         travel.clamp_length_max(1.0) * self.speed * hurry
     }
 
-    /// Lifts the camera to eye height over `ground`, the terrain's height below it, where it is lower.
+    /// Lifts the camera to eye height above `ground`, the terrain's height below it, if it is lower.
     pub fn stay_above(&mut self, ground: f64) {
         let floor = ground + EYE_HEIGHT;
         if self.position.y < floor {
@@ -153,9 +155,9 @@ mod tests {
         assert!(east.position.x > 20.0 && (east.position.z + 20.0).abs() < 1e-9);
         assert_eq!(east.position.y, 50.0);
         // A quarter to the right, forward is east.
-        let mut turned = pilot();
-        turned.fly(&Controls { turn: DVec2::new(FRAC_PI_2, 0.0), ..travel(0.0, 0.0, 1.0) }, 1.0);
-        assert!(turned.position.x > 20.0 && (turned.bearing() - 90.0).abs() < 1e-9);
+        let mut rotated = pilot();
+        rotated.fly(&Controls { rotation: DVec2::new(FRAC_PI_2, 0.0), ..travel(0.0, 0.0, 1.0) }, 1.0);
+        assert!(rotated.position.x > 20.0 && (rotated.bearing() - 90.0).abs() < 1e-9);
     }
 
     #[test]
@@ -224,12 +226,12 @@ mod tests {
     proptest! {
         #[test]
         fn nothing_leads_to_nowhere(
-            turn in any::<(f64, f64)>(), travel in any::<(f64, f64, f64)>(), notches in any::<f64>(),
+            rotation in any::<(f64, f64)>(), travel in any::<(f64, f64, f64)>(), notches in any::<f64>(),
             seconds in any::<f64>(), hurry in any::<bool>(),
         ) {
             let mut pilot = pilot();
             let controls = Controls {
-                travel: DVec3::from(travel), hurry, turn: DVec2::from(turn), notches,
+                travel: DVec3::from(travel), hurry, rotation: DVec2::from(rotation), notches,
             };
             for _ in 0..3 {
                 pilot.fly(&controls, seconds);

@@ -1,4 +1,4 @@
-//! What lies over the picture: numbers, help, messages.
+//! The overlays of the window: numbers, help, messages.
 
 use bevy::ecs::system::{Local, Res, ResMut};
 use bevy_egui::{
@@ -22,20 +22,20 @@ use crate::{
 
 /// Points between an overlay and the window's edge.
 const EDGE: f32 = 8.0;
-/// Points of the overlays' text.
+/// Size of the overlays' text in points.
 pub(super) const SMALL: f32 = 12.0;
-/// Colour of what stands before a value.
+/// Colour of a value's name.
 pub(super) const NAME: Color32 = Color32::from_gray(185);
-const FRAME_TIME: &str = "Time from one frame's completion on the device to the next one's, over the last 120 frames: \
-                          what the CPU needs, what the device needs, and the wait for the screen. Half of the frames \
-                          take no longer than p50, 95 of 100 no longer than p95.";
-const TREES: &str = "Trees that the view draws. One in the band between the levels counts in both.";
-const TRIANGLES: &str = "Triangles of the view: trees and ground, without shadow maps.";
-const SUN: &str = "Elevation of the sun's centre above the horizon, refraction included, in the light that is drawn.";
+const FRAME_TIME: &str = "Time between the completion of two frames on the device, over the last 120 frames: CPU, \
+                          device, and the wait for the screen. Half of the frames take at most p50, 95 % of them at \
+                          most p95.";
+const TREES: &str = "Trees that the view draws. A tree in the fade band between two levels counts in both.";
+const TRIANGLES: &str = "Triangles that the view draws: trees and ground, without shadow maps.";
+const SUN: &str = "Elevation of the sun's centre above the horizon, with refraction, in the light that is drawn.";
 const POSITION: &str = "Metres east (x) and south (z) of the terrain's centre, and above the datum of its heights. \
-                        With height above ground, bearing and pitch this is what --camera takes.";
+                        --camera takes x, z, the height above ground, bearing and pitch.";
 
-/// Draws the overlays; a frame that becomes a picture has none.
+/// Draws the overlays. A frame that is saved as an image has none.
 pub fn draw_overlays(
     mut contexts: EguiContexts,
     mut session: ResMut<Session>,
@@ -43,16 +43,16 @@ pub fn draw_overlays(
     frames: Res<FrameTimes>,
     report: Res<FrameReport>,
     daylight: Option<Res<Daylight>>,
-    mut dressed: Local<bool>,
+    mut styled: Local<bool>,
 ) {
     let Ok(context) = contexts.ctx_mut() else { return };
-    if !*dressed {
+    if !*styled {
         let mut visuals = Visuals::dark();
         visuals.override_text_color = Some(Color32::from_gray(235));
         context.set_visuals(visuals);
-        *dressed = true;
+        *styled = true;
     }
-    if std::mem::take(&mut session.picturing) {
+    if std::mem::take(&mut session.capturing) {
         return;
     }
     if session.help {
@@ -68,7 +68,7 @@ pub fn draw_overlays(
         panel(context, "canopy_light_panel", Align2::RIGHT_TOP, [-EDGE, EDGE], |ui| light_panel(ui, &light));
     }
     if let Some(message) = session.message() {
-        // An area remembers its size by its name: each message has its own.
+        // An area remembers its size by its name, so each message has its own.
         panel(context, message, Align2::CENTER_BOTTOM, [0.0, -2.0 * EDGE], |ui| {
             ui.label(message);
         });
@@ -78,7 +78,7 @@ pub fn draw_overlays(
 fn panel(context: &Context, name: &str, align: Align2, offset: [f32; 2], contents: impl FnOnce(&mut Ui)) {
     let widest = context.viewport_rect().width() - 4.0 * EDGE;
     Area::new(Id::new(name)).anchor(align, offset).default_width(widest).fade_in(false).show(context, |ui| {
-        // Rows as high as their text, not as a button.
+        // Rows are as high as their text, not as a button.
         ui.spacing_mut().interact_size.y = 0.0;
         Frame::new()
             .fill(Color32::from_black_alpha(180))
@@ -103,7 +103,7 @@ fn numbers(ui: &mut Ui, session: &Session, frames: &FrameTimes, sun: Option<f32>
         forest.levels.iter().map(|level| format!("{} {}", grouped(level.trees), level.label)).collect();
     let clock = match session.clock.rate() {
         _ if session.paused => "paused".to_owned(),
-        0.0 => "stands".to_owned(),
+        0.0 => "stopped".to_owned(),
         rate => format!("{rate}x"),
     };
     let position = session.pilot.position;
@@ -144,7 +144,7 @@ fn numbers(ui: &mut Ui, session: &Session, frames: &FrameTimes, sun: Option<f32>
             ("sun", format!("{:.1}\u{b0} {} the horizon", sun.abs(), if sun < 0.0 { "below" } else { "above" }), SUN),
         );
     }
-    let states = [(session.underground, "under the ground"), (session.tinted, "tinted by level")];
+    let states = [(session.underground, "below the ground"), (session.tinted, "tinted by level")];
     let states: Vec<&str> = states.iter().filter(|(on, _)| *on).map(|(_, name)| *name).collect();
     if !states.is_empty() {
         rows.push(("options", states.join(", "), "Keys U and T."));

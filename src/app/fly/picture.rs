@@ -1,4 +1,4 @@
-//! Pictures of the flight: what the window shows without its overlays, with the settings that made it.
+//! Images of the flight: what the window shows without its overlays, with the settings that reproduce it.
 
 use std::{
     path::PathBuf,
@@ -22,14 +22,9 @@ use crate::{
     components::DrawnSun,
 };
 
-/// Captures this frame where the session asks for it.
-pub fn take_picture(
-    mut commands: Commands,
-    session: Res<Session>,
-    panel: Res<LightPanel>,
-    drawn: Option<Res<DrawnSun>>,
-) {
-    if !session.picturing {
+/// Captures this frame if the session asks for it.
+pub fn save_image(mut commands: Commands, session: Res<Session>, panel: Res<LightPanel>, drawn: Option<Res<DrawnSun>>) {
+    if !session.capturing {
         return;
     }
     // The light may lag behind the clock.
@@ -44,7 +39,7 @@ pub fn take_picture(
             let file = free_name(SystemTime::now());
             picture.save(&file, &notes).map(|()| file)
         });
-        session.say(match outcome {
+        session.show_message(match outcome {
             Ok(file) => format!("saved {}", file.display()),
             Err(error) => {
                 warn!("{error}");
@@ -56,13 +51,12 @@ pub fn take_picture(
 }
 
 fn picture(image: &Image) -> Result<Picture, AppError> {
-    let failed =
-        |error: &dyn std::fmt::Display| AppError::Render(format!("the picture could not be read back: {error}"));
+    let failed = |error: &dyn std::fmt::Display| AppError::Render(format!("the image could not be read back: {error}"));
     let pixels = image.clone().try_into_dynamic().map_err(|error| failed(&error))?.to_rgb8();
     Ok(Picture { width: pixels.width(), height: pixels.height(), pixels: pixels.into_raw() })
 }
 
-/// A file name in the working directory that no file has: date, time (UTC) and a number.
+/// An unused file name in the working directory: date, time (UTC) and a number.
 fn free_name(now: SystemTime) -> PathBuf {
     let seconds = now.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
     let time = i64::try_from(seconds).ok().and_then(|seconds| DateTime::<Utc>::from_timestamp(seconds, 0));

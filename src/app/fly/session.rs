@@ -22,19 +22,19 @@ const MESSAGE_SECONDS: f64 = 6.0;
 /// A flight through a stage.
 #[derive(Resource)]
 pub struct Session {
-    /// What is flown through.
+    /// The scene of the flight.
     pub stage: Stage,
     /// The camera.
     pub pilot: Pilot,
-    /// The scripted flight, for scenes that have a path.
+    /// The scripted flight, if the scene has a path.
     pub tour: Option<Tour>,
-    /// Whether the camera follows it.
+    /// Whether the camera follows the path.
     pub touring: bool,
     /// The clock.
     pub clock: SceneClock,
-    /// Whether clock and scripted flight stand.
+    /// Whether clock and scripted flight are paused.
     pub paused: bool,
-    /// Whether the camera may go under the ground.
+    /// Whether the camera may go below the ground.
     pub underground: bool,
     /// Whether trees are tinted by their level of detail.
     pub tinted: bool,
@@ -42,13 +42,13 @@ pub struct Session {
     pub overlay: bool,
     /// Whether the help is shown.
     pub help: bool,
-    /// Whether this frame becomes a picture, so that nothing may lie over it.
-    pub picturing: bool,
+    /// Whether this frame is saved as an image, so no overlay may be drawn.
+    pub capturing: bool,
     message: Option<(String, f64)>,
     start: Start,
 }
 
-/// Where and when a flight begins.
+/// Position and time at the start of a flight.
 #[derive(Clone, Debug)]
 struct Start {
     pose: Pose,
@@ -81,13 +81,13 @@ impl Session {
             tinted: false,
             overlay: true,
             help: false,
-            picturing: false,
+            capturing: false,
             message: None,
             start,
             stage,
         };
         session.fly(&Controls::default(), 0.0);
-        session.say("H shows all keys".to_owned());
+        session.show_message("press H for all keys".to_owned());
         Ok(session)
     }
 
@@ -102,7 +102,7 @@ impl Session {
     }
 
     /// Shows a message for some seconds.
-    pub fn say(&mut self, message: String) {
+    pub fn show_message(&mut self, message: String) {
         self.message = Some((message, MESSAGE_SECONDS));
     }
 
@@ -138,13 +138,13 @@ impl Session {
         }
     }
 
-    /// Carries out a command, as far as it concerns the flight; what concerns the window is done there.
+    /// Carries out a command as far as it concerns the flight; the window does the rest.
     pub fn carry_out(&mut self, command: Command) {
         match command {
             Command::Leave | Command::Light => {}
-            Command::Picture => self.picturing = true,
+            Command::SaveImage => self.capturing = true,
             Command::Tour if self.tour.is_none() => {
-                self.say("this scene has no camera path; add `camera: (path: [...])` to its file".to_owned());
+                self.show_message("this scene has no camera path; add `camera: (path: [...])` to its file".to_owned());
             }
             Command::Tour => self.touring = !self.touring,
             Command::Pause => self.paused = !self.paused,

@@ -1,10 +1,10 @@
-//! What a frame costs and what it drew, told by the render world to the overlay.
+//! Frame times and counts, sent from the render world to the overlay.
 //!
-//! Without waiting for the device, frames pile up in its queue and a clock on the CPU believes in a fraction of the
-//! truth. So behind each frame an empty submission marks its end on the device, and the render world waits for such a
-//! mark before it goes on: on a hardware device for that of the frame before, so that CPU and GPU still overlap; on
-//! a software device, which shares the CPU anyway, for the frame's own. The time between two marks reached is the
-//! frame time, completion included, and no more than one frame is ever queued, which keeps the controls prompt.
+//! Without waiting for the device, frames pile up in its queue and a clock on the CPU measures only a fraction of the
+//! frame time. So after each frame an empty submission marks its end on the device, and the render world waits for such
+//! a mark before it goes on: on a hardware device for that of the frame before, so that CPU and GPU still overlap; on a
+//! software device, which shares the CPU anyway, for the frame's own. The time between two marks reached is the frame
+//! time, completion included, and no more than one frame is ever queued, which keeps the controls prompt.
 
 use std::{
     collections::VecDeque,
@@ -30,7 +30,7 @@ use wgpu::{DeviceType, SubmissionIndex};
 
 use crate::render::{forest::ForestStatistics, terrain::TerrainStatistics};
 
-/// Frames over which the overlay's percentiles go.
+/// Number of frames in the overlay's percentiles.
 pub const WINDOW: usize = 120;
 
 /// The times of the last [`WINDOW`] frames in seconds, and the counts of the last one.
@@ -44,7 +44,7 @@ pub struct FrameTimes {
 }
 
 impl FrameTimes {
-    /// Takes up a frame's time; the oldest beyond the window is forgotten.
+    /// Adds a frame's time; the oldest one beyond the window is dropped.
     pub fn push(&mut self, seconds: f64) {
         if !seconds.is_finite() {
             return;
@@ -77,7 +77,7 @@ struct News {
     terrain: TerrainStatistics,
 }
 
-/// The way of the news, shared between the worlds.
+/// The samples, shared between the two worlds.
 #[derive(Resource, Clone, Default)]
 struct Mailbox(Arc<Mutex<News>>);
 
@@ -95,11 +95,11 @@ impl Plugin for TimingPlugin {
 }
 
 fn receive(mailbox: Res<Mailbox>, mut frames: ResMut<FrameTimes>) {
-    let mut news = mailbox.0.lock().unwrap_or_else(PoisonError::into_inner);
-    for seconds in news.times.drain(..) {
+    let mut sample = mailbox.0.lock().unwrap_or_else(PoisonError::into_inner);
+    for seconds in sample.times.drain(..) {
         frames.push(seconds);
     }
-    (frames.forest, frames.terrain) = (news.forest.clone(), news.terrain);
+    (frames.forest, frames.terrain) = (sample.forest.clone(), sample.terrain);
 }
 
 fn await_device(
@@ -119,9 +119,9 @@ fn await_device(
         let _ = device.wgpu_device().poll(PollType::Wait { submission_index: marks.pop_front(), timeout: None });
     }
     let now = Instant::now();
-    let mut news = mailbox.0.lock().unwrap_or_else(PoisonError::into_inner);
-    news.times.extend(before.replace(now).map(|before| (now - before).as_secs_f64()));
-    (news.forest, news.terrain) = (forest.clone(), *terrain);
+    let mut sample = mailbox.0.lock().unwrap_or_else(PoisonError::into_inner);
+    sample.times.extend(before.replace(now).map(|before| (now - before).as_secs_f64()));
+    (sample.forest, sample.terrain) = (forest.clone(), *terrain);
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
-//! The scripted flight: the scene's path, round and round.
+//! The scripted flight: the scene's path, in a loop.
 
 use crate::{
     app::{PlanError, View},
     scene::{Path, Pose, Scene},
 };
 
-/// A place on the scene's path that moves with time.
+/// A position on the scene's path that moves with time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tour {
     path: Path,
@@ -13,7 +13,7 @@ pub struct Tour {
 }
 
 impl Tour {
-    /// The tour of `scene` from where `view` says that it begins; `None` for a scene without a path.
+    /// The tour of `scene`, starting where `view` says; `None` for a scene without a path.
     ///
     /// # Errors
     /// [`PlanError::NoPath`] and [`PlanError::OffPath`] for a [`View::Along`] that the scene's path does not have.
@@ -29,7 +29,7 @@ impl Tour {
         Ok(Some(Self { path, seconds }))
     }
 
-    /// Flies on for `seconds`; behind the path's end it begins again.
+    /// Flies on for `seconds`; after the path's end it starts again.
     pub fn advance(&mut self, seconds: f64) {
         let (start, length) = (self.path.start(), self.path.end() - self.path.start());
         let next = self.seconds + seconds;

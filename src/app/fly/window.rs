@@ -1,4 +1,4 @@
-//! The window's side: the mouse is caught and freed, keys become commands, the camera's entity follows the flight.
+//! Window input and output: captures the mouse, turns keys into commands, moves the camera's entity with the flight.
 
 use std::io::Write;
 
@@ -33,10 +33,10 @@ use crate::{
     render::components::{CanopyCamera, CanopyOrigin, ViewOptions},
 };
 
-/// Pixels of a touchpad's scrolling that are one notch of a wheel.
-const PIXELS_A_NOTCH: f64 = 100.0;
+/// Pixels of touchpad scrolling that equal one notch of a wheel.
+const PIXELS_PER_NOTCH: f64 = 100.0;
 
-/// Puts the stage and the camera into the world.
+/// Spawns the stage and the camera.
 pub fn set_up(mut commands: Commands, session: Res<Session>) {
     let stage = &session.stage;
     stage.show(&mut commands);
@@ -48,33 +48,33 @@ pub fn set_up(mut commands: Commands, session: Res<Session>) {
     ));
 }
 
-/// Catches the mouse on a click, and frees it when the window loses the focus.
-pub fn catch_mouse(
+/// Captures the mouse on a click, and releases it when the window loses the focus.
+pub fn capture_mouse(
     mut cursor: Single<&mut CursorOptions, With<PrimaryWindow>>,
     buttons: Res<ButtonInput<MouseButton>>,
     overlay: Res<EguiWantsInput>,
     mut focus: MessageReader<WindowFocused>,
 ) {
     if buttons.just_pressed(MouseButton::Left) && !overlay.wants_any_pointer_input() {
-        set_caught(&mut cursor, true);
+        set_captured(&mut cursor, true);
     }
     if focus.read().any(|message| !message.focused) {
-        set_caught(&mut cursor, false);
+        set_captured(&mut cursor, false);
     }
 }
 
-fn caught(cursor: &CursorOptions) -> bool {
+fn captured(cursor: &CursorOptions) -> bool {
     cursor.grab_mode != CursorGrabMode::None
 }
 
-fn set_caught(cursor: &mut CursorOptions, caught: bool) {
-    // Where a system cannot lock the mouse to its place, winit confines it to the window instead.
-    cursor.grab_mode = if caught { CursorGrabMode::Locked } else { CursorGrabMode::None };
-    cursor.visible = !caught;
+fn set_captured(cursor: &mut CursorOptions, captured: bool) {
+    // If the platform cannot lock the mouse at its position, winit confines it to the window instead.
+    cursor.grab_mode = if captured { CursorGrabMode::Locked } else { CursorGrabMode::None };
+    cursor.visible = !captured;
 }
 
-/// Carries out what the pressed keys ask for.
-pub fn obey(
+/// Carries out the commands of the pressed keys.
+pub fn handle_keys(
     mut keys: MessageReader<KeyboardInput>,
     held: Res<ButtonInput<KeyCode>>,
     mut session: ResMut<Session>,
@@ -86,7 +86,7 @@ pub fn obey(
     const SHIFTS: [KeyCode; 2] = [KeyCode::ShiftLeft, KeyCode::ShiftRight];
     for key in keys.read() {
         let pressed = key.state == ButtonState::Pressed;
-        // In the order of the strokes: in one slow frame Shift may have come and gone again.
+        // Shift is tracked in the order of the key strokes: it may be pressed and released within one slow frame.
         if SHIFTS.contains(&key.key_code) {
             *shift = pressed;
         }
@@ -94,20 +94,20 @@ pub fn obey(
             continue;
         }
         if panel.open
-            && let Some(turn) = controls::turn(&key.logical_key, *shift, key.repeat)
+            && let Some(input) = controls::panel_input(&key.logical_key, *shift, key.repeat)
         {
-            if let Some(text) = panel.turn(turn) {
-                write(&text, &mut session);
+            if let Some(text) = panel.handle(input) {
+                print(&text, &mut session);
             }
             continue;
         }
         let Some(command) = controls::command(key.key_code, &key.logical_key, *shift, key.repeat) else { continue };
         match command {
-            Command::Leave if caught(&cursor) => set_caught(&mut cursor, false),
+            Command::Leave if captured(&cursor) => set_captured(&mut cursor, false),
             Command::Leave if panel.open => panel.open = false,
             Command::Light => {
                 if !panel.toggle() {
-                    session.say("this scene has no species whose light could be turned".to_owned());
+                    session.show_message("this scene has no species whose lighting can be adjusted".to_owned());
                 }
             }
             Command::Leave => {
@@ -116,16 +116,16 @@ pub fn obey(
             _ => session.carry_out(command),
         }
     }
-    // A window that lost the focus hears of no release.
+    // A window that lost the focus gets no release events.
     *shift = held.any_pressed(SHIFTS);
 }
 
-/// Writes a text for the user to take.
-fn write(text: &str, session: &mut Session) {
+/// Prints a text for the user to copy.
+fn print(text: &str, session: &mut Session) {
     let mut out = std::io::stdout();
-    session.say(match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Ok(()) => "written into the terminal".to_owned(),
-        Err(error) => format!("the terminal cannot be written to: {error}"),
+    session.show_message(match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Ok(()) => "printed in the terminal".to_owned(),
+        Err(error) => format!("cannot print in the terminal: {error}"),
     });
 }
 
@@ -140,19 +140,19 @@ pub fn fly(
     mut session: ResMut<Session>,
 ) {
     let seconds = time.delta_secs_f64();
-    let mouse = if caught(&cursor) { motion.delta.as_dvec2() } else { glam::DVec2::ZERO };
+    let mouse = if captured(&cursor) { motion.delta.as_dvec2() } else { glam::DVec2::ZERO };
     let notches = match wheel.unit {
         MouseScrollUnit::Line => f64::from(wheel.delta.y),
-        MouseScrollUnit::Pixel => f64::from(wheel.delta.y) / PIXELS_A_NOTCH,
+        MouseScrollUnit::Pixel => f64::from(wheel.delta.y) / PIXELS_PER_NOTCH,
     };
     // A key that was pressed and released between two slow frames still counts.
     let pressed = |key| keys.pressed(key) || keys.just_pressed(key);
-    let held = |key| pressed(key) && !(panel.open && controls::turns_view(key));
+    let held = |key| pressed(key) && !(panel.open && controls::rotates_view(key));
     let controls = controls::controls(held, mouse, notches, seconds);
     session.fly(&controls, seconds);
 }
 
-/// Brings camera, light and options in step with the flight; what stays the same is not touched.
+/// Updates camera, light and options from the flight. Unchanged values are not touched, so change detection works.
 pub fn follow(
     session: Res<Session>,
     mut origin: ResMut<CanopyOrigin>,
@@ -160,10 +160,10 @@ pub fn follow(
     mut sun: Single<&mut Sun>,
 ) {
     let (mut transform, mut options) = camera.into_inner();
-    let (place, moved) = camera::place(&session.view());
-    origin.set_if_neq(place);
-    transform.set_if_neq(moved);
+    let (new_origin, new_transform) = camera::origin_and_transform(&session.view());
+    origin.set_if_neq(new_origin);
+    transform.set_if_neq(new_transform);
     options.set_if_neq(ViewOptions { tint_levels: session.tinted });
-    // How often the light follows is the sun's own affair.
+    // The sun's refresh policy decides how often the light is computed again.
     sun.set_if_neq(session.stage.sun(session.clock.now().to_utc()));
 }

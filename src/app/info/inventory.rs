@@ -1,4 +1,4 @@
-//! Inventories: the columns, and what stands in them.
+//! Inventories: the columns and their contents.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -23,7 +23,7 @@ pub(super) fn describe_file(page: &mut Page, path: &Path) -> Result<(), AppError
     page.title(format!("{name}: an inventory of {} trees", grouped(inventory.rows.len())));
     page.inset(|page| {
         for column in columns {
-            let meaning = column.meaning.unwrap_or_else(|| "ignored: no name that is known here".to_owned());
+            let meaning = column.meaning.unwrap_or_else(|| "ignored: unknown column name".to_owned());
             page.row("column", format!("{}: {meaning}", column.name));
         }
         describe(page, &inventory);
@@ -31,7 +31,7 @@ pub(super) fn describe_file(page: &mut Page, path: &Path) -> Result<(), AppError
     Ok(())
 }
 
-/// What stands in the rows.
+/// The contents of the rows.
 pub(super) fn describe(page: &mut Page, inventory: &Inventory) {
     let rows = &inventory.rows;
     if rows.is_empty() {
@@ -84,7 +84,7 @@ fn known(page: &mut Page, label: &str, unit: &str, values: impl Iterator<Item = 
         (low, high, sum, count) = (low.min(value), high.max(value), sum + value, count + 1);
     }
     if count == 0 {
-        page.row(label, "not known of any tree");
+        page.row(label, "unknown for all trees");
     } else {
         let whole = if count == rows { "all".to_owned() } else { format!("{} of {}", grouped(count), grouped(rows)) };
         page.row(label, format!("of {whole}: {low:.1} to {high:.1} {unit}, mean {:.1} {unit}", sum / count as f64));
@@ -98,7 +98,7 @@ fn species(page: &mut Page, inventory: &Inventory) {
     }
     let nameless = counts.remove("").unwrap_or(0);
     if counts.is_empty() {
-        page.row("species", "not known of any tree");
+        page.row("species", "unknown for all trees");
         return;
     }
     let mut ranked: Vec<(&str, usize)> = counts.into_iter().collect();

@@ -42,7 +42,7 @@ pub(super) fn describe(page: &mut Page, plant: &Plant, warnings: &[Warning]) {
                 length(f64::from(z))
             ),
         ),
-        None => page.row("extent", "none: there is no vertex"),
+        None => page.row("extent", "none: the plant has no vertices"),
     }
     for part in &report.parts {
         let kind = match part.kind {

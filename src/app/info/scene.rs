@@ -109,7 +109,7 @@ impl Progress for Heard {
 fn describe_ground(page: &mut Page, scene: &Scene, ground: &Terrain) {
     let source = match &scene.terrain {
         scene::Ground::File(file) => format!("the file {}", file.path.display()),
-        scene::Ground::Image(image) => format!("the picture {}", image.path.display()),
+        scene::Ground::Image(image) => format!("the image {}", image.path.display()),
         scene::Ground::Noise(noise) => format!("noise of seed {}", noise.seed),
         scene::Ground::Flat(_) => "a plane".to_owned(),
     };
@@ -167,7 +167,7 @@ fn describe_trees(
         Trees::Scattered(rules) => page.row(
             "trees",
             format!(
-                "{} scattered by {:?}: {} stems per hectare asked for, at least {} apart",
+                "{} scattered by {:?}: {} stems per hectare requested, at least {} apart",
                 grouped(stand.trees.len()),
                 rules.sequence,
                 rules.stems_per_hectare,
@@ -200,7 +200,7 @@ fn describe_place(page: &mut Page, scene: &Scene, observer: &Observer) -> Result
     page.row(
         "time",
         format!(
-            "{}: the sun stands {:.1}° above the horizon, bearing {:.1}°",
+            "{}: the sun is {:.1}° above the horizon, bearing {:.1}°",
             scene.place.time,
             sun.elevation.to_degrees(),
             sun.azimuth.to_degrees()
@@ -233,7 +233,7 @@ fn describe_quality(page: &mut Page, scene: &Scene) {
     page.row(
         "quality",
         format!(
-            "full models to {}, billboards from there to {}; {} cascades of {} texels to {}; {} samples a pixel",
+            "full models to {}, billboards from there to {}; {} cascades of {} texels to {}; {} samples per pixel",
             length(quality.near_distance + quality.fade_band),
             length(quality.view_distance),
             quality.cascades,

@@ -1,4 +1,4 @@
-//! Terrains: files as they are, and pictures of heights that lack their metres.
+//! Terrains: files with a scale, and height images without one.
 
 use std::path::Path;
 
@@ -46,11 +46,11 @@ pub(super) fn describe_image(page: &mut Page, path: &Path) -> Result<(), AppErro
     let field = terrain.field();
     let (low, high) = field.min_max();
     let grey = |share: f32| (f64::from(share) * 65535.0).round();
-    page.title(format!("{}: a picture of heights", path.display()));
+    page.title(format!("{}: a height image", path.display()));
     page.inset(|page| {
         page.row("samples", format!("{} x {}, 16-bit grey", field.columns(), field.rows()));
         page.row("greys", format!("{} to {} of 65535", grey(low), grey(high)));
-        page.row("system", "none: a picture says nothing about metres, nor where on earth it lies");
+        page.row("system", "none: an image contains neither a scale in metres nor a location on earth");
         page.row(
             "note",
             "state its scale in the scene: terrain: Image(path: \"...\", spacing: METRES BETWEEN PIXELS,\nlow: HEIGHT OF \
@@ -81,7 +81,7 @@ pub(super) fn describe(page: &mut Page, terrain: &Terrain) {
     page.row("slopes", format!("{mean:.1}° on average, {steepest:.1}° at most"));
     match terrain.reference() {
         Some(reference) => georeference(page, terrain, reference),
-        None => page.row("system", "metres from the centre, without a place on earth"),
+        None => page.row("system", "metres from the centre, without a location on earth"),
     }
 }
 

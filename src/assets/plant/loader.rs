@@ -1,4 +1,4 @@
-//! Reads plants through Bevy's asset sources, whatever they are: folders, archives, the executable itself.
+//! Loads plants through Bevy's asset sources: folders, archives, the executable itself.
 
 use std::{
     io,
@@ -26,9 +26,9 @@ use crate::{
 
 /// Loads [`PlantAsset`]s: glTF files (.glb, .gltf) and species files (.species.ron).
 ///
-/// A species file says itself how it is lit and how glossy it is; of [`PlantSettings`] the other values of the bake hold for
-/// it too. It is registered for the ending `species.ron` alone, as the ending `glb` belongs to Bevy's own loader; any file can
-/// be loaded as a [`PlantAsset`] by its type.
+/// A species file has its own lighting and gloss; the other bake values of [`PlantSettings`] apply to it too. The
+/// loader is registered only for the ending `species.ron`, because `glb` belongs to Bevy's own loader; any file can be
+/// loaded as a [`PlantAsset`] by its type.
 #[derive(Clone, Copy, Debug, Default, TypePath)]
 pub struct PlantLoader;
 
@@ -111,7 +111,7 @@ async fn species(
     Ok(Recipe::species(&species, individuals, settings))
 }
 
-/// The files that the glTF file `path` names. One that cannot be read is no error yet: it may be a texture.
+/// The files that the glTF file `path` names. An unreadable file is not an error yet: it may be a texture.
 async fn files_of(bytes: &[u8], path: &Path, context: &mut LoadContext<'_>) -> Result<ExternalFiles, StageError> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut files = ExternalFiles::new();

@@ -1,8 +1,8 @@
-//! Plants as Bevy assets: from a glTF file, from a species file, or made in code.
+//! Plants as Bevy assets: from a glTF file, from a species file, or built in code.
 //!
 //! ```text
 //!  oak.glb, oak.gltf + what it names --+
-//!  oak.species.ron + what it names ----+--> PlantLoader --> plants --> bakes (cached, beside the frames) --> PlantAsset
+//!  oak.species.ron + what it names ----+--> PlantLoader --> plants --> bakes (cached, in background)     --> PlantAsset
 //!  in code: Plant, GrowParameters -------------------------------> PlantAsset::bake, grown ------------------^
 //! ```
 
@@ -28,32 +28,33 @@ use crate::{
     },
 };
 
-/// The individuals of one plant or species, baked: what a [`Forest3d`](crate::components::Forest3d) is made of.
+/// The baked individuals of one plant or species, for a [`Forest3d`](crate::components::Forest3d).
 ///
-/// `assets.load::<PlantAsset>("oak.glb")` reads a glTF file as one individual, `"oak.species.ron"` a species, which is what
-/// stands in a scene file's list `species` ([`Species`](crate::scene::Species)), its paths relative to the file. The loader is
-/// chosen by the asset's type, so Bevy's own glTF loader keeps `oak.glb#Scene0`. How a glTF file is read and how a plant is
-/// baked is said by [`PlantSettings`]. A bake takes seconds the first time, beside the frames; then it comes from the user's
-/// cache. Files that a plant's file names are dependencies: when one changes and Bevy watches files, the plant is loaded again.
+/// `assets.load::<PlantAsset>("oak.glb")` reads a glTF file as one individual, `"oak.species.ron"` a species, which is
+/// an entry of a scene file's list `species` ([`Species`](crate::scene::Species)), its paths relative to the file. The
+/// loader is chosen by the asset's type, so Bevy's own glTF loader keeps `oak.glb#Scene0`. [`PlantSettings`] say how a
+/// glTF file is read and how a plant is baked. A bake takes seconds the first time, in the background; later it comes
+/// from the user's cache. Files that a plant's file names are dependencies: when one changes and Bevy watches files,
+/// the plant is reloaded.
 #[derive(Asset, TypePath, Clone, Debug)]
 pub struct PlantAsset {
     /// The plant's or the species' name, for messages and inventories.
     pub name: String,
-    /// The individuals; a copy of one is cheap. At least one, where a forest is to be made of it.
+    /// The individuals; cloning one is cheap. A forest needs at least one.
     pub individuals: Vec<BakedPlant>,
     /// How the sun lights full models.
     pub sun: SunLight,
     /// Where and how tall it grows.
     pub growth: Growth,
-    /// What its author ought to know though it can be drawn: a missing texture, a crown without a surface.
+    /// Problems that do not prevent it from being drawn: a missing texture, a crown without a surface.
     pub warnings: Vec<String>,
 }
 
 /// Where a plant grows, and how tall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Growth {
-    /// Range of heights in metres, lowest and highest, each 0.1 to 150. `None`: the individuals' own heights and 15 % more or
-    /// less.
+    /// Range of heights in metres, lowest and highest, each 0.1 to 150. `None`: the individuals' own heights and 15 %
+    /// more or less.
     pub heights: Option<(f64, f64)>,
     /// Range of ground heights in metres above the terrain's datum. `None`: everywhere.
     pub elevation: Option<(f64, f64)>,
@@ -93,7 +94,7 @@ pub struct PlantSettings {
     pub transmission: Option<Vec3>,
     /// The gloss of leaves.
     pub gloss: Gloss,
-    /// How it is baked, its light first of all.
+    /// How it is baked, above all its lighting.
     pub bake: BakeSettings,
     /// How the sun lights full models.
     pub sun: SunLight,
@@ -127,20 +128,20 @@ impl PlantSettings {
 }
 
 impl PlantAsset {
-    /// The address of the broadleaf that comes with the crate: `assets.load(PlantAsset::BROADLEAF)`.
+    /// Asset path of the built-in broadleaf: `assets.load(PlantAsset::BROADLEAF)`.
     pub const BROADLEAF: &'static str = "embedded://canopy/species/broadleaf.species.ron";
-    /// The address of the conifer that comes with the crate.
+    /// Asset path of the built-in conifer.
     pub const CONIFER: &'static str = "embedded://canopy/species/conifer.species.ron";
 
-    /// Bakes plants that a program has made itself; of `settings` the gloss, the bake and the sun count. Blocks for as long as
-    /// the bakes take, seconds each where the user's cache does not have them.
+    /// Bakes plants that were built in code; of `settings` only gloss, bake and sun are used. Blocks until the bakes
+    /// are done: seconds each if they are not in the user's cache.
     pub fn bake(name: impl Into<String>, plants: Vec<Plant>, settings: &PlantSettings) -> Self {
         let plants = plants.into_iter().map(|plant| (plant, Vec::new())).collect();
         Self::baked(name.into(), plants, settings, &|| true)
     }
 
-    /// Grows one individual for each of `seeds`, of at most `triangles` triangles, and bakes them as [`bake`](Self::bake)
-    /// does.
+    /// Grows one individual for each of `seeds`, of at most `triangles` triangles, and bakes them as
+    /// [`bake`](Self::bake) does.
     ///
     /// # Errors
     /// Those of [`grow`].
@@ -154,7 +155,7 @@ impl PlantAsset {
         Ok(Self::bake(parameters.name.clone(), plants, settings))
     }
 
-    /// Bakes `plants`, each with the warnings of its making, until nobody wants them any more: then some are missing.
+    /// Bakes `plants`, each with the warnings of its build. If the work is cancelled, some are missing.
     fn baked(
         name: String,
         plants: Vec<(Plant, Vec<String>)>,

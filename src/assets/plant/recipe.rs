@@ -1,4 +1,4 @@
-//! What a plant is made of, read and not yet made.
+//! The recipe of a plant: read, but not built yet.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use crate::{
     scene::{Lighting, Species},
 };
 
-/// A plant before it is made.
+/// A plant before it is built.
 #[derive(Debug)]
 pub struct Recipe {
     pub name: String,
@@ -23,13 +23,13 @@ pub struct Recipe {
     pub warnings: Vec<String>,
 }
 
-/// One individual before it is made.
+/// One individual before it is built.
 #[derive(Debug)]
 pub enum Individual {
     /// By rule.
     Grown {
         parameters: Box<GrowParameters>,
-        /// Where the rules come from, for messages.
+        /// The source of the rules, for messages.
         from: PathBuf,
         seed: u64,
         triangles: usize,
@@ -72,7 +72,7 @@ impl Recipe {
         }
     }
 
-    /// The plants of a species, `individuals`, whose own light and gloss take the place of those of `settings`.
+    /// The plants of a species, `individuals`, whose own lighting and gloss replace those of `settings`.
     pub fn species(species: &Species, individuals: Vec<Individual>, settings: &PlantSettings) -> Self {
         let mut settings = PlantSettings { gloss: species.gloss.in_range(), ..settings.clone() };
         if let Some(lighting) = &species.lighting {
@@ -94,7 +94,7 @@ impl Recipe {
         Self { name: species.name.clone(), individuals, settings, growth, warnings }
     }
 
-    /// Makes and bakes the plant.
+    /// Builds and bakes the plant.
     pub fn bake(self, wanted: &Wanted) -> Result<PlantAsset, StageError> {
         let plants = self.individuals.iter().map(Individual::make).collect::<Result<_, _>>()?;
         let mut asset = PlantAsset::baked(self.name, plants, &self.settings, &|| wanted.is_wanted());

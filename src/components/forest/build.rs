@@ -1,4 +1,4 @@
-//! From a component and loaded assets to what the renderer draws.
+//! Builds the renderer's forest from a component and loaded assets.
 
 use std::{collections::HashSet, sync::Arc};
 
@@ -15,9 +15,9 @@ use crate::{
     terrain::{HeightField, Surroundings, Terrain},
 };
 
-/// Width in metres of the level ground: far more than trees are drawn at.
+/// Width in metres of the level ground: far more than the distance to which trees are drawn.
 const LEVEL_WIDTH: f64 = 400_000.0;
-/// Share by which trees of a plant without a range of heights are lower or taller than it.
+/// Relative variation of the height for trees of a plant without a range of heights.
 const HEIGHT_VARIATION: f64 = 0.15;
 /// The range of heights that a scene allows, metres.
 const HEIGHTS: (f64, f64) = (0.1, 150.0);
@@ -31,18 +31,18 @@ pub struct Ingredients {
     pub terrain: Option<Arc<Terrain>>,
 }
 
-/// A forest, built.
+/// A built forest.
 pub struct Built {
     pub stand: Arc<PackedStand>,
     pub plants: Arc<Vec<BakedPlant>>,
     pub suns: Arc<[SunLight]>,
-    /// Share of the terrain under crowns; `None` on level ground, and without trees.
+    /// Canopy cover of the terrain; `None` on level ground, and without trees.
     pub cover: Option<Arc<CoverMap>>,
-    /// What the program's author ought to know.
+    /// Warnings for the program's author.
     pub warnings: Vec<String>,
 }
 
-/// Keeps the warnings of a build, and asks whether it is still wanted.
+/// Collects the warnings of a build, and cancels it when it is no longer needed.
 struct Listener<'a> {
     warnings: Vec<String>,
     wanted: &'a Wanted<'a>,
@@ -113,7 +113,7 @@ impl Ingredients {
         })
     }
 
-    /// The forest as a scene, whose rules for trees it shares.
+    /// The forest as a scene, so that both share the rules for trees.
     fn scene(&self) -> Scene {
         let trees = match self.forest.trees.clone() {
             ForestTrees::Scattered(mut rules) => {
@@ -123,7 +123,7 @@ impl Ingredients {
                 Trees::Scattered(rules)
             }
             ForestTrees::Inventory(mut inventory) => {
-                // Level ground has no corner to measure from.
+                // Level ground has no corner as a reference.
                 if self.terrain.is_none() && inventory.anchor == Anchor::SouthWest {
                     inventory.anchor = Anchor::TerrainCentre;
                 }
@@ -154,7 +154,7 @@ impl Ingredients {
                     elevation: asset.growth.elevation,
                     slope_limit: asset.growth.slope_limit,
                     trunk_radius: asset.growth.trunk_radius,
-                    // Only the plants' sizes count, which are known.
+                    // Only the sizes of the plants matter, and they are known.
                     ..Species::new(unique(name, &mut names), GrownPlants::default())
                 }
             })
@@ -162,7 +162,7 @@ impl Ingredients {
     }
 }
 
-/// `name`, or what comes next to it that is not among `names` yet: one plant may be two species of a forest.
+/// `name`, made unique among `names`: one plant may be two species of a forest.
 fn unique(name: &str, names: &mut HashSet<String>) -> String {
     let name = if name.trim().is_empty() { "plant" } else { name };
     let mut candidate = name.to_owned();
@@ -174,7 +174,7 @@ fn unique(name: &str, names: &mut HashSet<String>) -> String {
     candidate
 }
 
-/// The heights of a plant's individuals, and a little lower and taller.
+/// The range of heights of a plant's individuals, slightly widened.
 fn own_heights(asset: &PlantAsset) -> (f64, f64) {
     let heights = || asset.individuals.iter().map(|plant| f64::from(plant.size().height));
     let (low, high) = (heights().fold(f64::INFINITY, f64::min), heights().fold(0.0, f64::max));

@@ -1,4 +1,4 @@
-//! A forest as a component: what is planted where, of which plants.
+//! A forest as a component: its species, and where its trees stand.
 
 mod build;
 mod error;
@@ -42,25 +42,25 @@ pub const DEFAULT_WIDTH: f64 = 200.0;
 /// }
 /// ```
 ///
-/// Once all its plants and its terrain are loaded, the forest is built beside the frames; then the entity gets the renderer's
-/// [`Forest`](crate::render::components::Forest) and hears [`ForestReady`]. It is built anew when this component, an asset or
-/// its terrain changes; the forest before it is drawn until then, and stays if the new one cannot be built
-/// ([`ForestFailed`]).
+/// Once all its plants and its terrain are loaded, the forest is built in the background. Then the entity gets the
+/// renderer's [`Forest`](crate::render::components::Forest), and [`ForestReady`] is triggered on it. It is rebuilt when
+/// this component, an asset or its terrain changes. The previous forest is drawn until then, and stays if the new one
+/// cannot be built ([`ForestFailed`]).
 ///
-/// A forest on a terrain stands in the terrain's coordinates, metres from its centre. One without stands on level ground at
-/// the height and position of its own transform, whose rotation and scale do not count.
+/// A forest on a terrain uses the terrain's coordinates, metres from its centre. A forest without a terrain stands on
+/// level ground at the position and height of its own transform, whose rotation and scale have no effect.
 #[derive(Component, Clone, Debug, PartialEq, Reflect)]
 #[reflect(opaque, Component, Clone, Debug, Default, PartialEq)]
 #[require(Transform, Visibility, ForestSettings, ForestWork)]
 pub struct Forest3d {
     /// Where the trees stand.
     pub trees: ForestTrees,
-    /// What they are.
+    /// The species.
     pub species: Vec<ForestSpecies>,
     /// The [`Terrain3d`](super::Terrain3d) that they stand on; `None` is level ground.
     #[entities]
     pub ground: Option<Entity>,
-    /// Seed of everything that is drawn by lot: positions, species, rotation, size and tint.
+    /// Seed of everything random: positions, species, rotation, size and tint.
     pub seed: u64,
 }
 
@@ -69,7 +69,7 @@ pub struct Forest3d {
 pub enum ForestTrees {
     /// By rule.
     Scattered(ScatteredTrees),
-    /// As a CSV file lists them, which is read from the file system.
+    /// From an inventory: a CSV file, which is read from the file system.
     Inventory(InventoryTrees),
     /// At these positions, which are used as they are: no terrain lifts them. A tree's
     /// [`variant`](crate::scatter::Tree::variant) counts the individuals of all the forest's plants, in the order of
@@ -82,30 +82,30 @@ pub enum ForestTrees {
 pub struct ForestSpecies {
     /// Its plants.
     pub plant: Handle<PlantAsset>,
-    /// Share of the trees, relative to the other species that may grow at the same place, 0.000001 to 1000000.
+    /// Weight relative to the other species that may grow at the same position, 0.000001 to 1000000.
     pub weight: f64,
     /// Range of heights in metres; `None` takes the plant's own ([`Growth::heights`](crate::assets::Growth::heights)).
     pub heights: Option<(f64, f64)>,
-    /// The name by which an inventory calls it; `None` takes the plant's own.
+    /// Its name in an inventory; `None` takes the plant's own.
     pub name: Option<String>,
 }
 
 impl ForestSpecies {
-    /// `plant` with this weight; all else as the plant says.
+    /// `plant` with this weight; everything else from the plant.
     pub fn new(plant: Handle<PlantAsset>, weight: f64) -> Self {
         Self { plant, weight, heights: None, name: None }
     }
 }
 
 impl Default for Forest3d {
-    /// 300 stems a hectare, of no species yet.
+    /// 300 stems per hectare, without species yet.
     fn default() -> Self {
         Self { trees: ForestTrees::Scattered(ScatteredTrees::default()), species: Vec::new(), ground: None, seed: 1 }
     }
 }
 
 impl Forest3d {
-    /// Trees by rule, so many on a hectare of ground where trees stand, 0.01 to 100000.
+    /// Trees by rule, with this number of stems per hectare of wooded ground, 0.01 to 100000.
     pub fn scatter(stems_per_hectare: f64) -> Self {
         Self::scattered(ScatteredTrees { stems_per_hectare, ..ScatteredTrees::default() })
     }
@@ -120,7 +120,7 @@ impl Forest3d {
         Self { trees: ForestTrees::Inventory(inventory), ..Self::default() }
     }
 
-    /// Trees at positions of the program's own.
+    /// Trees at given positions.
     pub fn of_trees(trees: Vec<Tree>) -> Self {
         Self { trees: ForestTrees::Given(trees), ..Self::default() }
     }
@@ -132,7 +132,7 @@ impl Forest3d {
         self
     }
 
-    /// With trees of this plant, of this weight beside the other species.
+    /// Adds a species of this plant, with this weight relative to the other species.
     #[must_use]
     pub fn of(self, plant: Handle<PlantAsset>, weight: f64) -> Self {
         self.with(ForestSpecies::new(plant, weight))
@@ -152,7 +152,7 @@ impl Forest3d {
         self
     }
 
-    /// In this rectangle; of trees by rule.
+    /// Restricts the trees to this rectangle; for trees by rule.
     #[must_use]
     pub fn area(mut self, area: Area) -> Self {
         if let ForestTrees::Scattered(rules) = &mut self.trees {
@@ -161,7 +161,7 @@ impl Forest3d {
         self
     }
 
-    /// No two trees nearer to each other than this, in metres; of trees by rule.
+    /// Minimum distance between two trees in metres; for trees by rule.
     #[must_use]
     pub fn min_distance(mut self, metres: f64) -> Self {
         if let ForestTrees::Scattered(rules) = &mut self.trees {
@@ -170,7 +170,7 @@ impl Forest3d {
         self
     }
 
-    /// With clearings; of trees by rule.
+    /// Adds clearings; for trees by rule.
     #[must_use]
     pub fn clearings(mut self, clearings: ClearingNoise) -> Self {
         if let ForestTrees::Scattered(rules) = &mut self.trees {
@@ -190,7 +190,7 @@ impl Forest3d {
     }
 }
 
-/// How a forest is drawn. A change takes effect at once and builds nothing anew.
+/// How a forest is drawn. A change takes effect at once, without a rebuild.
 #[derive(Component, Clone, Debug, PartialEq, Reflect)]
 #[reflect(opaque, Component, Clone, Debug, Default, PartialEq)]
 pub struct ForestSettings {
@@ -201,7 +201,7 @@ pub struct ForestSettings {
 }
 
 impl Default for ForestSettings {
-    /// As a scene file without `quality` has it.
+    /// The settings of a scene file without `quality`.
     fn default() -> Self {
         let quality = Quality::default();
         Self {
@@ -211,7 +211,7 @@ impl Default for ForestSettings {
     }
 }
 
-/// A [`Forest3d`] is built, or built anew, and drawn from this frame on. Its entity's observers hear it.
+/// A [`Forest3d`] is built, or rebuilt, and drawn from this frame on. Triggered on its entity.
 #[derive(EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ForestReady {
     /// The forest.
@@ -220,7 +220,7 @@ pub struct ForestReady {
     pub trees: usize,
 }
 
-/// A [`Forest3d`] cannot be built, or not anew; what is drawn stays. Its entity's observers hear it, and the log has it.
+/// A [`Forest3d`] cannot be built or rebuilt; the previous one stays. Triggered on its entity, and logged.
 #[derive(EntityEvent, Debug)]
 pub struct ForestFailed {
     /// The forest.

@@ -1,4 +1,4 @@
-//! Follows the forests of a world: builds what is new or has changed, beside the frames.
+//! Builds new and changed forests of a world in the background.
 
 use std::collections::HashSet;
 
@@ -34,13 +34,13 @@ use crate::{
     render::components::Forest,
 };
 
-/// What is under way for a forest.
+/// The state of a forest's build.
 #[derive(Component, Default)]
 pub struct ForestWork {
-    /// What was asked for is not being built yet: something is still missing.
+    /// The build has not started yet: something is still missing.
     waits: bool,
     job: Option<Job>,
-    /// Why it could not be built the last time: what is known is not said again.
+    /// Why the last build failed: the same error is not logged again.
     failure: Option<String>,
 }
 
@@ -100,7 +100,7 @@ pub struct Sources<'w, 's> {
 }
 
 impl Sources<'_, '_> {
-    /// Why an asset cannot be loaded, where it cannot.
+    /// Why an asset cannot be loaded, if it failed.
     fn failure(&self, id: impl Into<UntypedAssetId>) -> Option<String> {
         match self.server.as_ref()?.get_load_state(id)? {
             LoadState::Failed(error) => Some(load_error(&error)),
@@ -115,7 +115,7 @@ impl Sources<'_, '_> {
         }
         let ground = forest.ground.map(|ground| self.terrains.get(ground).map_err(|_| ForestError::NoTerrain(ground)));
         let ground = ground.transpose()?.map(|(_, terrain, _)| terrain.0.id());
-        // What has failed is said at once, whatever else is still on its way.
+        // Report a failure at once, whatever else is still being loaded.
         if let Some(error) = forest.species.iter().find_map(|species| self.failure(species.plant.id())) {
             return Err(ForestError::Plant(error));
         }
@@ -133,7 +133,7 @@ impl Sources<'_, '_> {
     }
 }
 
-/// Builds forests and gives their entities what the renderer draws.
+/// Builds forests and inserts the renderer's components on their entities.
 pub fn tend_forests(
     mut commands: Commands,
     mut forests: Query<(Entity, Ref<Forest3d>, Ref<ForestSettings>, &mut ForestWork, Option<&mut Forest>)>,
@@ -180,7 +180,7 @@ pub fn tend_forests(
             }
         }
         if let Some(mut shown) = shown {
-            // Each of these marks the forest as changed, so only where it is.
+            // Each assignment marks the forest as changed, so only assign real changes.
             if shown.origin != place {
                 shown.origin = place;
             }

@@ -1,114 +1,129 @@
-//! A scene built beside the program, on threads of its own.
+//! Builds a scene in the background, on threads of its own.
 //!
-//! Not on Bevy's task pools, whose threads a bake would hold for seconds, and not in rayon's global pool, in which the
-//! frames' own work (the sky's tables, the tiles) would queue up behind it.
+//! Bevy's task pools are not used: a bake would block their threads for seconds. Neither is rayon's global pool: the
+//! frames' own work (the sky's tables, the tiles) would queue up behind the bake.
 
 use std::{
     any::Any,
-    mem,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+        mpsc::{Receiver, Sender, channel},
+    },
     thread::{self, JoinHandle},
 };
 
 use bevy::ecs::component::Component;
 
-use super::{CanopyScene, progress::Said};
+use super::{CanopyScene, progress::BuildEvent};
 use crate::{
     assets::{Stage, StageError, threads::spare_cores},
     progress::Progress,
 };
 
-/// What was said and nobody has heard yet.
-type Line = Arc<Mutex<Vec<Said>>>;
-
-/// A scene that is being built. Dropped, it is given up: the threads end after the plants that they are at, and nobody
-/// waits for them.
+/// A scene that is being built. Dropping it cancels the build without waiting: the threads end after their current
+/// plants.
 #[derive(Component)]
 pub struct Job {
-    line: Line,
-    /// Until its end was taken.
+    /// Events that were not read yet. The mutex only makes the receiver `Sync`; nobody locks it.
+    events: Mutex<Receiver<BuildEvent>>,
+    /// Set when the job is dropped.
+    cancelled: Arc<AtomicBool>,
+    /// `None` once its result was taken.
     thread: Option<JoinHandle<Result<Stage, StageError>>>,
 }
 
 impl Job {
-    /// Begins.
+    /// Starts to build the scene of `request`.
     ///
     /// # Errors
-    /// [`StageError::Background`] where the system has no thread for it.
+    /// [`StageError::Background`] if the system cannot create a thread.
     pub fn start(request: &CanopyScene) -> Result<Self, StageError> {
-        let line = Line::default();
-        let mut speaker = Speaker(line.clone());
+        let (sender, events) = channel();
+        let cancelled = Arc::<AtomicBool>::default();
+        let mut reporter = Reporter { events: sender, cancelled: cancelled.clone() };
         let CanopyScene { source, overrides } = request.clone();
         let work = move || {
             let name = |index| format!("canopy bake {index}");
             let pool = rayon::ThreadPoolBuilder::new().num_threads(spare_cores()).thread_name(name).build();
-            let pool = pool.map_err(|error| StageError::Background(format!("no threads for bakes: {error}")))?;
-            pool.install(|| Stage::build(&overrides.applied(source.read()?), &mut speaker))
+            let pool =
+                pool.map_err(|error| StageError::Background(format!("cannot create threads for bakes: {error}")))?;
+            pool.install(|| Stage::build(&overrides.applied(source.read()?), &mut reporter))
         };
         let thread = thread::Builder::new().name("canopy scene".to_owned()).spawn(work);
-        let thread = thread.map_err(|error| StageError::Background(format!("no thread: {error}")))?;
-        Ok(Self { line, thread: Some(thread) })
+        let thread = thread.map_err(|error| StageError::Background(format!("cannot create a thread: {error}")))?;
+        Ok(Self { events: Mutex::new(events), cancelled, thread: Some(thread) })
     }
 
-    /// Whether [`finish`](Self::finish) has not to wait.
+    /// Whether [`finish`](Self::finish) returns at once.
     pub fn is_finished(&self) -> bool {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
-    /// What was said since the last call.
-    pub fn said(&self) -> Vec<Said> {
-        mem::take(&mut *self.line.lock().unwrap_or_else(PoisonError::into_inner))
+    /// The events since the last call.
+    pub fn events(&mut self) -> Vec<BuildEvent> {
+        self.events.get_mut().unwrap_or_else(PoisonError::into_inner).try_iter().collect()
     }
 
-    /// What came of it.
+    /// The result of the build. Waits for the thread.
     ///
     /// # Errors
-    /// Those of [`Stage::build`]; [`StageError::Background`] where the thread broke off.
+    /// Those of [`Stage::build`]; [`StageError::Background`] if the thread panicked; [`StageError::Cancelled`] if the
+    /// result was taken before.
     pub fn finish(&mut self) -> Result<Stage, StageError> {
         let Some(thread) = self.thread.take() else { return Err(StageError::Cancelled) };
-        thread.join().unwrap_or_else(|panic| Err(StageError::Background(broken_off(&*panic))))
+        thread.join().unwrap_or_else(|panic| Err(StageError::Background(panic_message(&*panic))))
     }
 }
 
-fn broken_off(panic: &(dyn Any + Send)) -> String {
+impl Drop for Job {
+    fn drop(&mut self) {
+        self.cancelled.store(true, Ordering::Relaxed);
+    }
+}
+
+fn panic_message(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().copied();
     let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
     format!("an error in the program: {}", text.unwrap_or("(see above)"))
 }
 
-/// The builder's end of the line.
-struct Speaker(Line);
+/// Reports the progress of the build to its [`Job`].
+struct Reporter {
+    events: Sender<BuildEvent>,
+    cancelled: Arc<AtomicBool>,
+}
 
-impl Speaker {
-    fn say(&self, said: Said) {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(said);
+impl Reporter {
+    fn report(&self, event: BuildEvent) {
+        // The send fails only when the job was dropped: nobody needs the event then.
+        let _ = self.events.send(event);
     }
 }
 
-impl Progress for Speaker {
+impl Progress for Reporter {
     fn begin(&mut self, what: &str, steps: u64) {
-        self.say(Said::Begin(what.to_owned(), steps));
+        self.report(BuildEvent::Begin(what.to_owned(), steps));
     }
 
     fn advance(&mut self, steps: u64) {
-        self.say(Said::Advance(steps));
+        self.report(BuildEvent::Advance(steps));
     }
 
     fn end(&mut self) {
-        self.say(Said::End);
+        self.report(BuildEvent::End);
     }
 
     fn warn(&mut self, message: &str) {
-        self.say(Said::Warning(message.to_owned()));
+        self.report(BuildEvent::Warning(message.to_owned()));
     }
 
     fn note(&mut self, message: &str) {
-        self.say(Said::Note(message.to_owned()));
+        self.report(BuildEvent::Note(message.to_owned()));
     }
 
-    /// Nobody is at the other end any more.
     fn is_cancelled(&self) -> bool {
-        Arc::strong_count(&self.0) == 1
+        self.cancelled.load(Ordering::Relaxed)
     }
 }
 
@@ -129,39 +144,39 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_is_given_up_when_nobody_listens() -> Result<(), Box<dyn std::error::Error>> {
-        let Job { line, thread: Some(thread) } = Job::start(&many())? else {
-            return Err("no thread".into());
-        };
-        let at_plants = |line: &Line| {
-            let said = line.lock().unwrap_or_else(PoisonError::into_inner);
-            said.iter().any(|said| matches!(said, Said::Begin(step, _) if step == "Plants"))
-        };
-        while !at_plants(&line) && !thread.is_finished() {
+    fn a_build_is_cancelled_when_its_job_is_dropped() -> Result<(), Box<dyn std::error::Error>> {
+        let mut job = Job::start(&many())?;
+        let thread = job.thread.take().ok_or("no thread")?;
+        let at_plants = |event: &BuildEvent| matches!(event, BuildEvent::Begin(step, _) if step == "Plants");
+        while !job.events().iter().any(at_plants) && !thread.is_finished() {
             thread::yield_now();
         }
-        drop(line);
+        drop(job);
         let outcome = thread.join().map_err(|_| "a panic")?;
         assert!(matches!(outcome, Err(StageError::Cancelled)), "{:?}", outcome.err());
         Ok(())
     }
 
     #[test]
-    fn a_job_that_is_dropped_waits_for_nobody() -> Result<(), Box<dyn std::error::Error>> {
-        let job = Job::start(&many())?;
-        // While the line is held its thread cannot end, for it has something to say first.
-        let line = job.line.clone();
-        let held = line.lock().unwrap_or_else(PoisonError::into_inner);
-        drop(job);
-        assert_eq!(Arc::strong_count(&line), 2, "the thread is still at it");
-        drop(held);
+    fn dropping_a_job_does_not_wait_for_its_thread() -> Result<(), Box<dyn std::error::Error>> {
+        let (release, released) = channel::<()>();
+        let thread = thread::spawn(move || {
+            released.recv().ok();
+            Err(StageError::Cancelled)
+        });
+        let (_, events) = channel();
+        let cancelled = Arc::<AtomicBool>::default();
+        drop(Job { events: Mutex::new(events), cancelled: cancelled.clone(), thread: Some(thread) });
+        assert!(cancelled.load(Ordering::Relaxed));
+        // The receiver still exists, so the thread still runs.
+        release.send(())?;
         Ok(())
     }
 
     #[test]
-    fn what_broke_off_says_why() {
-        assert_eq!(broken_off(&"index out of bounds"), "an error in the program: index out of bounds");
-        assert_eq!(broken_off(&String::from("x")), "an error in the program: x");
-        assert_eq!(broken_off(&1), "an error in the program: (see above)");
+    fn a_panic_becomes_a_message() {
+        assert_eq!(panic_message(&"index out of bounds"), "an error in the program: index out of bounds");
+        assert_eq!(panic_message(&String::from("x")), "an error in the program: x");
+        assert_eq!(panic_message(&1), "an error in the program: (see above)");
     }
 }

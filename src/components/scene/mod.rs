@@ -1,8 +1,9 @@
-//! Scenes in a Bevy program: built beside it with progress, shown as children of their entity when they are ready.
+//! Scenes in a Bevy program: built in the background, shown as children of their entity when they are ready.
 //!
-//! The bakes run in parallel on threads of their own, all cores but one, and come from the cache where it has them. Until a
-//! scene is ready a frame pays for a look at a list; then for uploading the scene. A program that closes meanwhile does not
-//! wait: what is under way is given up, and as the cache's files appear whole or not at all, nothing half stays in it.
+//! The bakes run in parallel on threads of their own, on all cores but one; bakes that are in the cache are loaded from
+//! it. Until a scene is ready, a frame only reads a list of events; then it uploads the scene. A program that closes
+//! meanwhile does not wait: the build is cancelled. The cache stays valid, because its files appear whole or not at
+//! all.
 
 mod job;
 mod progress;
@@ -36,44 +37,46 @@ use crate::{
     scene::{Overrides, SceneSource},
 };
 use job::Job;
-use progress::Said;
+use progress::BuildEvent;
 pub use progress::{SceneProgress, SceneState};
 
-/// A scene on an entity: a file ([scene files](crate::scene)), or a [`Scene`](crate::scene::Scene) that was made in code.
+/// A scene on an entity: a file ([scene files](crate::scene)), or a [`Scene`](crate::scene::Scene) that was built in
+/// code.
 ///
-/// It is built beside the program. When it is ready, its ground, its forest and, where the world has no [`Sun`] yet, its sun
-/// become children of the entity, which gets a [`LoadedScene`], and [`SceneReady`] is triggered on it; [`SceneFailed`]
-/// where it cannot be shown, and the program goes on as it was. The log has both. [`SceneProgress`] says how far it is.
+/// It is built in the background. When it is ready, its ground, its forest and, if the world has no [`Sun`] yet, its
+/// sun become children of the entity; the entity gets a [`LoadedScene`], and [`SceneReady`] is triggered on it. If the
+/// scene cannot be shown, [`SceneFailed`] is triggered and the program continues unchanged. Both are logged.
+/// [`SceneProgress`] has the progress.
 ///
-/// Another value on the same entity replaces what is shown when it is ready, not before. The entity's transform and
-/// visibility act on all of the scene. Several scenes can be in a world, of which one ground at a time is drawn.
+/// A new value on the same entity replaces the scene once the new one is ready, not before. The entity's transform and
+/// visibility apply to the whole scene. A world can hold several scenes; only one ground is drawn at a time.
 #[derive(Component, Clone, Debug, Default, PartialEq)]
 #[require(Transform, Visibility, SceneProgress)]
 pub struct CanopyScene {
     /// The scene: a file, or a value.
     pub source: SceneSource,
-    /// What replaces values in it.
+    /// Values that replace those of the scene.
     pub overrides: Overrides,
 }
 
 impl CanopyScene {
-    /// `source`, a file or a [`Scene`](crate::scene::Scene), as it is.
+    /// The scene of `source`, a file or a [`Scene`](crate::scene::Scene), without overrides.
     pub fn new(source: impl Into<SceneSource>) -> Self {
         Self { source: source.into(), overrides: Overrides::default() }
     }
 }
 
-/// A scene is in the world, from this very frame on. Triggered on its entity.
+/// A scene is in the world, from this frame on. Triggered on its entity.
 #[derive(EntityEvent, Clone)]
 pub struct SceneReady {
     /// The entity of the [`CanopyScene`].
     pub entity: Entity,
-    /// What it is made of.
+    /// The built scene.
     pub stage: Arc<Stage>,
 }
 
-/// A scene cannot be shown. Triggered on its entity. [`Display`](fmt::Display) has the whole message: what is wrong, where, and
-/// the remedy.
+/// A scene cannot be shown. Triggered on its entity. [`Display`](fmt::Display) gives the whole message: what is wrong,
+/// where, and the remedy.
 #[derive(EntityEvent, Debug)]
 pub struct SceneFailed {
     /// The entity of the [`CanopyScene`].
@@ -88,10 +91,10 @@ impl fmt::Display for SceneFailed {
     }
 }
 
-/// The scene that an entity shows, beside its [`CanopyScene`] from when it is ready.
+/// The scene that an entity shows. Added next to its [`CanopyScene`] when the scene is ready.
 #[derive(Component, Clone)]
 pub struct LoadedScene {
-    /// What it is made of.
+    /// The built scene.
     pub stage: Arc<Stage>,
     /// Its entities, children of this one.
     pub shown: Shown,
@@ -102,14 +105,14 @@ pub struct LoadedScene {
 pub struct Shown {
     /// Its ground.
     pub ground: Entity,
-    /// Its forest, where it has trees.
+    /// Its forest, if it has trees.
     pub forest: Option<Entity>,
-    /// Its sun, where the world had none.
+    /// Its sun, if the world had none.
     pub sun: Option<Entity>,
 }
 
 impl Shown {
-    /// Takes them out of the world, those that are still there.
+    /// Removes those entities that still exist from the world.
     pub fn despawn(self, commands: &mut Commands) {
         for entity in self.sun.into_iter().chain(self.forest).chain([self.ground]) {
             commands.entity(entity).try_despawn();
@@ -118,7 +121,7 @@ impl Shown {
 }
 
 impl Stage {
-    /// Puts ground and forest into a world. The sun is another matter, as a world has one: see [`sun`](Self::sun).
+    /// Spawns the ground and the forest. A world has only one sun, so that is separate: see [`sun`](Self::sun).
     pub fn show(&self, commands: &mut Commands) -> Shown {
         Shown {
             ground: commands.spawn(self.ground()).id(),
@@ -127,7 +130,7 @@ impl Stage {
         }
     }
 
-    /// Sun, moon and air at an instant. [`shadow`](Self::shadow) belongs beside it.
+    /// Sun, moon and air at an instant. Spawn it together with [`shadow`](Self::shadow).
     pub fn sun(&self, instant: chrono::DateTime<chrono::Utc>) -> Sun {
         Sun {
             observer: self.observer,
@@ -146,15 +149,15 @@ impl Plugin for ScenePlugin {
     fn build(&self, app: &mut App) {
         app.register_type::<SceneProgress>()
             .add_systems(First, (begin, follow).chain().in_set(CanopySystems::Load))
-            .add_observer(give_up);
+            .add_observer(remove_scene);
     }
 }
 
-/// Begins to build the scenes that are new or have changed.
+/// Starts to build the scenes that are new or have changed.
 fn begin(mut commands: Commands, scenes: Query<(Entity, Ref<CanopyScene>, Has<Job>), Changed<CanopyScene>>) {
     for (entity, scene, building) in &scenes {
         if building && !scene.is_added() {
-            info!("another scene is given up for {}", scene.source);
+            info!("the build of another scene is cancelled in favour of {}", scene.source);
         }
         let mut entity_commands = commands.entity(entity);
         entity_commands.remove::<Job>();
@@ -171,7 +174,7 @@ fn begin(mut commands: Commands, scenes: Query<(Entity, Ref<CanopyScene>, Has<Jo
     }
 }
 
-/// Takes in how far the scenes are, and shows those that are ready.
+/// Updates the progress of the scenes, and shows those that are ready.
 fn follow(
     mut commands: Commands,
     mut scenes: Query<(Entity, &CanopyScene, &mut Job, &mut SceneProgress, Option<&LoadedScene>)>,
@@ -181,15 +184,16 @@ fn follow(
     // Two scenes may become ready in the same frame.
     let mut lit = false;
     for (entity, scene, mut job, mut progress, loaded) in &mut scenes {
-        // The builder says its last before it ends, so nothing is lost if its end is asked for first.
+        // Check for the end before reading the events: the build reports its last event before it ends, so none is
+        // lost.
         let finished = job.is_finished();
-        for said in job.said() {
-            match &said {
-                Said::Note(note) => info!("{}: {note}", scene.source),
-                Said::Warning(warning) => warn!("{}: {warning}", scene.source),
-                Said::Begin(..) | Said::Advance(_) | Said::End => {}
+        for event in job.events() {
+            match &event {
+                BuildEvent::Note(note) => info!("{}: {note}", scene.source),
+                BuildEvent::Warning(warning) => warn!("{}: {warning}", scene.source),
+                BuildEvent::Begin(..) | BuildEvent::Advance(_) | BuildEvent::End => {}
             }
-            progress.hear(said);
+            progress.apply(event);
         }
         if !finished {
             continue;
@@ -227,8 +231,8 @@ fn follow(
     }
 }
 
-/// A scene that is taken from its entity is built no further, and shown no more.
-fn give_up(removed: On<Remove, CanopyScene>, loaded: Query<&LoadedScene>, mut commands: Commands) {
+/// Cancels and removes a scene whose component was removed.
+fn remove_scene(removed: On<Remove, CanopyScene>, loaded: Query<&LoadedScene>, mut commands: Commands) {
     let entity = removed.entity;
     if let Ok(loaded) = loaded.get(entity) {
         loaded.shown.despawn(&mut commands);

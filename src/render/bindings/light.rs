@@ -1,11 +1,11 @@
-//! The light of the moment, as the shaders read it.
+//! The current light, as the shaders read it.
 
 use glam::{Mat3, Vec3};
 
 use super::uniforms::LightUniform;
 use crate::light::{LightState, sh::cosine_coefficient, sun::SUN_ANGULAR_RADIUS};
 
-/// The largest value that is handed to a half-float target.
+/// The largest value that is written to a half-float target.
 const BRIGHTEST: f32 = 6.0e4;
 
 /// Packs `light`, premultiplied by `exposure` (radiance to display values).
@@ -16,7 +16,7 @@ pub fn light_uniform(light: &LightState, exposure: f32) -> LightUniform {
     let mut sky = [[0.0; 4]; 9];
     for (index, (slot, coefficient)) in sky.iter_mut().zip(&light.sky_sh).enumerate() {
         let band = index.isqrt();
-        // Irradiance over pi: what a white Lambertian surface sends back.
+        // Irradiance over pi: what a white Lambertian surface reflects.
         let irradiance = *coefficient * (cosine_coefficient(band) / std::f32::consts::PI * exposure);
         *slot = irradiance.min(Vec3::splat(f32::MAX)).extend(0.0).to_array();
     }

@@ -1,8 +1,8 @@
 //! Bind group 0, which all passes of a view share: frame, light, shadow, and the textures that passes read from each
 //! other.
 //!
-//! The group imports no pass. A pass that has something for the others writes it into [`SharedTextures`] or
-//! [`SharedPlacement`] while resources are prepared; until then the group has a single texel there.
+//! This module imports no pass. A pass that produces something for others writes it into [`SharedTextures`] or
+//! [`SharedPlacement`] while resources are prepared; until then the group binds a single texel there.
 
 mod light;
 pub mod uniforms;
@@ -59,7 +59,7 @@ pub fn frame_layout() -> BindGroupLayoutDescriptor {
     )
 }
 
-/// Group 0 of what casts into a shadow map: the cascade, with a dynamic offset.
+/// Group 0 of the casters of a shadow map: the cascade, with a dynamic offset.
 pub fn caster_layout() -> BindGroupLayoutDescriptor {
     BindGroupLayoutDescriptor::new(
         "canopy_cascade",
@@ -70,12 +70,12 @@ pub fn caster_layout() -> BindGroupLayoutDescriptor {
     )
 }
 
-/// The textures of group 0, each written by the pass that makes it.
+/// The textures of group 0, each written by the pass that computes it.
 #[derive(Resource)]
 pub struct SharedTextures {
     /// Radiance of the sky.
     pub sky: TextureView,
-    /// Depth maps of the sun's shadow, one layer a cascade.
+    /// Depth maps of the sun's shadow, one layer per cascade.
     pub shadow_maps: TextureView,
     /// Terrain shadow and canopy cover, seen from above.
     pub ground: TextureView,
@@ -102,7 +102,7 @@ impl FromWorld for SharedTextures {
     }
 }
 
-/// Where the shared textures lie in the view of this frame, each written by the pass that makes the texture.
+/// Position of the shared textures in the view of this frame, each written by the pass that computes the texture.
 #[derive(Resource, Clone, Copy, Debug, Default)]
 pub struct SharedPlacement {
     /// Cascades of the shadow maps, from the finest to the widest.
@@ -113,11 +113,11 @@ pub struct SharedPlacement {
     pub shadow_map_size: u32,
     /// Camera-relative origin (x, z) and inverse size of the ground texture.
     pub ground: [f32; 4],
-    /// Mean share of ground under crowns where the terrain is known.
+    /// Mean canopy cover where the terrain is known.
     pub mean_cover: f32,
 }
 
-/// Group 0 of this frame and the view that it belongs to; nothing while a part of it is missing.
+/// Group 0 of this frame and its view; empty while a part of it is missing.
 #[derive(Resource, Default)]
 pub struct FrameBindGroup(Option<(Entity, BindGroup)>);
 
@@ -157,13 +157,13 @@ impl FromWorld for FrameBuffers {
             light: gpu::buffer_with(device, "canopy_light", usage, &[LightUniform::default()]),
             shadow: gpu::buffer_with(device, "canopy_shadow", usage, &[ShadowUniform::default()]),
             clamp_sampler: clamp(None),
-            // Reversed depth: a point is lit where it is at least as near to the light as the map.
+            // Reversed depth: a point is lit if it is at least as near to the light as the map's depth.
             shadow_sampler: clamp(Some(CompareFunction::GreaterEqual)),
         }
     }
 }
 
-/// Makes group 0 of each frame.
+/// Creates group 0 of each frame.
 pub struct BindingsPlugin;
 
 impl Plugin for BindingsPlugin {

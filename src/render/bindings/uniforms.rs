@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 /// Period in metres of everything that is drawn by world position (ground noise); a power of two.
 pub const NOISE_PERIOD: f64 = 1024.0;
 
-/// Most cascades a view can have.
+/// Maximum number of cascades of a view.
 pub const MAX_CASCADES: usize = 4;
 
 /// `Frame` of `frame.wgsl`.
@@ -36,7 +36,7 @@ pub struct LightUniform {
     pub exposure: f32,
     /// Illuminance of the key light, normal to its direction.
     pub key_illuminance: [f32; 3],
-    /// The most colour that night sight takes, 0..1.
+    /// Maximum loss of colour by night vision, 0..1.
     pub scotopic_strength: f32,
     /// Unit vector to the sun.
     pub sun_direction: [f32; 3],
@@ -52,7 +52,7 @@ pub struct LightUniform {
     pub moon_disc_cosine: f32,
     /// Radiance of the moon's disc.
     pub moon_radiance: [f32; 3],
-    /// Share of the star field's cells with a star, 0..1.
+    /// Fraction of the star field's cells with a star, 0..1.
     pub star_density: f32,
     /// Exitant radiance of a white Lambertian surface under the sky, bands 0 to 2.
     pub sky: [[f32; 4]; 9],
@@ -60,9 +60,9 @@ pub struct LightUniform {
     pub fog_extinction: [f32; 3],
     /// One over the fog's scale height, 1/m.
     pub fog_inverse_scale_height: f32,
-    /// Colour of night sight, luminance 1.
+    /// Colour of night vision, luminance 1.
     pub scotopic_tint: [f32; 3],
-    /// Share of night sight that the adaptation to the whole picture allows, 0..1.
+    /// Fraction of night vision that the adaptation to the whole image allows, 0..1.
     pub scotopic_amount: f32,
     /// Rotation from the world into the stars' frame, by columns of four.
     pub star_frame: [[f32; 4]; 3],
@@ -80,7 +80,7 @@ pub struct LightUniform {
 pub struct CascadeUniform {
     /// Camera-relative metres to the map's clip space.
     pub map_from_relative: [[f32; 4]; 4],
-    /// Metres a texel.
+    /// Metres per texel.
     pub texel: f32,
     /// Radius around the camera within which the map is read, metres.
     pub radius: f32,
@@ -96,7 +96,7 @@ pub struct ShadowUniform {
     pub cascades: [CascadeUniform; MAX_CASCADES],
     /// Ground map: camera-relative origin (x, z) and inverse size.
     pub ground: [f32; 4],
-    /// How many of the cascades there are.
+    /// Number of cascades.
     pub cascade_count: i32,
     /// One over the map's size in texels.
     pub inverse_map_size: f32,

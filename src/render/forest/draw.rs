@@ -5,8 +5,8 @@ use bevy::render::{render_phase::TrackedRenderPass, render_resource::PipelineCac
 use super::{gpu_forest::GpuForest, pipelines::LevelPipelines, representation::LevelTarget};
 use crate::cull::DrawLists;
 
-/// Draws the trees of `lists`. Group 0 is set; `bind_level` sets group 1 for the level of that index. Levels whose pipeline is
-/// not ready are left out.
+/// Draws the trees of `lists`. Group 0 is set; `bind_level` sets group 1 for the level of that index. Levels whose
+/// pipeline is not ready are skipped.
 pub fn draw_levels<'a>(
     pass: &mut TrackedRenderPass<'a>,
     forest: &'a GpuForest,

@@ -1,4 +1,4 @@
-//! A forest on the device: made when the entity appears or changes, dropped when it is gone.
+//! A forest on the device: created when the entity appears or changes, dropped when it is removed.
 
 use std::{ops::Range, sync::Arc};
 
@@ -33,18 +33,18 @@ use crate::{
 
 /// A level of one forest on the device.
 pub struct ForestLevel {
-    /// What draws it.
+    /// The renderer that draws it.
     pub renderer: Arc<dyn LevelRenderer>,
     /// Its plants.
     pub gpu: Box<dyn GpuLevel>,
 }
 
-/// A forest's side of the device.
+/// A forest on the device.
 pub struct GpuForest {
     stand: Arc<PackedStand>,
-    /// What the buffers and textures hold.
+    /// The plants that the buffers and textures hold.
     plants: Arc<Vec<BakedPlant>>,
-    /// What the entity asks for now.
+    /// The current component of the entity.
     pub forest: Forest,
     /// [`PackedTree`]s.
     pub trees: Buffer,
@@ -55,11 +55,11 @@ pub struct GpuForest {
     pub sizes: Vec<PlantSize>,
     /// Largest scale of any tree.
     pub max_scale: f32,
-    /// The levels in the order of [`Forest::levels`]; `None` for a representation that nothing here can draw.
+    /// The levels in the order of [`Forest::levels`]; `None` for a representation without a renderer.
     levels: Vec<Option<ForestLevel>>,
-    /// How each level wants its trees.
+    /// How each level groups its trees.
     pub groupings: Vec<Grouping>,
-    /// Counts up with every change of content, so that shadows are drawn again.
+    /// Increases with every change of content, so that shadows are drawn again.
     pub generation: u64,
 }
 
@@ -74,11 +74,11 @@ impl GpuForest {
         &self.plants
     }
 
-    /// Distances in metres from the middle of a shadow map at which each level casts into a map of `texel` metres a texel;
-    /// `near` are those of the first one.
+    /// Distances in metres from the centre of a shadow map at which each level casts into a map of `texel` metres per
+    /// texel; `near` are those of the first level.
     ///
-    /// A tree casts in the first level whose range holds it: in the one in which the view shows it, but for levels that are
-    /// too fine for the map, in whose place the farthest one casts.
+    /// A tree casts in the first level whose range contains it. That is the level in which the view draws it, except
+    /// for levels that are too fine for the map: the farthest level casts instead of them.
     pub fn casting_distances(&self, near: Range<f64>, texel: f64) -> Vec<Range<f64>> {
         let levels = &self.forest.levels;
         let mut casting = vec![0.0..0.0; levels.len()];
@@ -135,7 +135,7 @@ impl GpuForest {
         }
     }
 
-    /// Whether what the device holds becomes that of `forest` by other light alone.
+    /// Whether `forest` differs from the uploaded one only in lighting.
     fn can_follow(&self, forest: &Forest) -> bool {
         let same = |(old, new): (&BakedPlant, &BakedPlant)| {
             Arc::ptr_eq(&old.plant, &new.plant) && self.levels().all(|(_, level)| level.renderer.same_shape(old, new))
@@ -147,10 +147,10 @@ impl GpuForest {
                 || (self.plants.len() == forest.plants.len() && self.plants.iter().zip(forest.plants.iter()).all(same)))
     }
 
-    /// Other light for plants that are drawn already: what a bake gives anew is written over what the device holds. Meshes,
-    /// outlines, the stand and so the shadow maps stay.
+    /// Updates the lighting of plants that are already drawn: new bakes overwrite the data on the device. Meshes,
+    /// outlines, the stand and therefore the shadow maps stay.
     ///
-    /// Cost: 20 bytes a vertex written and their normals packed, and 1 MB a plant where its crosses changed (256 texels).
+    /// Cost: packing and writing 20 bytes per vertex, and 1 MB per plant whose crosses changed (256 texels).
     fn relight(&mut self, forest: &Forest, upload: &mut ForestUpload) {
         let relight = Relight { old: &self.plants, new: &forest.plants, suns: &forest.suns };
         for level in self.levels.iter_mut().flatten() {
@@ -182,7 +182,7 @@ impl GpuForests {
         self.iter().flat_map(|(_, forest)| forest.levels().map(|(_, level)| level))
     }
 
-    /// What the trees of all of them are to light, in the mean over the areas of their leaves.
+    /// Optical properties of the trees of all forests, averaged over the areas of their leaves.
     pub fn trees(&self) -> StandTrees {
         self.iter().map(|(_, forest)| forest.leaves).fold(Leaves::default(), Leaves::add).trees()
     }
@@ -193,7 +193,7 @@ impl GpuForests {
     }
 }
 
-/// Uploads new and changed forests, forgets despawned ones.
+/// Uploads new and changed forests, and drops despawned ones.
 pub fn prepare_forests(
     scene: Res<ExtractedScene>,
     representations: Res<Representations>,

@@ -1,4 +1,4 @@
-//! Group 1 of everything that draws trees: where they stand, which of them are drawn, and what their plants are.
+//! Group 1 of everything that draws trees: their positions, the visible ones, and their plants.
 
 use bevy::render::render_resource::{BindGroup, BindGroupEntries, BindingResource, Buffer, BufferBinding};
 use glam::{DVec3, IVec2, Vec4};
@@ -6,23 +6,23 @@ use glam::{DVec3, IVec2, Vec4};
 use super::{gpu_forest::GpuForest, instance_layout::instance_layout, uniforms::ForestViewUniform};
 use crate::{lod::FadeBand, render::gpu::Gpu};
 
-/// A distance in metres that no tree reaches.
+/// A distance in metres beyond any tree.
 const NEVER: f32 = 1e30;
 
 /// How a level looks in a view.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LevelLook {
-    /// Over which distances it comes in.
+    /// The distances over which it fades in.
     pub fade_in: Option<FadeBand>,
-    /// Over which distances it goes out.
+    /// The distances over which it fades out.
     pub fade_out: Option<FadeBand>,
-    /// Linear colour of its tint and how much of it is mixed in.
+    /// Linear colour of its tint, and its weight.
     pub tint: Vec4,
 }
 
 /// The uniform of a view or cascade whose positions are relative to `anchor` (scene metres).
 ///
-/// `level`: whose fades and tint it has; those of no level for a cascade, where trees do not fade.
+/// `level`: its fades and tint. A cascade has none, because trees do not fade there.
 pub fn forest_view(forest: &GpuForest, anchor: DVec3, level: Option<LevelLook>) -> ForestViewUniform {
     let look = level.unwrap_or_default();
     let local = anchor - forest.forest.origin;

@@ -1,10 +1,10 @@
-//! What the leaves of a forest are to light, in the mean over their areas.
+//! Optical properties of a forest's leaves, averaged over their areas.
 
 use glam::Vec3;
 
 use crate::{bake::BakedPlant, light::StandTrees, render::components::Forest};
 
-/// Sums over leaves, each counted by its area.
+/// Sums over leaves, weighted by area.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Leaves {
     area: f32,
@@ -15,7 +15,7 @@ pub struct Leaves {
 }
 
 impl Leaves {
-    /// Of all trees of a stand.
+    /// The sums of all trees of a stand.
     pub fn of(forest: &Forest) -> Self {
         let mut areas = vec![0.0; forest.plants.len()];
         for tree in &forest.stand.trees {
@@ -37,7 +37,7 @@ impl Leaves {
         forest.plants.iter().zip(areas).map(of_plant).fold(Self::default(), Self::add)
     }
 
-    /// Of two forests.
+    /// The sums of two forests.
     pub fn add(self, other: Self) -> Self {
         Self {
             area: self.area + other.area,
@@ -48,7 +48,7 @@ impl Leaves {
         }
     }
 
-    /// Means over the area; black where there is none.
+    /// Means over the area; black without leaves.
     pub fn trees(self) -> StandTrees {
         if self.area > 0.0 && self.area.is_finite() {
             StandTrees {

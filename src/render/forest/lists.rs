@@ -1,4 +1,4 @@
-//! Which trees the view draws, and their indices on the device.
+//! The trees that the view draws, and their indices on the device.
 
 use bevy::{
     ecs::{
@@ -25,10 +25,10 @@ use crate::{
     },
 };
 
-/// How much of a level's tint is mixed into its trees' colour.
+/// Weight of a level's tint in its trees' colour.
 const TINT_AMOUNT: f32 = 0.6;
 
-/// What a view draws of one forest.
+/// The trees of one forest that a view draws.
 pub struct PreparedForest {
     /// Ranges of trees.
     pub lists: DrawLists,
@@ -45,12 +45,12 @@ impl PreparedForest {
     }
 }
 
-/// What the view draws of every forest.
+/// The trees of every forest that the view draws.
 #[derive(Resource, Default)]
 pub struct PreparedForests(HashMap<Entity, PreparedForest>);
 
 impl PreparedForests {
-    /// What the view draws of the forest `entity`.
+    /// The trees of the forest `entity` that the view draws.
     pub fn get(&self, entity: Entity) -> Option<&PreparedForest> {
         self.0.get(&entity)
     }
@@ -66,11 +66,11 @@ impl PreparedForests {
 pub struct LevelStatistics {
     /// Which representation.
     pub representation: Representation,
-    /// What its trees are called, in the plural.
+    /// Plural name of its trees.
     pub label: &'static str,
-    /// Trees drawn so.
+    /// Number of trees drawn with it.
     pub trees: usize,
-    /// Triangles of these.
+    /// Number of their triangles.
     pub triangles: usize,
 }
 
@@ -87,7 +87,7 @@ impl ForestStatistics {
         self.levels.iter().map(|level| level.triangles).sum()
     }
 
-    /// Trees of all levels; one that fades from one level to the next counts in both.
+    /// Trees of all levels; a tree that fades between two levels counts in both.
     pub fn trees(&self) -> usize {
         self.levels.iter().map(|level| level.trees).sum()
     }
@@ -95,7 +95,7 @@ impl ForestStatistics {
     fn add(&mut self, forest: &GpuForest, lists: &DrawLists) {
         for (index, level) in forest.levels() {
             let ranges = lists.ranges(index);
-            // A level that draws all variants together has as many triangles for each of them.
+            // A level that draws all variants together has the same number of triangles for each of them.
             let triangles =
                 ranges.iter().enumerate().map(|(variant, range)| range.len() * level.gpu.triangles(variant)).sum();
             let (representation, label) = (level.renderer.representation(), level.renderer.label());
@@ -139,7 +139,7 @@ pub fn prepare_view_lists(
             settings.view_distance,
         );
         statistics.add(forest, &lists);
-        // A forest that was replaced under the same entity has other buffers: group 1 is made again each frame.
+        // A forest that was replaced on the same entity has other buffers, so group 1 is created again each frame.
         let (mut visible, buffer) = match prepared.0.remove(&entity) {
             Some(old) => (old.visible, old.uniform),
             None => (

@@ -1,10 +1,12 @@
 //! The forest pass: trees in the levels of detail that [`Forest::levels`](super::components::Forest::levels) lists, one
 //! lighting for all of them.
 //!
-//! From [Franzke 2005] 4.3 (billboards, blending by alpha test). A tree costs 16 bytes of instance data. What is drawn is
-//! decided by [`cull`](crate::cull) before the frame; how it is drawn, by the [`representation`] of each level.
+//! From [Franzke 2005] 4.3 (billboards, blending by alpha test). A tree costs 16 bytes of instance data.
+//! [`cull`](crate::cull) decides which trees are drawn before the frame; the [`representation`] of each level decides
+//! how.
 //!
-//! Limits: at most 1,024 variants a forest, and as many with crosses as a texture array has room for, three layers each; no motion vectors; one camera.
+//! Limits: at most 1,024 variants per forest; crosses for as many variants as a texture array has room for, three
+//! layers each; no motion vectors; one camera.
 
 mod draw;
 mod gpu_forest;

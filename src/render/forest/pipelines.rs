@@ -1,4 +1,4 @@
-//! Pipelines of all levels, requested where a forest needs them.
+//! Pipelines of all levels, requested when a forest needs them.
 
 use bevy::{
     ecs::{
@@ -21,7 +21,7 @@ use crate::{
 /// What a pipeline depends on.
 type PipelineKey = (Representation, u32, LevelTarget);
 
-/// Pipelines of all levels, by what they depend on.
+/// Pipelines of all levels, by key.
 #[derive(Resource, Default)]
 pub struct LevelPipelines(HashMap<PipelineKey, CachedRenderPipelineId>);
 
@@ -37,7 +37,7 @@ impl LevelPipelines {
         self.0.get(&(renderer.representation(), features, target)).and_then(|id| cache.get_render_pipeline(*id))
     }
 
-    /// Whether all that `forests` need for `target` is ready.
+    /// Whether all pipelines that `forests` need for `target` are ready.
     pub fn ready(&self, forests: &GpuForests, target: LevelTarget, cache: &PipelineCache) -> bool {
         forests.levels().all(|level| {
             let features = level.gpu.features(target);

@@ -1,8 +1,7 @@
-//! What a level of detail must be able to do to be drawn: the renderer's side of a
-//! [`Representation`].
+//! The traits that a level of detail implements to be drawn: the renderer's side of a [`Representation`].
 //!
 //! ```text
-//!   Levels of a forest ── by name ──> LevelRenderer ── upload ──> GpuLevel, one a forest
+//!   Levels of a forest ── by name ──> LevelRenderer ── upload ──> GpuLevel, one per forest
 //!                                         │ pipeline                  │ draw (view, shadow maps), relight
 //!                                         v                           v
 //!                                    LevelPipelines ────────────> forest pass, sun shadow pass
@@ -10,8 +9,8 @@
 //!
 //! A new level is one file that bakes it (in `bake/levels`, if it needs a bake), one that implements both traits, one
 //! shader, and one line in `levels::built_in`. A program adds its own with [`RegisterRepresentation`];
-//! `examples/box_level.rs` is one of under a hundred lines. What all levels share (lists of trees, thresholds, tints,
-//! statistics, reports) goes over the list and knows none of them.
+//! `examples/box_level.rs` is one with under a hundred lines. Shared code (lists of trees, thresholds, tints,
+//! statistics, reports) iterates over the list and does not refer to any single level.
 
 use std::{ops::Range, sync::Arc};
 
@@ -40,7 +39,7 @@ use crate::{
     },
 };
 
-/// What a pipeline of a level draws into.
+/// The target of a level's pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum LevelTarget {
     /// Colour and depth of a view.
@@ -68,32 +67,32 @@ impl LevelTarget {
     }
 }
 
-/// Draws one representation. One value serves all forests.
+/// Draws one representation. One value is used for all forests.
 pub trait LevelRenderer: Send + Sync + 'static {
-    /// Which representation it draws.
+    /// The representation that it draws.
     fn representation(&self) -> Representation;
 
-    /// What its trees are called in reports, in the plural: "crosses".
+    /// Plural name of its trees in reports, such as "crosses".
     fn label(&self) -> &'static str;
 
-    /// Linear colour that its trees take on where levels are tinted.
+    /// Linear colour of its trees when levels are tinted.
     fn tint(&self) -> Vec3;
 
-    /// How its draw calls want the trees.
+    /// How its draw calls group the trees.
     fn grouping(&self) -> Grouping;
 
-    /// Metres a texel of the coarsest shadow map that can show it; it casts into no coarser one. `None`: it never casts.
-    /// The farthest level of a forest that casts at all does so into every map.
+    /// Metres per texel of the coarsest shadow map into which it casts. `None`: it never casts. The farthest level of a
+    /// forest that casts at all casts into every map.
     fn coarsest_shadow_texel(&self) -> Option<f64>;
 
-    /// Brings the plants of `forest` to the device.
+    /// Uploads the plants of `forest`.
     fn upload(&self, forest: &Forest, upload: &mut ForestUpload) -> Box<dyn GpuLevel>;
 
-    /// Whether `new` has the same shape as `old`, so that [`GpuLevel::relight`] leads from one to the other.
+    /// Whether `new` has the same shape as `old`, so that [`GpuLevel::relight`] can update one to the other.
     fn same_shape(&self, old: &BakedPlant, new: &BakedPlant) -> bool;
 
-    /// The pipeline for `features`, bits that mean something to this renderer alone, into `target`. Both entry points of
-    /// its shader see group 0 and 1 as [`LevelTarget::layouts`] has them.
+    /// The pipeline for `features` (bits that only this renderer interprets) and `target`. Both entry points of its
+    /// shader use groups 0 and 1 as in [`LevelTarget::layouts`].
     fn pipeline(&self, features: u32, target: LevelTarget) -> RenderPipelineDescriptor;
 }
 
@@ -105,39 +104,40 @@ pub trait GpuLevel: Send + Sync + 'static {
     /// Triangles of a tree of `variant`.
     fn triangles(&self, variant: usize) -> usize;
 
-    /// Draws the trees in `ranges` (one a variant or a single one, by the renderer's [`Grouping`]) that belong to the
+    /// Draws the trees in `ranges` (one per variant or a single one, by the renderer's [`Grouping`]) that belong to the
     /// pipeline of `features`, which is set, as are groups 0 and 1. `visible[range]` are the trees' indices.
     fn draw<'a>(&'a self, pass: &mut TrackedRenderPass<'a>, features: u32, target: LevelTarget, ranges: &[Range<u32>]);
 
-    /// Writes the light of other bakes of the same shapes over what the device holds.
+    /// Overwrites the lighting on the device with that of other bakes of the same shapes.
     fn relight(&mut self, relight: &Relight, upload: &mut ForestUpload);
 }
 
-/// Other bakes of plants that are drawn already.
+/// New bakes of plants that are already drawn.
 #[derive(Clone, Copy, Debug)]
 pub struct Relight<'a> {
-    /// What the device holds.
+    /// The plants on the device.
     pub old: &'a [BakedPlant],
-    /// What it shall hold, plant by plant of the same shape.
+    /// The new plants, each of the same shape as the old one.
     pub new: &'a [BakedPlant],
-    /// How the sun lights each plant; the default where the list ends.
+    /// How the sun lights each plant; the default beyond the end of the list.
     pub suns: &'a [SunLight],
 }
 
-/// What an upload writes to.
+/// The resources that an upload writes to.
 pub struct ForestUpload<'a, 'w> {
     /// The device.
     pub gpu: &'a Gpu<'w>,
-    /// The light for radiance transfer, which notes what plants ask of it.
+    /// The light for radiance transfer, which records what plants need of it.
     pub transfer: &'a mut TransferLight,
 }
 
-/// All representations that can be drawn: a resource of the main world until the app is finished, then of the render world.
+/// All representations that can be drawn: a resource of the main world until the app is finished, then of the render
+/// world.
 #[derive(Resource, Clone, Default)]
 pub struct Representations(Vec<Arc<dyn LevelRenderer>>);
 
 impl Representations {
-    /// Adds a renderer; `false` where one of that name is there already, which stays.
+    /// Adds a renderer; `false` if one of that name exists already, which stays.
     pub fn add(&mut self, renderer: Arc<dyn LevelRenderer>) -> bool {
         let new = self.get(renderer.representation()).is_none();
         if new {
@@ -157,10 +157,10 @@ impl Representations {
     }
 }
 
-/// Adds representations of a program's own.
+/// Adds custom representations.
 pub trait RegisterRepresentation {
-    /// Makes `renderer` known. The order to Canopy's plugins does not matter. Forests that were uploaded before keep the
-    /// renderers that they found.
+    /// Registers `renderer`, before or after Canopy's plugins are added. Forests that were uploaded before keep their
+    /// renderers.
     fn register_representation(&mut self, renderer: impl LevelRenderer) -> &mut Self;
 }
 

@@ -1,4 +1,4 @@
-//! Rotates the light for radiance transfer into every yaw where it has changed.
+//! Rotates the light for radiance transfer into every yaw when it has changed.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use bevy::{
 
 use super::{
     gpu_forest::GpuForests,
-    transfer::{SET_BYTES, TransferLight, Wanted, YAWS, beam, turned},
+    transfer::{SET_BYTES, TransferLight, Wanted, YAWS, beam, rotated},
 };
 use crate::{
     bake::lighting::BakedLighting,
@@ -17,7 +17,7 @@ use crate::{
     render::{extract::ExtractedScene, report::FrameReport, view::PreparedFrame},
 };
 
-/// Turns the light where it, the exposure or what is asked of it has changed.
+/// Rotates the light if it, the exposure or the needs of the plants have changed.
 pub fn prepare_transfer_light(
     scene: Res<ExtractedScene>,
     frame: Res<PreparedFrame>,
@@ -27,7 +27,7 @@ pub fn prepare_transfer_light(
     mut transfer: ResMut<TransferLight>,
 ) {
     let transfer = &mut *transfer;
-    // Plants may have come into another light since.
+    // The lighting of plants may have changed since the last frame.
     let lit = || {
         let mut plants = forests.iter().flat_map(|(_, forest)| forest.plants());
         plants.any(|plant| matches!(*plant.lighting, BakedLighting::Transfer(_)))
@@ -40,18 +40,18 @@ pub fn prepare_transfer_light(
     let same = |(light, exposure, wanted): &(Arc<LightState>, f32, Wanted)| {
         Arc::ptr_eq(light, &daylight.0) && *exposure == view.exposure && *wanted == transfer.wanted
     };
-    if transfer.known.as_ref().is_some_and(same) {
-        report.skipped("transfer light", "the light rests");
+    if transfer.uploaded.as_ref().is_some_and(same) {
+        report.skipped("transfer light", "the light has not changed");
         return;
     }
     let Wanted { bands, sun } = transfer.wanted;
     let sky = daylight.0.surroundings().project(bands);
-    queue.write_buffer(buffer, 0, bytemuck::cast_slice(&turned(&sky, view.exposure)));
+    queue.write_buffer(buffer, 0, bytemuck::cast_slice(&rotated(&sky, view.exposure)));
     if sun {
         let light = beam(daylight.0.key_direction, daylight.0.key_illuminance, bands);
-        queue.write_buffer(buffer, SET_BYTES, bytemuck::cast_slice(&turned(&light, view.exposure)));
+        queue.write_buffer(buffer, SET_BYTES, bytemuck::cast_slice(&rotated(&light, view.exposure)));
     }
-    transfer.known = Some((daylight.0.clone(), view.exposure, transfer.wanted));
+    transfer.uploaded = Some((daylight.0.clone(), view.exposure, transfer.wanted));
     let of = if sun { "sky and sun, " } else { "" };
-    report.ran("transfer light", format!("{of}{bands} bands turned into {YAWS} yaws"));
+    report.ran("transfer light", format!("{of}{bands} bands rotated into {YAWS} yaws"));
 }

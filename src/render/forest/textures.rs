@@ -19,7 +19,7 @@ use crate::{
     render::gpu,
 };
 
-/// What an image is used for: each use filters it otherwise.
+/// What a texture is used for: each use filters it differently.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 enum TextureUse {
     Wood,
@@ -32,7 +32,7 @@ enum TextureUse {
 #[derive(Default)]
 pub struct TextureCache {
     views: HashMap<(usize, TextureUse), TextureView>,
-    /// Bound where a material has no normal map, and never sampled.
+    /// Bound if a material has no normal map, and never sampled.
     no_normals: Option<TextureView>,
 }
 
@@ -61,7 +61,7 @@ impl TextureCache {
             .clone()
     }
 
-    /// The normal map. Without one a texel that no pipeline samples, the same for all materials.
+    /// The normal map. Without one: a texel that no pipeline samples, shared by all materials.
     pub fn normal(&mut self, material: &PlantMaterial, device: &RenderDevice, queue: &RenderQueue) -> TextureView {
         let format = TextureFormat::Rgba8Unorm;
         let Some(image) = &material.normal_texture else {

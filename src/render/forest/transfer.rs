@@ -1,11 +1,12 @@
-//! Radiance transfer on the GPU: a part's coefficients, and the light turned into every yaw that a tree can have.
+//! Radiance transfer on the GPU: a part's coefficients, and the light per yaw.
 //!
-//! A packed tree has one of 256 yaws, so the light is turned for all of them at once when it has changed, exactly and at
-//! any band, and a vertex does nothing but two dot products, four coefficients at a time. Without a plant that is lit by transfer there is no buffer,
-//! no binding, and nothing is computed.
+//! A packed tree has one of 256 yaws, so the light is rotated into all of them at once when it changes, exactly and at
+//! any band. A vertex then needs only two dot products, four coefficients at a time. If no plant is lit by radiance
+//! transfer, there is no buffer and no binding, and nothing is computed.
 //!
-//! A plant can take the sun the same way [Franzke 2005, 4.3.3], [`SunLight::Harmonics`]: its light is a second set of 256
-//! rows, which is neither computed nor uploaded while no plant asks for it, and costs a vertex two more dot products.
+//! A plant can receive the sun the same way [Franzke 2005, 4.3.3], [`SunLight::Harmonics`]: the sun's light is a second
+//! set of 256 rows. It is neither computed nor uploaded while no plant needs it, and costs a vertex two more dot
+//! products.
 
 use std::{f32::consts::TAU, sync::Arc};
 
@@ -34,9 +35,9 @@ use crate::{
 
 /// Yaws of a packed tree.
 pub const YAWS: usize = 1 << YAW_BITS;
-/// Vectors from one yaw's light to the next: the first coefficient, then red, green and blue of each word.
+/// Number of vectors per yaw: the first coefficient, then red, green and blue of each word.
 pub const STRIDE: usize = 1 + 3 * WORDS;
-/// Bytes of one light in all yaws.
+/// Bytes of one light, rotated into all yaws.
 pub const SET_BYTES: u64 = (YAWS * STRIDE * size_of::<[f32; 4]>()) as u64;
 
 /// Layout of group 3: the rotated light, the part's coefficients, their layout.
@@ -54,28 +55,28 @@ pub fn transfer_layout() -> BindGroupLayoutDescriptor {
     )
 }
 
-/// The light of the moment, turned.
+/// The current light, rotated into each yaw.
 #[derive(Resource, Default)]
 pub struct TransferLight {
-    /// The rotated light; `None` until a plant asks for it.
+    /// The rotated light; `None` until a plant needs it.
     pub buffer: Option<Buffer>,
-    /// What plants ask of it.
+    /// What plants need of it.
     pub wanted: Wanted,
-    /// What the buffer holds.
-    pub known: Option<(Arc<LightState>, f32, Wanted)>,
+    /// The light, exposure and needs for which the buffer was uploaded.
+    pub uploaded: Option<(Arc<LightState>, f32, Wanted)>,
 }
 
-/// What plants ask of the turned light.
+/// What plants need of the rotated light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wanted {
-    /// The most bands.
+    /// Maximum number of bands.
     pub bands: usize,
-    /// The sun's light too.
+    /// Whether the sun's light is needed too.
     pub sun: bool,
 }
 
 impl TransferLight {
-    /// Group 3 of a part; `tint`: the colour of light that leaves send each other ([`scattered_tint`]).
+    /// Group 3 of a part; `tint`: the colour of light scattered between leaves ([`scattered_tint`]).
     pub fn bind_group(
         &mut self,
         (settings, part): (&TransferSettings, &PackedPart),
@@ -87,7 +88,7 @@ impl TransferLight {
         self.wanted.sun |= sun == SunLight::Harmonics;
         let light = self.buffer.get_or_insert_with(|| {
             gpu.device.create_buffer(&BufferDescriptor {
-                label: Some("canopy_turned_light"),
+                label: Some("canopy_rotated_light"),
                 // Sky and sun.
                 size: 2 * SET_BYTES,
                 usage: BufferUsages::STORAGE | BufferUsages::COPY_DST,
@@ -117,8 +118,8 @@ pub fn beam(direction: Vec3, illuminance: Vec3, bands: usize) -> Vec<Vec3> {
     basis.into_iter().map(|value| illuminance * value).collect()
 }
 
-/// `light` as each yaw's plant sees it, times `exposure`; zeros beyond its bands.
-pub fn turned(light: &[Vec3], exposure: f32) -> Vec<[f32; 4]> {
+/// `light` rotated into the frame of a plant of each yaw, times `exposure`; zeros beyond its bands.
+pub fn rotated(light: &[Vec3], exposure: f32) -> Vec<[f32; 4]> {
     let mut rows = Vec::with_capacity(YAWS * STRIDE);
     for yaw in 0..YAWS {
         let mut seen = light.to_vec();
@@ -153,13 +154,13 @@ mod tests {
     }
 
     #[test]
-    fn a_plant_sees_the_light_turned_the_other_way() {
+    fn a_plant_sees_the_light_rotated_the_other_way() {
         let sun = Vec3::new(0.6, 0.5, -0.4).normalize();
         let light: Vec<Vec3> = basis::<16>(sun).map(Vec3::splat).to_vec();
-        let turned = turned(&light, 2.0);
-        assert_eq!(turned.len(), YAWS * STRIDE);
+        let rotated = rotated(&light, 2.0);
+        assert_eq!(rotated.len(), YAWS * STRIDE);
         for yaw in [0, 1, 64, 200] {
-            let row = &turned[yaw * STRIDE..][..STRIDE];
+            let row = &rotated[yaw * STRIDE..][..STRIDE];
             let codes = row[1..].chunks_exact(3).flat_map(|word| word[0]);
             let row: Vec<f32> = std::iter::once(row[0][0]).chain(codes).collect();
             let in_plant = Vec3::new(0.1, 0.7, 0.7).normalize();

@@ -1,4 +1,4 @@
-//! What the shaders know of a forest, its plants and their parts.
+//! The uniforms of a forest, its plants and their parts.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -31,13 +31,13 @@ pub struct ForestViewUniform {
     pub anchor_y: f32,
     /// Metres along a cell's side.
     pub cell_size: f32,
-    /// Distances in metres over which the level comes in.
+    /// Distances in metres over which the level fades in.
     pub fade_in: [f32; 2],
-    /// Distances in metres over which it goes out.
+    /// Distances in metres over which it fades out.
     pub fade_out: [f32; 2],
     /// WGSL aligns the next member to 16 bytes.
     pub padding: [f32; 2],
-    /// Linear colour of the level's tint and how much of it is mixed in.
+    /// Linear colour of the level's tint, and its weight.
     pub tint: [f32; 4],
 }
 
@@ -45,13 +45,13 @@ pub struct ForestViewUniform {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct PlaneUniform {
-    /// Middle of the picture, metres in the plant's frame.
+    /// Centre of the billboard, metres in the plant's frame.
     pub center: [f32; 4],
-    /// Half extent to the picture's right.
+    /// Half extent to the billboard's right.
     pub u: [f32; 4],
     /// Half extent upwards.
     pub v: [f32; 4],
-    /// Unit normal towards the side that the picture was taken from.
+    /// Unit normal towards the side from which the texture was rendered.
     pub normal: [f32; 4],
 }
 
@@ -70,21 +70,22 @@ pub struct VariantUniform {
     pub height: f32,
     /// Metres.
     pub crown_radius: f32,
-    /// 1 where it is lit by radiance transfer: its ambient visibility is traced, and holds what leaves scatter.
+    /// 1 if it is lit by radiance transfer: its ambient occlusion is ray-traced, and includes light scattered by
+    /// leaves.
     pub radiance_transfer: u32,
     /// Specular reflectance of its leaves.
     pub specular_reflectance: f32,
     /// Root mean square slope of their facets.
     pub roughness: f32,
-    /// 1 where the foliage's normals point out of the crown, else 0.
+    /// 1 if the foliage's normals are realigned to point out of the crown, else 0.
     pub realigned: f32,
-    /// Indirect light of the key light in the mean over its leaves: the second band's component towards the zenith.
+    /// Mean indirect light of the key light over its leaves: the component of SH band 1 towards the zenith.
     pub indirect_sun_zenith: f32,
-    /// Its first coefficient.
+    /// The first coefficient (band 0) of the same.
     pub indirect_sun_mean: f32,
-    /// Its colour.
+    /// The colour of the same.
     pub indirect_sun_color: [f32; 3],
-    /// 1 where its ambient visibility is the ambient term of a density field, else 0.
+    /// 1 if its ambient occlusion is the ambient term of a density field, else 0.
     pub ambient_term: u32,
     /// Strength of the lobe of its gloss that carries a share of 1 ([`lobe_gain`]).
     pub lobe_gain: f32,
@@ -100,13 +101,13 @@ pub struct VariantUniform {
 pub struct CrossVariantUniform {
     /// Two upright planes and a level one.
     pub planes: [PlaneUniform; PLANES],
-    /// Factor for light through its leaves ([`PlantMaterial::transmission`]), in the mean.
+    /// Mean factor for light through its leaves ([`PlantMaterial::transmission`]).
     pub transmission: [f32; 3],
     /// First layer of its textures.
     pub first_layer: u32,
     /// Fraction of a texel's leaf area with isotropic normals, mip by mip.
     pub isotropic_fraction: [[f32; 4]; SPREAD_LEVELS / 4],
-    /// First layer of its lighting textures, where it has some.
+    /// First layer of its lighting textures, if it has any.
     pub first_light_layer: u32,
     /// WGSL rounds the size up to 16 bytes.
     pub padding: [u32; 3],
@@ -118,15 +119,15 @@ pub struct CrossVariantUniform {
 pub struct PartUniform {
     /// Linear factor on the texture.
     pub base_color: [f32; 3],
-    /// 1 where the normals point out of the crown, whichever side of a leaf is seen; else 0.
+    /// 1 if the normals are realigned: they point out of the crown, whichever side of a leaf is seen; else 0.
     pub realigned: f32,
     /// Factor for light from behind ([`PlantMaterial::transmission`]).
     pub transmission: [f32; 3],
-    /// Share of the light that the surface of a leaf reflects without letting it in; 0: matt.
+    /// Specular reflectance of a leaf's surface; 0: matt.
     pub specular_reflectance: f32,
     /// Root mean square slope of its facets.
     pub roughness: f32,
-    /// 1 where its ambient visibility is the ambient term of a density field, else 0.
+    /// 1 if its ambient occlusion is the ambient term of a density field, else 0.
     pub ambient_term: u32,
     /// Strength of the lobe of its gloss that carries a share of 1 ([`lobe_gain`]).
     pub lobe_gain: f32,
@@ -141,24 +142,24 @@ pub const WORDS: usize = (MAX_BANDS * MAX_BANDS - 1).div_ceil(4);
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct TransferUniform {
-    /// What 127 stands for in each coefficient after the first, relative to it, four a word of codes.
+    /// Scale of each coefficient after the first, relative to it: the value of code 127; four per word of codes.
     pub scale: [[f32; 4]; WORDS],
     /// Words from one vertex to the next.
     pub vertex_words: u32,
-    /// Words of a vertex's means, which stand first.
+    /// Number of words of a vertex's means, which come first.
     pub mean_words: u32,
     /// Words of the codes of one side and channel.
     pub side_words: u32,
-    /// Where the codes of the indirect key light begin, a word a vertex.
+    /// Index of the first code of the indirect key light, one word per vertex.
     pub indirect_sun_start: u32,
-    /// Colour of the indirect key light, which leaves send each other.
+    /// Colour of the indirect key light, which is scattered between leaves.
     pub indirect_sun_color: [f32; 3],
-    /// What 127 stands for in its codes.
+    /// Scale of its codes: the value of code 127.
     pub indirect_sun_scale: f32,
 }
 
 impl TransferUniform {
-    /// That of one part of a plant.
+    /// The uniform of one part of a plant.
     pub fn new(settings: &TransferSettings, part: &PackedPart, tint: Vec3) -> Self {
         let mut scale = [0.0; 4 * WORDS];
         for (i, scale) in scale.iter_mut().enumerate() {
@@ -176,17 +177,18 @@ impl TransferUniform {
     }
 }
 
-/// The colour that light takes on from a leaf, by its luminance; white where leaves are black.
+/// The colour of light that a leaf scattered, divided by its luminance; white for black leaves.
 ///
-/// With one channel a transfer holds what comes over other leaves by the luminance of their colours. That of the sky is a
-/// few percent of its light and stays without colour; that of the sun is most of what lights the shade inside a crown.
+/// A transfer with one channel stores light from other leaves by the luminance of their colours. Scattered light of the
+/// sky is a few percent of the sky's light and stays uncoloured; that of the sun is most of the light in the shade
+/// inside a crown.
 pub fn scattered_tint(leaves: &LeafColors) -> Vec3 {
     let color = leaves.reflected + leaves.transmitted;
     let light = luminance(color);
     if light > 1e-4 { color / light } else { Vec3::ONE }
 }
 
-/// What the shaders know of each plant.
+/// The uniforms of each plant.
 pub fn variants(plants: &[BakedPlant], sizes: &[PlantSize]) -> Vec<VariantUniform> {
     plants.iter().zip(sizes).map(|(plant, size)| variant(plant, size)).collect()
 }
@@ -211,7 +213,7 @@ fn variant(plant: &BakedPlant, size: &PlantSize) -> VariantUniform {
     }
 }
 
-/// What the shaders know of the crosses of each plant; of a plant without one, planes without extent.
+/// The uniforms of the crosses of each plant; planes without extent for a plant without a cross.
 pub fn cross_variants(plants: &[BakedPlant]) -> Vec<CrossVariantUniform> {
     let mut first_light_layer = 0;
     let mut variants = Vec::with_capacity(plants.len());
@@ -239,12 +241,12 @@ pub fn cross_variants(plants: &[BakedPlant]) -> Vec<CrossVariantUniform> {
     variants
 }
 
-/// 1 where the foliage's normals point out of the crown.
+/// 1 if the foliage's normals are realigned.
 fn realigned(lighting: &BakedLighting) -> f32 {
     f32::from(u8::from(lighting.is_realigned()))
 }
 
-/// What the shaders know of a part's material.
+/// The uniform of a part's material.
 pub fn part_uniform(material: &PlantMaterial, lighting: &BakedLighting) -> PartUniform {
     let gloss = material.gloss.in_range();
     PartUniform {
@@ -281,7 +283,7 @@ mod tests {
             assert_eq!([realigned(&local), realigned(&own), realigned(&half)], [0.0, 0.0, 1.0]);
             assert_eq!(own.lighting.normals(part), None, "the leaves keep their own");
         }
-        // Crosses too: their texels' normals are those of leaves, of which the seen side counts.
+        // Crosses too: their texels' normals are those of leaves, whose visible side counts.
         let normals = |plant: &BakedPlant| -> Vec<[u8; 2]> {
             let textures = plant.cross().into_iter().flat_map(|cross| &cross.textures.properties);
             textures.flat_map(|chain| chain.levels[0].chunks_exact(4).map(|texel| [texel[0], texel[1]])).collect()

@@ -16,14 +16,14 @@ use crate::bake::lighting::implicit::packing;
 pub struct PlantVertex {
     /// Metres in the plant's frame.
     pub position: [f32; 3],
-    /// The normal, as long as the ambient visibility says ([`packing`]).
+    /// The normal, scaled by the ambient occlusion ([`packing`]).
     pub normal: u32,
     /// Texture coordinates, half precision.
     pub uv: [u16; 2],
 }
 
 impl PlantVertex {
-    /// Packs one vertex. Values that are not finite become harmless ones: the origin, up, 1, 0.
+    /// Packs one vertex. Values that are not finite are replaced by the origin, up, 1 and 0.
     pub fn new(position: Vec3, normal: Vec3, ambient: f32, uv: Vec2) -> Self {
         let position = if position.is_finite() { position } else { Vec3::ZERO };
         let half =

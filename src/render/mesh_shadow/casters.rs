@@ -1,4 +1,4 @@
-//! Which trees cast into which of Bevy's cascades.
+//! Chooses the trees that cast into each of Bevy's cascades.
 
 use bevy::{
     ecs::{
@@ -27,10 +27,10 @@ use crate::{
     },
 };
 
-/// The most cascades that are served in a frame: four lights of four.
+/// Maximum number of cascades per frame: four lights with four each.
 const MAX_VIEWS: usize = 16;
 
-/// What is drawn of one forest into one map.
+/// The trees of one forest that are drawn into one map.
 pub struct CastForest {
     /// Which forest.
     pub entity: Entity,
@@ -40,7 +40,7 @@ pub struct CastForest {
     pub bind_group: BindGroup,
 }
 
-/// A map of Bevy's and its casters.
+/// One of Bevy's maps and its casters.
 pub struct CastView {
     /// The light's view.
     pub entity: Entity,

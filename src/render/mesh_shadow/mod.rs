@@ -1,11 +1,11 @@
 //! Trees in the shadow maps of Bevy's directional lights, so that ordinary meshes receive the shadow of the forest.
 //!
-//! Our own maps ([`sun_shadow`](super::sun_shadow)) are read by Canopy's shaders alone; a `StandardMaterial` reads those of its
-//! [`DirectionalLight`](bevy::light::DirectionalLight). Where such a light has `shadow_maps_enabled`, the casters of each of its
-//! cascades are drawn into the map after Bevy's own. Nothing runs where no light has.
+//! Our own maps ([`sun_shadow`](super::sun_shadow)) are read by Canopy's shaders only; a `StandardMaterial` reads those
+//! of its [`DirectionalLight`](bevy::light::DirectionalLight). Where such a light has `shadow_maps_enabled`, the
+//! casters of each of its cascades are drawn into the map after Bevy's own. Nothing runs if no light has.
 //!
-//! Cost: Bevy clears its maps in every frame, so the casters are culled and drawn in every frame: one depth pass a cascade.
-//! Limits: point and spot lights know no trees; the terrain casts onto no mesh.
+//! Cost: Bevy clears its maps in every frame, so the casters are culled and drawn in every frame: one depth pass per
+//! cascade. Limits: trees cast no shadow from point and spot lights; the terrain casts no shadow onto meshes.
 
 mod casters;
 mod draw;

@@ -2,7 +2,7 @@
 //! everything else.
 //!
 //! From [Hillaire 2020], evaluated on the CPU ([`SkyView`]), so that the visible sky, the fog, the light on ground and
-//! trees and the ground truth share one model. Cost: an upload of 150 KB when the light changed, one look-up a sky
+//! trees and the ground truth share one model. Cost: an upload of 150 KB when the light changes, one look-up per sky
 //! pixel.
 
 use bevy::{
@@ -47,14 +47,14 @@ use crate::light::atmosphere::SkyView;
 struct SkyTexture {
     view: TextureView,
     texture: Texture,
-    shows: Option<(Daylight, f32)>,
+    uploaded: Option<(Daylight, f32)>,
 }
 
 impl FromWorld for SkyTexture {
     fn from_world(world: &mut World) -> Self {
         let size = (SkyView::WIDTH as u32, SkyView::HEIGHT as u32);
         let (texture, view) = gpu::table(world.resource::<RenderDevice>(), "canopy_sky", size);
-        Self { texture, view, shows: None }
+        Self { texture, view, uploaded: None }
     }
 }
 
@@ -119,18 +119,18 @@ fn upload_sky(
 ) {
     shared.sky = sky.view.clone();
     let (Some(view), Some(daylight)) = (&frame.view, &scene.daylight) else { return };
-    let known = sky
-        .shows
+    let current = sky
+        .uploaded
         .as_ref()
         .is_some_and(|(light, exposure)| std::sync::Arc::ptr_eq(&light.0, &daylight.0) && *exposure == view.exposure);
-    if known {
-        report.skipped("sky radiance", "the sun rests");
+    if current {
+        report.skipped("sky radiance", "the light has not changed");
         return;
     }
     let texels = daylight.0.sky_view.to_rgba16f(view.exposure);
     let (width, height) = (SkyView::WIDTH as u32, SkyView::HEIGHT as u32);
     gpu::write_level(&queue, &sky.texture, 0, 0, width, height, 8, bytemuck::cast_slice(&texels));
-    sky.shows = Some((daylight.clone(), view.exposure));
+    sky.uploaded = Some((daylight.clone(), view.exposure));
     report.ran("sky radiance", "uploaded for a new light");
 }
 
@@ -148,7 +148,7 @@ fn prepare_pipeline(
     current.0 = frame.view.as_ref().map(|view| pipelines.specialize(&cache, &pipeline, view.attachment));
 }
 
-/// Fills what nothing else covers.
+/// Draws the sky where nothing else was drawn.
 fn sky_pass(
     view: ViewQuery<(&ViewTarget, &ViewDepthTexture, &ExtractedCamera), With<CanopyCamera>>,
     frame: Res<FrameBindGroup>,

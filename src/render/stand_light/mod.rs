@@ -1,5 +1,5 @@
-//! The light inside a stand, as a texture of bind group 0: what neighbouring crowns let through of sky and sun, and what
-//! they scatter ([`crate::light::stand`]). Cost: nothing while light, exposure and trees stay the same.
+//! The light inside a stand, as a texture of bind group 0: the transmittance of neighbouring crowns for sky and sun,
+//! and what they scatter ([`crate::light::stand`]). Cost: nothing while light, exposure and trees stay the same.
 
 use std::sync::Arc;
 
@@ -31,9 +31,9 @@ use crate::{
     },
 };
 
-/// What is kept of a place: sky and beam, down, up; below each other in the texture.
+/// Blocks of the texture, one below the other: transmittances, downwelling and upwelling radiance.
 const BLOCKS: usize = 3;
-/// The largest number that is written.
+/// The largest value that is written.
 const BRIGHTEST: f32 = 6.0e4;
 
 /// The table of [`StandLight`] on the GPU, exposed.
@@ -41,19 +41,19 @@ const BRIGHTEST: f32 = 6.0e4;
 struct StandTexture {
     texture: Texture,
     view: TextureView,
-    /// What it holds.
-    shows: Option<(Arc<LightState>, f32, StandTrees)>,
+    /// The light, exposure and trees for which the texture was uploaded.
+    uploaded: Option<(Arc<LightState>, f32, StandTrees)>,
 }
 
 impl FromWorld for StandTexture {
     fn from_world(world: &mut World) -> Self {
         let size = (COVERS as u32, (BLOCKS * (DEPTHS + 1)) as u32);
         let (texture, view) = gpu::table(world.resource::<RenderDevice>(), "canopy_stand_light", size);
-        Self { texture, view, shows: None }
+        Self { texture, view, uploaded: None }
     }
 }
 
-/// Keeps the light inside stands.
+/// Computes the light inside stands.
 pub struct StandLightPlugin;
 
 impl Plugin for StandLightPlugin {
@@ -65,7 +65,7 @@ impl Plugin for StandLightPlugin {
     }
 }
 
-/// Computes and uploads the table where light, exposure or the trees have changed.
+/// Computes and uploads the table if light, exposure or the trees have changed.
 fn upload_stand_light(
     scene: Res<ExtractedScene>,
     frame: Res<PreparedFrame>,
@@ -78,17 +78,17 @@ fn upload_stand_light(
     shared.stand_light = stand.view.clone();
     let (Some(view), Some(daylight)) = (&frame.view, &scene.daylight) else { return };
     let trees = forests.trees();
-    let same = |(light, exposure, known): &(Arc<LightState>, f32, StandTrees)| {
-        Arc::ptr_eq(light, &daylight.0) && *exposure == view.exposure && *known == trees
+    let same = |(light, exposure, uploaded_trees): &(Arc<LightState>, f32, StandTrees)| {
+        Arc::ptr_eq(light, &daylight.0) && *exposure == view.exposure && *uploaded_trees == trees
     };
-    if stand.shows.as_ref().is_some_and(same) {
-        report.skipped("stand light", "the light rests");
+    if stand.uploaded.as_ref().is_some_and(same) {
+        report.skipped("stand light", "the light has not changed");
         return;
     }
     let texels = texels(&daylight.0, &StandLight::new(&daylight.0, &trees), view.exposure);
     let height = (BLOCKS * (DEPTHS + 1)) as u32;
     gpu::write_level(&queue, &stand.texture, 0, 0, COVERS as u32, height, 8, bytemuck::cast_slice(&texels));
-    stand.shows = Some((daylight.0.clone(), view.exposure, trees));
+    stand.uploaded = Some((daylight.0.clone(), view.exposure, trees));
     report.ran("stand light", "computed for a new light");
 }
 

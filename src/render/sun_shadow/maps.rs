@@ -1,4 +1,4 @@
-//! The shadow maps on the device, and what each of them shows.
+//! The shadow maps on the device, and the state that each of them was drawn for.
 
 use std::ops::Range;
 
@@ -34,20 +34,20 @@ use crate::{
 /// Everything that a cascade's map depends on. Equal keys have equal maps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CascadeKey {
-    /// Where the cascade lies.
+    /// Position of the cascade.
     pub place: CascadeBox,
-    /// Of each forest its generation, its origin, and at which distances each level casts.
+    /// Per forest: its generation, its origin, and the distances at which each level casts.
     pub forests: Vec<(Entity, u64, DVec3, Vec<Range<f64>>)>,
     /// State of the ordinary meshes that cast.
     pub meshes: u64,
 }
 
-/// What a layer shows.
+/// The state that a layer was drawn for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DrawnCascade {
     /// What the map depends on.
     pub key: CascadeKey,
-    /// Camera and view that the casters were chosen for; `None` if all of them are there.
+    /// Camera and view for which the casters were chosen; `None` if all casters were drawn.
     pub seen_by: Option<(DVec3, Mat4)>,
 }
 
@@ -65,7 +65,7 @@ pub struct CascadeForest {
 pub struct CascadeWork {
     /// Which layer.
     pub index: usize,
-    /// What the map will show.
+    /// The state that the map is drawn for.
     pub content: DrawnCascade,
     /// Casters.
     pub forests: Vec<CascadeForest>,
@@ -73,22 +73,22 @@ pub struct CascadeWork {
 
 /// Group 1 of a forest's casters.
 pub struct CasterBuffers {
-    /// One entry a cascade.
+    /// One entry per cascade.
     pub uniform: Buffer,
-    /// Indices of the casting trees, one list a cascade.
+    /// Indices of the casting trees, one list per cascade.
     pub visible: Vec<GrowingBuffer>,
 }
 
-/// The shadow maps and what they show.
+/// The shadow maps and their state.
 #[derive(Resource)]
 pub struct ShadowMaps {
     /// All layers, for sampling.
     pub view: TextureView,
-    /// One view a layer, for drawing.
+    /// One view per layer, for drawing.
     pub layers: Vec<TextureView>,
     /// Cascades of this frame, finest first.
     pub cascades: Vec<CascadeBox>,
-    /// What each layer shows.
+    /// The state of each layer.
     pub drawn: Vec<Option<DrawnCascade>>,
     /// Cascades to draw in this frame.
     pub work: Vec<CascadeWork>,
@@ -96,7 +96,7 @@ pub struct ShadowMaps {
     pub cascade_bind_group: Option<BindGroup>,
     /// Texels along a side.
     pub map_size: u32,
-    /// One [`CascadeViewUniform`](crate::render::bindings::uniforms::CascadeViewUniform) a cascade.
+    /// One [`CascadeViewUniform`](crate::render::bindings::uniforms::CascadeViewUniform) per cascade.
     pub cascade_uniforms: Buffer,
     /// Buffers of the forests that cast.
     pub casters: HashMap<Entity, CasterBuffers>,
@@ -105,7 +105,7 @@ pub struct ShadowMaps {
 impl FromWorld for ShadowMaps {
     fn from_world(world: &mut World) -> Self {
         let device = world.resource::<RenderDevice>();
-        // One texel serves while no shadow is asked for: nothing large is allocated for what a scene does not use.
+        // One texel is enough while no shadow is requested: a scene allocates nothing large that it does not use.
         let (view, layers) = create_maps(device, 1, 1);
         Self {
             view,
@@ -146,7 +146,7 @@ fn create_maps(device: &RenderDevice, size: u32, count: usize) -> (TextureView, 
 }
 
 impl ShadowMaps {
-    /// The cascades as the passes that read the maps see them, for a camera at `camera` (scene metres).
+    /// The cascades in the form that reading passes need, for a camera at `camera` (scene metres).
     pub fn uniforms(&self, camera: DVec3) -> [CascadeUniform; MAX_CASCADES] {
         let mut cascades = [CascadeUniform::default(); MAX_CASCADES];
         for (slot, cascade) in cascades.iter_mut().zip(&self.cascades) {
@@ -160,7 +160,7 @@ impl ShadowMaps {
         cascades
     }
 
-    /// Makes maps of the size and number that `settings` ask for, as far as the device has them.
+    /// Creates maps of the size and number in `settings`, within the limits of the device.
     pub fn resize(&mut self, device: &RenderDevice, settings: &SunShadowSettings) {
         let limit = device.limits().max_texture_dimension_2d;
         let size = settings.map_size.max(16).min(limit.min(8192));

@@ -36,7 +36,7 @@ use crate::render::{
     shaders::{CanopyShaders, ShaderFile},
 };
 
-/// Stride and topology: what a pipeline depends on.
+/// What a pipeline depends on: stride and topology.
 type PipelineKey = (u64, PrimitiveTopology);
 
 struct MeshCaster {
@@ -79,12 +79,12 @@ impl MeshCasters {
         self.casters.is_empty()
     }
 
-    /// Changes whenever a caster appears, moves or goes.
+    /// Changes whenever a caster is added, moved or removed.
     pub fn state(&self) -> u64 {
         self.state
     }
 
-    /// Places of all casters relative to `anchor` (scene metres), as group 1 with dynamic offsets.
+    /// Transforms of all casters relative to `anchor` (scene metres), as group 1 with dynamic offsets.
     pub fn bind_group(&self, device: &RenderDevice, pipelines: &PipelineCache, anchor: DVec3) -> BindGroup {
         let mut bytes = vec![0u8; self.casters.len().max(1) * UNIFORM_STRIDE as usize];
         let shift = Mat4::from_translation((self.origin - anchor).as_vec3());

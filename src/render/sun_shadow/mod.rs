@@ -1,12 +1,13 @@
-//! The shadow of the key light (sun or moon): our own depth maps, kept while nothing changed.
+//! The shadow of the key light (sun or moon): our own depth maps, kept until something changes.
 //!
-//! Up to four square cascades around the camera ([`cascades`](crate::cull::cascades)), from near to far. Near trees cast as shadow proxies,
-//! far ones as one picture that faces the light's azimuth plus the level picture, so that a cross that the sun sees
-//! edge-on keeps its shadow. Casters between the light and a cascade are clamped onto its near plane.
+//! Up to four square cascades around the camera ([`cascades`](crate::cull::cascades)), from near to far. Near trees
+//! cast as shadow proxies. Far trees cast as one billboard that faces the light's azimuth and the horizontal one, so
+//! that a cross that the sun sees edge-on keeps its shadow. Casters between the light and a cascade are clamped onto
+//! its near plane.
 //!
-//! Cost: nothing while the light, the box and the casters rest; else one depth pass a changed cascade. A rounded
-//! light and a stepped box make the map a function of the moment, not of the frames before; the rounding moves no
-//! shadow by more than half a texel.
+//! Cost: nothing while light, box and casters do not change; else one depth pass per changed cascade. The light's
+//! direction is rounded and the box moves in steps, so a map depends on the current state only, not on earlier frames.
+//! The rounding moves no shadow by more than half a texel.
 //!
 //! Limits: no translucent shadows; the terrain casts through [`GroundMap`](super::terrain::GroundMap), at its
 //! resolution.

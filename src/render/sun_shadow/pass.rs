@@ -22,7 +22,7 @@ use crate::render::{
 
 const TARGET: LevelTarget = LevelTarget::ShadowMap;
 
-/// Draws every cascade whose key changed, and notes what it shows now.
+/// Draws every cascade whose key changed, and records its new state.
 pub fn sun_shadow_pass(
     _view: ViewQuery<&CanopyCamera>,
     mut maps: ResMut<ShadowMaps>,

@@ -1,4 +1,4 @@
-//! Where the cascades of a frame lie, which of them must be drawn again, and with which casters.
+//! Positions the cascades of a frame, and decides which of them are drawn again and with which casters.
 
 use bevy::{
     ecs::system::{Res, ResMut},
@@ -74,7 +74,7 @@ pub fn prepare_shadows(
         .collect();
 
     for (index, &place) in maps.cascades.iter().enumerate() {
-        // Near the camera, a finer map has the trees' own shadows already.
+        // Near the camera, a finer map already contains the trees' shadows.
         let served = index.checked_sub(1).map_or(0.0, |finer| 0.7 * maps.cascades[finer].radius);
         let content = forests.iter().map(|(entity, forest)| {
             let casting = forest.casting_distances(served..settings.proxy_distance, place.texel);
@@ -86,12 +86,13 @@ pub fn prepare_shadows(
         let drawn = maps.drawn[index].as_ref();
         let fits = |drawn: &DrawnCascade| drawn.key == key && drawn.seen_by.is_none_or(|seen_by| seen_by == this_view);
         if drawn.is_some_and(fits) {
-            report.skipped(name, "light, box and casters rest");
+            report.skipped(name, "light, box and casters have not changed");
             continue;
         }
-        // Under a new light the map is drawn for this view only: while the light moves, it will not live to see another.
-        // If it does, it is completed once and kept. What this view shows is the same either way, as the margin holds what
-        // the shaders add to a place before they look it up: a few texels, half a crown for crosses.
+        // For a new light the map is drawn for this view only: while the light moves, the map is replaced before the
+        // view changes. If it is not, it is completed once and kept. This view looks the same either way, because the
+        // margin includes what the shaders add to a position before the look-up: a few texels, or half a crown for
+        // crosses.
         let same_light = drawn.is_some_and(|drawn| drawn.key.place.direction == key.place.direction);
         let margin = 6.0 * place.texel + 0.6 * f64::from(widest);
         let lowest = lowest_receiver(&scene, view.camera, place.radius) - margin;
@@ -150,7 +151,7 @@ fn lowest_receiver(scene: &ExtractedScene, camera: DVec3, radius: f64) -> f64 {
     ground.unwrap_or(f64::NEG_INFINITY).max(camera.y - radius)
 }
 
-/// Shares the maps with the passes that read them.
+/// Passes the maps to the passes that read them.
 pub fn share_maps(
     frame: Res<PreparedFrame>,
     maps: Res<ShadowMaps>,

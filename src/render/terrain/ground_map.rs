@@ -1,4 +1,5 @@
-//! A picture of the terrain from above that every pass reads: where it hides the key light, and where crowns cover it.
+//! A texture of the terrain seen from above that every pass reads: the horizon map of the key light, and the canopy
+//! cover.
 
 use std::sync::Arc;
 
@@ -38,11 +39,10 @@ const LONGEST_SIDE: f64 = 512.0;
 /// Metres towards the light within which relief can hide it.
 const HORIZON_DISTANCE: u32 = 12_000;
 
-/// Metres over which the cover counts that shades a tree: light that comes in askew passes over as much ground as trees are
-/// high.
-const SHADING_REACH: f64 = 32.0;
+/// Radius in metres of the cover that shades a tree: oblique light passes over about as much ground as trees are high.
+const SHADING_RADIUS: f64 = 32.0;
 
-/// Height in metres above the ground that the key light clears (R), share of ground under crowns (G), and that share in the
+/// Height in metres above the ground from which the key light is visible (R), canopy cover (G), and canopy cover of the
 /// surroundings (B).
 #[derive(Resource)]
 pub struct GroundMap {
@@ -51,12 +51,12 @@ pub struct GroundMap {
     texture: Texture,
     size: (u32, u32),
     extent: DVec2,
-    /// The cover of the surroundings of each place.
+    /// The canopy cover of the surroundings of each texel.
     wide: Option<CoverMap>,
-    shows: Option<Shown>,
+    uploaded: Option<Uploaded>,
 }
 
-struct Shown {
+struct Uploaded {
     terrain: Arc<Terrain>,
     cover: Option<Arc<CoverMap>>,
     light: Vec3,
@@ -69,22 +69,23 @@ impl FromWorld for GroundMap {
 }
 
 impl GroundMap {
-    /// The map without a ground: nothing hides the light, and no crowns cover anything.
+    /// The map without a ground: the light is visible everywhere, and the canopy cover is 0.
     fn empty(device: &RenderDevice, queue: &RenderQueue) -> Self {
         let (texture, view) = gpu::table(device, "canopy_ground_map", (1, 1));
         let texel = [f16::from_f32(-6.0e4), f16::ZERO, f16::ZERO, f16::ZERO];
         gpu::write_level(queue, &texture, 0, 0, 1, 1, 8, bytemuck::cast_slice(&[texel]));
-        Self { view, mean_cover: 0.0, texture, size: (1, 1), extent: DVec2::ONE, wide: None, shows: None }
+        Self { view, mean_cover: 0.0, texture, size: (1, 1), extent: DVec2::ONE, wide: None, uploaded: None }
     }
 
-    /// Camera-relative origin and inverse size of the map, for a camera at `camera` (metres from the terrain's own origin).
+    /// Camera-relative origin and inverse size of the map, for a camera at `camera` (metres from the terrain's own
+    /// origin).
     fn placement(&self, camera: DVec3) -> [f32; 4] {
         let origin = -0.5 * self.extent - DVec2::new(camera.x, camera.z);
         [origin.x as f32, origin.y as f32, (1.0 / self.extent.x) as f32, (1.0 / self.extent.y) as f32]
     }
 }
 
-/// Brings the map up to date and shares it with all passes.
+/// Updates the map and passes it to all passes.
 pub fn prepare_ground_map(
     scene: Res<ExtractedScene>,
     frame: Res<PreparedFrame>,
@@ -113,24 +114,24 @@ fn update(
     report: &FrameReport,
 ) {
     let Some((_, ground, _)) = &scene.ground else {
-        // A ground that was despawned is let go, its shadow with it.
-        if map.shows.is_some() {
+        // A despawned ground is freed together with its shadow.
+        if map.uploaded.is_some() {
             *map = GroundMap::empty(device, queue);
         }
         return;
     };
     let Some(daylight) = &scene.daylight else { return };
     let light = daylight.0.key_direction;
-    let same_ground = map.shows.as_ref().is_some_and(|shown| {
-        Arc::ptr_eq(&shown.terrain, &ground.terrain)
-            && match (&shown.cover, &ground.cover) {
+    let same_ground = map.uploaded.as_ref().is_some_and(|uploaded| {
+        Arc::ptr_eq(&uploaded.terrain, &ground.terrain)
+            && match (&uploaded.cover, &ground.cover) {
                 (Some(a), Some(b)) => Arc::ptr_eq(a, b),
                 (None, None) => true,
                 _ => false,
             }
     });
-    if same_ground && map.shows.as_ref().is_some_and(|shown| shown.light == light) {
-        report.skipped("terrain shadow", "light and terrain rest");
+    if same_ground && map.uploaded.as_ref().is_some_and(|uploaded| uploaded.light == light) {
+        report.skipped("terrain shadow", "light and terrain have not changed");
         return;
     }
     let extent = ground.terrain.extent();
@@ -150,7 +151,7 @@ fn update(
         }
     };
     if !same_ground {
-        map.wide = ground.cover.as_ref().map(|cover| cover.widened(SHADING_REACH));
+        map.wide = ground.cover.as_ref().map(|cover| cover.widened(SHADING_RADIUS));
     }
     let texels = texels(ground, map.wide.as_ref(), &horizon, size);
     if !same_ground {
@@ -159,10 +160,10 @@ fn update(
     }
     gpu::write_level(queue, &map.texture, 0, 0, size.0, size.1, 8, bytemuck::cast_slice(&texels));
     report.ran("terrain shadow", format!("{} × {} cells", size.0, size.1));
-    map.shows = Some(Shown { terrain: ground.terrain.clone(), cover: ground.cover.clone(), light });
+    map.uploaded = Some(Uploaded { terrain: ground.terrain.clone(), cover: ground.cover.clone(), light });
 }
 
-/// One texel a cell, row by row from the north.
+/// One texel per cell, row by row from the north.
 fn texels(ground: &Ground, wide: Option<&CoverMap>, horizon: &[f32], size: (u32, u32)) -> Vec<[f16; 4]> {
     let extent = ground.terrain.extent();
     let cell = extent / DVec2::new(f64::from(size.0), f64::from(size.1));

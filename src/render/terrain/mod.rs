@@ -1,9 +1,9 @@
 //! The terrain pass: the ground as tiles of continuous level of detail, and the ground map that trees read.
 //!
 //! From [Strugar 2009], "Continuous Distance-Dependent Level of Detail for Rendering Heightmaps": a quadtree of square
-//! tiles of 32 × 32 cells, each vertex sliding onto the next coarser grid before its tile gives way, so that
-//! neighbours always meet ([`crate::terrain::tiles`]). A tile's heights and normals are evaluated on the CPU from the
-//! same smooth surface on which the trees stand, once, and kept on the GPU while it is in use.
+//! tiles of 32 × 32 cells, each vertex morphs onto the next coarser grid before its tile is replaced, so that
+//! neighbours always match ([`crate::terrain::tiles`]). A tile's heights and normals are evaluated on the CPU from the
+//! same smooth surface on which the trees stand, once, and kept on the GPU while the tile is in use.
 //!
 //! Ground colour follows slope, height, canopy cover and noise (`shaders/terrain/terrain.wgsl`).
 

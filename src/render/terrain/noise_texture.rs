@@ -16,7 +16,7 @@ pub fn noise_texture(device: &RenderDevice, queue: &RenderQueue) -> TextureView 
     gpu::texture(device, queue, "canopy_ground_noise", TextureFormat::Rgba8Unorm, &mip_chain(&noise_image()), 1)
 }
 
-/// Box-filtered levels, all four channels alike: these are numbers, not colours.
+/// Box-filtered levels, all four channels alike: the values are numbers, not colours.
 fn mip_chain(image: &image::RgbaImage) -> MipChain {
     let mut levels = vec![image.as_raw().clone()];
     let mut side = NOISE_SIDE as usize;

@@ -18,7 +18,7 @@ use crate::terrain::{
 
 /// Vertices of a tile.
 pub const TILE_VERTICES: usize = (TILE_QUADS + 1) * (TILE_QUADS + 1);
-/// Tiles that the device holds at first; doubled while a view needs more.
+/// Initial number of tiles on the device; doubled while a view needs more.
 const FIRST_SLOTS: usize = 512;
 
 /// Level, column and row in the quadtree.
@@ -41,7 +41,7 @@ impl TileCache {
     /// An empty cache of the tiles of `terrain`.
     ///
     /// # Errors
-    /// [`TerrainError`] for settings that no quadtree can have.
+    /// [`TerrainError`] for settings that are not valid for a quadtree.
     pub fn new(device: &RenderDevice, terrain: &Arc<Terrain>, settings: &TileSettings) -> Result<Self, TerrainError> {
         Ok(Self {
             terrain: terrain.clone(),
@@ -75,7 +75,7 @@ impl TileCache {
         self.free = (0..capacity).rev().collect();
     }
 
-    /// Makes room for `wanted` tiles at once; the tiles that it holds may have to be made again.
+    /// Makes room for `wanted` tiles; the current tiles may have to be uploaded again.
     pub fn reserve(&mut self, device: &RenderDevice, wanted: usize) {
         let limit = device.limits().max_storage_buffer_binding_size as usize;
         let most = limit / (TILE_VERTICES * size_of::<GpuTileVertex>());
@@ -85,14 +85,14 @@ impl TileCache {
         }
     }
 
-    /// The slot of a tile, made and uploaded where it is new. `None` while all slots are in use in this frame.
+    /// The slot of a tile, which is computed and uploaded if it is new. `None` if all slots are in use in this frame.
     pub fn slot(&mut self, key: TileKey, frame: u64, queue: &RenderQueue, made: &mut usize) -> Option<usize> {
         if let Some((slot, used)) = self.slots.get_mut(&key) {
             *used = frame;
             return Some(*slot);
         }
         if self.free.is_empty() {
-            // Forget the half that was not used longest.
+            // Drop the least recently used half.
             let mut ages: Vec<(u64, TileKey, usize)> =
                 self.slots.iter().filter(|(_, (_, used))| *used != frame).map(|(k, (s, u))| (*u, *k, *s)).collect();
             ages.sort_unstable();

@@ -85,11 +85,11 @@ impl FromWorld for GpuTerrain {
 pub struct TerrainStatistics {
     /// Tiles drawn.
     pub tiles: usize,
-    /// Triangles of these.
+    /// Number of their triangles.
     pub triangles: usize,
 }
 
-/// Chooses the tiles of the view and uploads those that are new.
+/// Chooses the tiles of the view and uploads the new ones.
 pub fn prepare_tiles(
     scene: Res<ExtractedScene>,
     frame: Res<PreparedFrame>,
@@ -162,7 +162,7 @@ pub fn prepare_tiles(
     if made == 0 {
         report.skipped("terrain tiles", "all tiles of the view are on the GPU");
     } else {
-        report.ran("terrain tiles", format!("{made} made"));
+        report.ran("terrain tiles", format!("{made} uploaded"));
     }
     let noise = gpu.noise.get_or_insert_with(|| noise_texture(&device, &queue));
     gpu.bind_group = Some(device.create_bind_group(

@@ -1,12 +1,14 @@
-//! Bakes of the leaves' light beside the flight: a preview at once, then in full, then the pictures of the crosses.
+//! Bakes the lighting of the leaves in the background: a preview at once, then at full quality, then the textures of
+//! the crossed billboards.
 //!
-//! Two threads of their own wait for orders. The quick one makes previews, of a share of the generators, one plant after
-//! the other. The thorough one begins when the previews are there and the keys have been at rest for a moment. The latest order of a
-//! species wins: what an older one still had to do is dropped, and of a bake that was under way only a preview is still
-//! shown. So a preview never waits for a bake in full that nobody wants any more.
+//! Two threads wait for requests, one per priority. The preview thread bakes previews with a fraction of the
+//! generators, one plant after the other. The full thread starts when the previews are done and no key was pressed for
+//! a moment. The latest request of a species wins: the remaining work of an older one is dropped, and of its running
+//! bakes only a preview is still shown. So a preview never waits for an outdated full bake.
 //!
-//! The thorough thread has a rayon pool of all cores but one, the quick one a pool of one thread: of two cores or more they
-//! never ask for more than there are, and leave one to the frame unless a preview comes while a bake that was dropped ends.
+//! The full thread has a rayon pool of all cores but one, the preview thread a pool of one thread. On two cores or more
+//! they never use more than there are, and leave one to the frame, except when a preview starts while an outdated full
+//! bake is still ending.
 
 use std::{
     collections::BTreeMap,
@@ -27,89 +29,90 @@ use crate::{
     plant::Plant,
 };
 
-/// Share of the generators that a preview goes by.
+/// Fraction of the generators that a preview uses.
 pub const PREVIEW_SHARE: f32 = 0.1;
-/// How long keys rest before a bake in full begins.
-const REST: Duration = Duration::from_millis(250);
+/// Time without a key press before a full bake starts.
+const QUIET_TIME: Duration = Duration::from_millis(250);
 
-/// What is wanted.
+/// A request to bake the lighting of a species.
 #[derive(Clone, Debug)]
-pub struct Order {
-    /// Number of the species.
+pub struct BakeRequest {
+    /// Index of the species.
     pub species: usize,
     /// Its individuals.
     pub plants: Vec<Arc<Plant>>,
-    /// How they are lit.
+    /// Settings of the lighting.
     pub settings: ImplicitSettings,
-    /// How their crosses are made; `None` only asks for the values that follow from the first individual.
+    /// Settings of the crossed billboards; `None` requests only the automatic values of the first individual.
     pub cross: Option<CrossSettings>,
 }
 
-/// What was baked.
+/// A finished bake.
 #[derive(Clone, Debug)]
-pub struct News {
-    /// Number of the species.
+pub struct BakeResult {
+    /// Index of the species.
     pub species: usize,
-    /// Number of the individual among those of the species.
+    /// Index of the individual within the species.
     pub individual: usize,
-    /// When it was ordered; `None` for a preview of an order that was replaced meanwhile. While a key is held no other may
-    /// come.
-    pub ordered: Option<Instant>,
-    /// What it is.
+    /// Time of the request; `None` for a preview of a request that was replaced meanwhile. While a key is held, all
+    /// previews may be of that kind.
+    pub requested: Option<Instant>,
+    /// The result itself.
     pub content: Content,
 }
 
-/// What was baked of one individual.
+/// The result of a bake of one individual.
 #[derive(Clone, Debug)]
 pub enum Content {
-    /// The values that a bake would go by.
+    /// The parameters that a bake would use.
     Values(ImplicitParameters),
-    /// The light.
+    /// The lighting.
     Light {
-        /// Of a preview or in full.
+        /// Whether it is a preview or at full quality.
         preview: bool,
-        /// The light.
+        /// The lighting.
         lighting: Arc<BakedLighting>,
-        /// The values that it goes by.
+        /// The parameters of the bake.
         values: ImplicitParameters,
-        /// Why the leaves have their own normals after all.
+        /// Why the leaves keep their own normals, if they do.
         no_surface: Option<NoSurface>,
     },
-    /// Crosses in the light that was baked in full.
+    /// Crossed billboards with the lighting at full quality.
     Cross(Arc<Cross>),
 }
 
-/// How far an order has come.
+/// Progress of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
-    /// Previews or values are made.
+    /// Previews or values are being computed.
     Preview,
-    /// Individuals that are baked in full, of how many.
+    /// Number of individuals baked at full quality, and of all individuals.
     Full(usize, usize),
-    /// Individuals whose crosses are made, of how many.
+    /// Number of individuals whose billboards are baked, and of all individuals.
     Crosses(usize, usize),
 }
 
 struct Job {
     number: u64,
-    ordered: Instant,
-    order: Order,
+    requested: Instant,
+    request: BakeRequest,
     previewed: usize,
     lit: Vec<Arc<BakedLighting>>,
     crossed: usize,
 }
 
+/// The thread that bakes a task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Lane {
-    Quick,
-    Thorough,
+enum Priority {
+    Preview,
+    Full,
 }
 
-/// A piece of an order that is carried out in one go.
-struct Piece {
+/// A part of a request that is baked in one go.
+struct Task {
     species: usize,
     number: u64,
-    ordered: Instant,
+    requested: Instant,
     individual: usize,
     plant: Arc<Plant>,
     work: Work,
@@ -121,13 +124,13 @@ enum Work {
     Cross { lighting: Arc<BakedLighting>, settings: CrossSettings },
 }
 
-impl Piece {
-    fn carry_out(&self) -> Content {
+impl Task {
+    fn run(&self) -> Content {
         match &self.work {
             Work::Values(settings) => Content::Values(implicit_parameters(&self.plant, settings)),
             Work::Light { settings, preview } => {
                 let mut settings = *settings;
-                // The normals do not ask for it, and nobody looks at it.
+                // Neither the normals nor the panel need the mesh of the surface.
                 settings.surface = false;
                 if *preview {
                     settings.generator_share = PREVIEW_SHARE;
@@ -145,42 +148,49 @@ impl Piece {
 }
 
 impl Job {
-    fn piece(&self, individual: usize, work: Work) -> Option<Piece> {
-        let plant = self.order.plants.get(individual)?.clone();
-        Some(Piece { species: self.order.species, number: self.number, ordered: self.ordered, individual, plant, work })
+    fn task(&self, individual: usize, work: Work) -> Option<Task> {
+        let plant = self.request.plants.get(individual)?.clone();
+        Some(Task {
+            species: self.request.species,
+            number: self.number,
+            requested: self.requested,
+            individual,
+            plant,
+            work,
+        })
     }
 
-    fn quick(&self) -> Option<Piece> {
-        let settings = self.order.settings;
+    fn preview_task(&self) -> Option<Task> {
+        let settings = self.request.settings;
         let preview = || Work::Light { settings, preview: true };
-        let work = if self.order.cross.is_some() { preview() } else { Work::Values(settings) };
-        self.piece(self.previewed, work)
+        let work = if self.request.cross.is_some() { preview() } else { Work::Values(settings) };
+        self.task(self.previewed, work)
     }
 
-    fn thorough(&self) -> Option<Piece> {
-        let settings = self.order.cross.filter(|_| self.quick().is_none())?;
+    fn full_task(&self) -> Option<Task> {
+        let settings = self.request.cross.filter(|_| self.preview_task().is_none())?;
         match self.lit.get(self.crossed) {
-            Some(lighting) if self.lit.len() == self.order.plants.len() => {
-                self.piece(self.crossed, Work::Cross { lighting: lighting.clone(), settings })
+            Some(lighting) if self.lit.len() == self.request.plants.len() => {
+                self.task(self.crossed, Work::Cross { lighting: lighting.clone(), settings })
             }
-            _ => self.piece(self.lit.len(), Work::Light { settings: self.order.settings, preview: false }),
+            _ => self.task(self.lit.len(), Work::Light { settings: self.request.settings, preview: false }),
         }
     }
 
-    /// Notes what was carried out; whether nothing is left to do.
-    fn note(&mut self, content: &Content) -> bool {
+    /// Records a finished task; returns whether nothing is left to do.
+    fn record(&mut self, content: &Content) -> bool {
         match content {
             Content::Values(_) => return true,
             Content::Light { preview: true, .. } => self.previewed += 1,
             Content::Light { lighting, .. } => self.lit.push(lighting.clone()),
             Content::Cross(_) => self.crossed += 1,
         }
-        self.crossed >= self.order.plants.len()
+        self.crossed >= self.request.plants.len()
     }
 
     fn progress(&self) -> Progress {
-        let all = self.order.plants.len();
-        if self.quick().is_some() {
+        let all = self.request.plants.len();
+        if self.preview_task().is_some() {
             Progress::Preview
         } else if self.lit.len() < all {
             Progress::Full(self.lit.len(), all)
@@ -193,27 +203,27 @@ impl Job {
 #[derive(Default)]
 struct State {
     jobs: BTreeMap<usize, Job>,
-    orders: u64,
-    news: Vec<News>,
+    requests: u64,
+    results: Vec<BakeResult>,
     closed: bool,
     failure: Option<String>,
 }
 
 impl State {
-    /// What `lane` should do now, or how long it may sleep before it looks again.
-    fn next(&self, lane: Lane, now: Instant) -> Result<Piece, Option<Duration>> {
+    /// The next task for `priority`, or how long it may sleep before it checks again.
+    fn next(&self, priority: Priority, now: Instant) -> Result<Task, Option<Duration>> {
         let mut jobs: Vec<&Job> = self.jobs.values().collect();
         jobs.sort_by_key(|job| std::cmp::Reverse(job.number));
         let mut wait = None;
         for job in jobs {
-            let rest = REST.saturating_sub(now.saturating_duration_since(job.ordered));
-            match lane {
-                Lane::Quick => match job.quick() {
-                    Some(piece) => return Ok(piece),
+            let rest = QUIET_TIME.saturating_sub(now.saturating_duration_since(job.requested));
+            match priority {
+                Priority::Preview => match job.preview_task() {
+                    Some(task) => return Ok(task),
                     None => continue,
                 },
-                Lane::Thorough => match job.thorough() {
-                    Some(piece) if rest.is_zero() => return Ok(piece),
+                Priority::Full => match job.full_task() {
+                    Some(task) if rest.is_zero() => return Ok(task),
                     Some(_) => wait = Some(wait.unwrap_or(rest).min(rest)),
                     None => {}
                 },
@@ -222,18 +232,18 @@ impl State {
         Err(wait)
     }
 
-    /// Takes up what came of a piece, unless its order was taken back or, but for a preview, replaced meanwhile.
-    fn finish(&mut self, piece: &Piece, content: Content) {
-        let Some(job) = self.jobs.get_mut(&piece.species) else { return };
-        let current = job.number == piece.number;
+    /// Stores the result of a task, unless its request was cancelled meanwhile or, except for a preview, replaced.
+    fn finish(&mut self, task: &Task, content: Content) {
+        let Some(job) = self.jobs.get_mut(&task.species) else { return };
+        let current = job.number == task.number;
         if !current && !matches!(content, Content::Light { preview: true, .. }) {
             return;
         }
-        if current && job.note(&content) {
-            self.jobs.remove(&piece.species);
+        if current && job.record(&content) {
+            self.jobs.remove(&task.species);
         }
-        let ordered = current.then_some(piece.ordered);
-        self.news.push(News { species: piece.species, individual: piece.individual, ordered, content });
+        let requested = current.then_some(task.requested);
+        self.results.push(BakeResult { species: task.species, individual: task.individual, requested, content });
     }
 }
 
@@ -248,40 +258,40 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for something to do; `None` when nobody wants anything any more.
-    fn wait(&self, lane: Lane) -> Option<Piece> {
+    /// Waits for a task; `None` when the baker was dropped.
+    fn wait(&self, priority: Priority) -> Option<Task> {
         let mut state = self.state();
         loop {
             if state.closed {
                 return None;
             }
-            state = match state.next(lane, Instant::now()) {
-                Ok(piece) => return Some(piece),
+            state = match state.next(priority, Instant::now()) {
+                Ok(task) => return Some(task),
                 Err(Some(rest)) => self.changed.wait_timeout(state, rest).unwrap_or_else(PoisonError::into_inner).0,
                 Err(None) => self.changed.wait(state).unwrap_or_else(PoisonError::into_inner),
             };
         }
     }
 
-    fn work(&self, lane: Lane, threads: usize) {
+    fn work(&self, priority: Priority, threads: usize) {
         let name = |index| format!("canopy light {index}");
         let pool = match rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(name).build() {
             Ok(pool) => pool,
             Err(error) => {
-                self.state().failure = Some(format!("no threads for bakes: {error}"));
+                self.state().failure = Some(format!("cannot create threads for bakes: {error}"));
                 self.changed.notify_all();
                 return;
             }
         };
-        while let Some(piece) = self.wait(lane) {
-            let content = pool.install(|| piece.carry_out());
-            self.state().finish(&piece, content);
+        while let Some(task) = self.wait(priority) {
+            let content = pool.install(|| task.run());
+            self.state().finish(&task, content);
             self.changed.notify_all();
         }
     }
 }
 
-/// The two threads and their orders. Dropped, they end after what they are at.
+/// The two threads and their requests. When it is dropped, they end after their current task.
 #[derive(Default)]
 pub struct Baker {
     shared: Arc<Shared>,
@@ -289,62 +299,62 @@ pub struct Baker {
 }
 
 impl Baker {
-    /// Bakes `order` instead of what was wanted of this species before. The first order starts the threads.
-    pub fn order(&mut self, order: Order) {
-        if order.plants.is_empty() {
+    /// Bakes `request`, which replaces an earlier request of its species. The first request starts the threads.
+    pub fn request(&mut self, request: BakeRequest) {
+        if request.plants.is_empty() {
             return;
         }
         if !std::mem::replace(&mut self.started, true) {
-            self.start(Lane::Quick, 1);
-            self.start(Lane::Thorough, spare_cores());
+            self.start(Priority::Preview, 1);
+            self.start(Priority::Full, spare_cores());
         }
         let mut state = self.shared.state();
-        state.orders += 1;
-        // A share that is no larger than a preview's needs none.
-        let slow = order.cross.is_none() || order.settings.in_range().generator_share > PREVIEW_SHARE;
-        let previewed = if slow { 0 } else { order.plants.len() };
-        let (number, ordered) = (state.orders, Instant::now());
-        let job = Job { number, ordered, previewed, lit: Vec::new(), crossed: 0, order };
-        state.jobs.insert(job.order.species, job);
+        state.requests += 1;
+        // A full bake with no more generators than a preview needs no preview.
+        let slow = request.cross.is_none() || request.settings.in_range().generator_share > PREVIEW_SHARE;
+        let previewed = if slow { 0 } else { request.plants.len() };
+        let (number, requested) = (state.requests, Instant::now());
+        let job = Job { number, requested, previewed, lit: Vec::new(), crossed: 0, request };
+        state.jobs.insert(job.request.species, job);
         drop(state);
         self.shared.changed.notify_all();
     }
 
-    fn start(&self, lane: Lane, threads: usize) {
+    fn start(&self, priority: Priority, threads: usize) {
         let shared = self.shared.clone();
-        let started =
-            thread::Builder::new().name(format!("canopy light {lane:?}")).spawn(move || shared.work(lane, threads));
+        let started = thread::Builder::new()
+            .name(format!("canopy light {priority:?}"))
+            .spawn(move || shared.work(priority, threads));
         if let Err(error) = started {
-            self.shared.state().failure = Some(format!("no thread for bakes: {error}"));
+            self.shared.state().failure = Some(format!("cannot create a thread for bakes: {error}"));
         }
     }
 
-    /// Drops what was wanted of a species, and what came of it that nobody has taken yet.
+    /// Cancels the request of a species, and drops its results that were not taken yet.
     pub fn cancel(&mut self, species: usize) {
         let mut state = self.shared.state();
         state.jobs.remove(&species);
-        state.news.retain(|news| news.species != species);
+        state.results.retain(|result| result.species != species);
     }
 
-    /// What was baked since the last call, in its order; nothing of orders that were taken back, and of those that were replaced
-    /// only previews.
-    pub fn news(&mut self) -> Vec<News> {
-        std::mem::take(&mut self.shared.state().news)
+    /// The results since the last call, in order: none of cancelled requests, and only previews of replaced ones.
+    pub fn results(&mut self) -> Vec<BakeResult> {
+        std::mem::take(&mut self.shared.state().results)
     }
 
-    /// How far the order of a species has come; `None` where nothing is to be done.
+    /// Progress of the request of a species; `None` if nothing is left to do.
     pub fn progress(&self, species: usize) -> Option<Progress> {
         self.shared.state().jobs.get(&species).map(Job::progress)
     }
 
-    /// Waits until there is news, or nothing left to do.
+    /// Waits until there are results, or nothing is left to do.
     #[cfg(test)]
     pub(super) fn wait(&self) {
-        let idle = |state: &mut State| state.news.is_empty() && !state.jobs.is_empty() && state.failure.is_none();
+        let idle = |state: &mut State| state.results.is_empty() && !state.jobs.is_empty() && state.failure.is_none();
         drop(self.shared.changed.wait_while(self.shared.state(), idle));
     }
 
-    /// Why nothing can be baked, if so.
+    /// Why nothing can be baked, if it cannot.
     pub fn failure(&self) -> Option<String> {
         self.shared.state().failure.clone()
     }
@@ -371,35 +381,35 @@ mod tests {
         (0..count).map(|seed| grow(&GrowParameters::broadleaf(), seed, 5000).map(Arc::new)).collect()
     }
 
-    fn order(plants: &[Arc<Plant>], settings: ImplicitSettings) -> Order {
+    fn request(plants: &[Arc<Plant>], settings: ImplicitSettings) -> BakeRequest {
         let cross = CrossSettings { resolution: 64, supersampling: 1, ..CrossSettings::default() };
-        Order { species: 0, plants: plants.to_vec(), settings, cross: Some(cross) }
+        BakeRequest { species: 0, plants: plants.to_vec(), settings, cross: Some(cross) }
     }
 
-    /// All news until the order of species 0 is carried out.
-    fn all_news(baker: &mut Baker) -> Vec<News> {
-        let mut news = Vec::new();
+    /// All results until the request of species 0 is done.
+    fn all_results(baker: &mut Baker) -> Vec<BakeResult> {
+        let mut results = Vec::new();
         while baker.progress(0).is_some() && baker.failure().is_none() {
             baker.wait();
-            news.extend(baker.news());
+            results.extend(baker.results());
         }
-        news.extend(baker.news());
-        news
+        results.extend(baker.results());
+        results
     }
 
     #[test]
-    fn previews_come_first_and_what_comes_last_is_the_scenes_own_bake() -> Outcome {
+    fn previews_come_first_and_the_last_results_equal_the_scenes_own_bake() -> Outcome {
         let plants = plants(2)?;
         let settings = ImplicitSettings { radius: Some(1.5), ..ImplicitSettings::default() };
         let mut baker = Baker::default();
-        baker.order(order(&plants, settings));
-        let news = all_news(&mut baker);
-        let kinds: Vec<_> = news
+        baker.request(request(&plants, settings));
+        let results = all_results(&mut baker);
+        let kinds: Vec<_> = results
             .iter()
-            .map(|news| {
+            .map(|result| {
                 (
-                    news.individual,
-                    match &news.content {
+                    result.individual,
+                    match &result.content {
                         Content::Values(_) => "values",
                         Content::Light { preview: true, .. } => "preview",
                         Content::Light { .. } => "full",
@@ -411,54 +421,57 @@ mod tests {
         let expected = ["preview", "full", "cross"].map(|kind| [(0, kind), (1, kind)]).concat();
         assert_eq!(kinds, expected);
         for (individual, plant) in plants.iter().enumerate() {
-            let truth = BakedLighting::bake(plant, &LightingSettings::Expressive(settings));
-            let Content::Light { lighting, no_surface: None, .. } = &news[2 + individual].content else {
+            let expected = BakedLighting::bake(plant, &LightingSettings::Expressive(settings));
+            let Content::Light { lighting, no_surface: None, .. } = &results[2 + individual].content else {
                 return Err("no light".into());
             };
-            assert!(**lighting == truth);
-            let Content::Cross(cross) = &news[4 + individual].content else { return Err("no cross".into()) };
-            assert!(**cross == bake_cross(plant, &truth, &order(&plants, settings).cross.unwrap_or_default()));
+            assert!(**lighting == expected);
+            let Content::Cross(cross) = &results[4 + individual].content else { return Err("no cross".into()) };
+            assert!(**cross == bake_cross(plant, &expected, &request(&plants, settings).cross.unwrap_or_default()));
         }
         Ok(())
     }
 
     #[test]
-    fn the_latest_order_wins() -> Outcome {
+    fn the_latest_request_wins() -> Outcome {
         let plants = plants(1)?;
         let mut baker = Baker::default();
-        let radius = |turn: u16| 1.0 + 0.1 * f32::from(turn);
-        for turn in 0..20 {
-            baker.order(order(&plants, ImplicitSettings { radius: Some(radius(turn)), ..ImplicitSettings::default() }));
+        let radius = |step: u16| 1.0 + 0.1 * f32::from(step);
+        for step in 0..20 {
+            baker.request(request(
+                &plants,
+                ImplicitSettings { radius: Some(radius(step)), ..ImplicitSettings::default() },
+            ));
         }
-        let full: Vec<f32> = all_news(&mut baker)
+        let full: Vec<f32> = all_results(&mut baker)
             .iter()
-            .filter_map(|news| match &news.content {
+            .filter_map(|result| match &result.content {
                 Content::Light { preview: false, values, .. } => Some(values.radius),
                 _ => None,
             })
             .collect();
         assert_eq!(full, [radius(19)]);
-        baker.order(order(&plants, ImplicitSettings::default()));
+        baker.request(request(&plants, ImplicitSettings::default()));
         baker.cancel(0);
-        assert!(all_news(&mut baker).is_empty());
+        assert!(all_results(&mut baker).is_empty());
         Ok(())
     }
 
-    /// A held key replaces order after order, faster than one preview is made.
+    /// A held key replaces request after request, faster than one preview is baked.
     #[test]
-    fn a_replaced_order_still_shows_its_preview_and_nothing_else() -> Outcome {
+    fn a_replaced_request_still_shows_its_preview_and_nothing_else() -> Outcome {
         let (plants, now) = (plants(1)?, Instant::now());
         let job = |number| Job {
             number,
-            ordered: now,
-            order: order(&plants, ImplicitSettings::default()),
+            requested: now,
+            request: request(&plants, ImplicitSettings::default()),
             previewed: 0,
             lit: Vec::new(),
             crossed: 0,
         };
         let mut state = State::default();
         state.jobs.insert(0, job(2));
-        let old = job(1).quick().ok_or("nothing to do")?;
+        let old = job(1).preview_task().ok_or("nothing to do")?;
         let light = |preview| Content::Light {
             preview,
             lighting: Arc::new(BakedLighting::Local),
@@ -466,36 +479,38 @@ mod tests {
             no_surface: None,
         };
         state.finish(&old, light(false));
-        assert!(state.news.is_empty());
+        assert!(state.results.is_empty());
         state.finish(&old, light(true));
-        assert!(state.news.len() == 1 && state.news[0].ordered.is_none());
+        assert!(state.results.len() == 1 && state.results[0].requested.is_none());
         assert_eq!(state.jobs[&0].progress(), Progress::Preview);
-        // The thorough lane waits for the preview, then for the keys to rest.
-        assert!(matches!(state.next(Lane::Thorough, now), Err(None)));
-        let new = state.next(Lane::Quick, now).map_err(|_| "nothing to do")?;
+        // The full priority waits for the preview, then for the keys to be released.
+        assert!(matches!(state.next(Priority::Full, now), Err(None)));
+        let new = state.next(Priority::Preview, now).map_err(|_| "nothing to do")?;
         state.finish(&new, light(true));
-        assert!(matches!(state.next(Lane::Thorough, now), Err(Some(rest)) if rest == REST));
-        assert!(state.next(Lane::Thorough, now + REST).is_ok_and(|piece| piece.number == 2));
+        assert!(matches!(state.next(Priority::Full, now), Err(Some(rest)) if rest == QUIET_TIME));
+        assert!(state.next(Priority::Full, now + QUIET_TIME).is_ok_and(|task| task.number == 2));
         state.jobs.clear();
         state.finish(&new, light(true));
-        assert_eq!(state.news.len(), 2);
+        assert_eq!(state.results.len(), 2);
         Ok(())
     }
 
     #[test]
-    fn values_come_without_a_bake_and_no_surface_is_told() -> Outcome {
+    fn values_come_without_a_bake_and_a_missing_surface_is_reported() -> Outcome {
         let plants = plants(1)?;
         let mut baker = Baker::default();
-        baker.order(Order { cross: None, ..order(&plants, ImplicitSettings::default()) });
-        let news = all_news(&mut baker);
-        let [News { content: Content::Values(values), .. }] = news.as_slice() else { return Err("no values".into()) };
+        baker.request(BakeRequest { cross: None, ..request(&plants, ImplicitSettings::default()) });
+        let results = all_results(&mut baker);
+        let [BakeResult { content: Content::Values(values), .. }] = results.as_slice() else {
+            return Err("no values".into());
+        };
         assert!(values.radius > 0.0 && values.threshold > 0.0 && values.core > 0.0);
-        baker.order(order(&plants, ImplicitSettings { threshold: Some(1e6), ..ImplicitSettings::default() }));
-        let told = all_news(&mut baker).into_iter().filter_map(|news| match news.content {
+        baker.request(request(&plants, ImplicitSettings { threshold: Some(1e6), ..ImplicitSettings::default() }));
+        let reasons = all_results(&mut baker).into_iter().filter_map(|result| match result.content {
             Content::Light { no_surface, .. } => no_surface,
             _ => None,
         });
-        assert!(told.count() == 2);
+        assert!(reasons.count() == 2);
         Ok(())
     }
 }

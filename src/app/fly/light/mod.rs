@@ -1,9 +1,10 @@
-//! The light of the leaves, turned while looking: a panel whose lines are the values of an implicit surface's light, for one
-//! species of the scene at a time.
+//! The light panel: adjusts the lighting of the leaves during the flight. Its lines are the settings of the lighting by
+//! an implicit surface, for one species of the scene at a time.
 //!
-//! `tuning` says what can be turned; `baker` bakes beside the flight; `show` draws the panel. Here is what holds them together.
-//! A turn bakes a preview first, which changes the full models' vertices; then everything in full; then the pictures of the
-//! crosses, which until then keep the light they had. Nothing of it goes into the cache of bakes.
+//! `tuning` defines what can be adjusted; `baker` bakes in the background; `show` draws the panel. This file connects
+//! them. An adjustment first bakes a preview, which changes the full models' vertices; then everything at full quality;
+//! then the textures of the crossed billboards, which keep the old lighting until then. None of it goes into the cache
+//! of bakes.
 
 mod baker;
 mod show;
@@ -16,7 +17,7 @@ use bevy::ecs::{
     system::{Query, ResMut},
 };
 
-use super::{controls::Turn, session::Session};
+use super::{controls::PanelInput, session::Session};
 use crate::{
     assets::{Stage, plants},
     bake::{
@@ -30,51 +31,52 @@ use crate::{
     render::components::Forest,
     scene::{Lighting, Transfer},
 };
-use baker::{Baker, Content, News, Order};
+use baker::{BakeRequest, BakeResult, Baker, Content};
 use tuning::{Line, Tuning};
 
 pub use show::light_panel;
 
-/// What is turned, and what is shown of it.
+/// The state of the light panel.
 #[derive(Resource)]
 pub struct LightPanel {
-    /// Whether the panel is shown and has the arrow keys.
+    /// Whether the panel is shown and receives the arrow keys.
     pub open: bool,
-    /// Number of the species that is turned.
-    chosen: usize,
-    /// Number of the line that is turned, among those that its species has now.
+    /// Index of the selected species.
+    selected: usize,
+    /// Index of the selected line among the current lines of the species.
     line: usize,
-    species: Vec<Turned>,
-    /// The plants in the scene's own light.
+    species: Vec<SpeciesTuning>,
+    /// The plants with the scene's own lighting.
     plants: Arc<Vec<BakedPlant>>,
     cross: CrossSettings,
     baker: Baker,
-    /// Species that are to be shown in their scene's light again.
+    /// Species that get their scene's lighting back.
     restored: Vec<usize>,
 }
 
-/// A species and what became of it.
-struct Turned {
+/// A species and the results of its bakes.
+struct SpeciesTuning {
     name: String,
-    /// First and last but one of its variants.
+    /// Indices of its variants.
     variants: std::ops::Range<usize>,
     tuning: Tuning,
-    /// What the last bake of its first individual went by.
+    /// Parameters of the last bake of its first individual.
     values: Option<ImplicitParameters>,
-    /// Why an individual has its leaves' own normals.
+    /// Per individual: why it uses its leaves' own normals, if it does.
     no_surface: Vec<Option<String>>,
-    /// Seconds from the key to the frame that uploads its preview, light in full and crosses, each of all individuals.
+    /// Seconds from the key press to the upload of the preview, the full lighting and the crossed billboards of all
+    /// individuals.
     times: [Option<f64>; 3],
 }
 
 impl LightPanel {
     /// A panel, closed, for the species of `stage`.
     pub fn new(stage: &Stage) -> Self {
-        // What is lit together with its neighbours is no plant's own light.
+        // The lighting of plants that are lit together with their neighbours cannot be baked per plant.
         let alone = stage.scene.species.iter().zip(&stage.variants).filter(|(species, _)| !species.is_lit_together());
         let species = alone.map(|(species, variants)| {
             let variants = usize::from(variants.start)..usize::from(variants.end);
-            Turned {
+            SpeciesTuning {
                 name: species.name.clone(),
                 tuning: Tuning::new(species.lighting.clone().unwrap_or(Lighting::Transfer(Transfer::default()))),
                 values: None,
@@ -85,7 +87,7 @@ impl LightPanel {
         });
         Self {
             open: false,
-            chosen: 0,
+            selected: 0,
             line: 0,
             species: species.collect(),
             plants: stage.plants.clone(),
@@ -95,36 +97,36 @@ impl LightPanel {
         }
     }
 
-    /// Opens or closes the panel; `false` where the scene has no species that can be turned.
+    /// Opens or closes the panel; `false` if the scene has no species whose lighting can be adjusted.
     pub fn toggle(&mut self) -> bool {
         let something = !self.species.is_empty();
         self.open = !self.open && something;
-        self.ask_for_values();
+        self.request_values();
         something
     }
 
-    /// Does what a key asks for; a text is what to write for the user.
-    pub fn turn(&mut self, turn: Turn) -> Option<String> {
-        let number = self.chosen;
+    /// Handles a key press. Returns the text to print for the user, if any.
+    pub fn handle(&mut self, input: PanelInput) -> Option<String> {
+        let number = self.selected;
         let count = self.species.len();
         let species = self.species.get_mut(number)?;
         let lines = species.tuning.lines();
         let line = lines.get(self.line).copied().unwrap_or(Line::Light);
-        let changed = match turn {
-            Turn::Line(down) => {
+        let changed = match input {
+            PanelInput::Line(down) => {
                 let step = if down { 1 } else { lines.len() - 1 };
                 self.line = (self.line + step) % lines.len();
                 false
             }
-            Turn::Species(forward) => {
-                self.chosen = (number + if forward { 1 } else { count - 1 }) % count;
+            PanelInput::Species(forward) => {
+                self.selected = (number + if forward { 1 } else { count - 1 }) % count;
                 self.line = 0;
-                self.ask_for_values();
+                self.request_values();
                 false
             }
-            Turn::Value { up, fine } => species.tuning.turn(line, up, fine, species.values.as_ref()),
-            Turn::Reset => species.tuning.reset(line),
-            Turn::Write => return Some(snippet(&species.name, &species.tuning.lighting())),
+            PanelInput::Value { up, fine } => species.tuning.adjust(line, up, fine, species.values.as_ref()),
+            PanelInput::Reset => species.tuning.reset(line),
+            PanelInput::Write => return Some(snippet(&species.name, &species.tuning.lighting())),
         };
         if changed {
             self.apply(number);
@@ -132,53 +134,53 @@ impl LightPanel {
         None
     }
 
-    /// The light of the species that are not in their scene's own, for a picture's notes.
+    /// The lighting of the species that differ from the scene, for an image's notes.
     pub fn notes(&self) -> Option<String> {
-        let turned = self.species.iter().filter(|species| species.tuning.is_turned());
+        let changed = self.species.iter().filter(|species| species.tuning.is_changed());
         let notes: Vec<_> =
-            turned.map(|species| format!("{}: {}", species.name, species.tuning.lighting().to_ron())).collect();
+            changed.map(|species| format!("{}: {}", species.name, species.tuning.lighting().to_ron())).collect();
         (!notes.is_empty()).then(|| notes.join("; "))
     }
 
-    /// Orders the light that a species has now.
+    /// Requests bakes of the current lighting of a species.
     fn apply(&mut self, number: usize) {
         let Some(species) = self.species.get_mut(number) else { return };
         species.times = [None; 3];
-        if species.tuning.is_turned() {
-            self.order(number, Some(self.cross));
+        if species.tuning.is_changed() {
+            self.request(number, Some(self.cross));
         } else {
-            // The scene's own light is still there.
+            // The bakes of the scene's own lighting are still there.
             self.baker.cancel(number);
             self.restored.push(number);
             let own = self.plants.get(species.variants.clone()).unwrap_or_default();
             species.no_surface = own.iter().map(|plant| plant.lighting.warning()).collect();
             species.values = None;
-            self.ask_for_values();
+            self.request_values();
         }
     }
 
-    /// Orders what an open panel does not know yet of the chosen species.
-    fn ask_for_values(&mut self) {
-        let unknown = self.species.get(self.chosen).is_some_and(|species| species.values.is_none());
-        // A bake that is under way will tell.
-        if self.open && unknown && self.baker.progress(self.chosen).is_none() {
-            self.order(self.chosen, None);
+    /// Requests the automatic values of the selected species, if the panel is open and they are not known yet.
+    fn request_values(&mut self) {
+        let unknown = self.species.get(self.selected).is_some_and(|species| species.values.is_none());
+        // A running bake will return them.
+        if self.open && unknown && self.baker.progress(self.selected).is_none() {
+            self.request(self.selected, None);
         }
     }
 
-    fn order(&mut self, number: usize, cross: Option<CrossSettings>) {
+    fn request(&mut self, number: usize, cross: Option<CrossSettings>) {
         let Some(species) = self.species.get(number) else { return };
         let Some(expressive) = species.tuning.expressive() else { return };
         let settings = ImplicitSettings { together: false, ..*expressive };
         let plants = self.plants.get(species.variants.clone()).unwrap_or_default();
         let plants = plants.iter().map(|plant| plant.plant.clone()).collect();
-        self.baker.order(Order { species: number, plants, settings, cross });
+        self.baker.request(BakeRequest { species: number, plants, settings, cross });
     }
 
-    /// `shown` with everything that was baked or taken back since the last call; `None` where nothing was.
-    fn follow(&mut self, shown: &[BakedPlant]) -> Option<Vec<BakedPlant>> {
-        let (restored, news) = (std::mem::take(&mut self.restored), self.baker.news());
-        if restored.is_empty() && news.is_empty() {
+    /// `shown` with everything that was baked or restored since the last call; `None` if nothing was.
+    fn take_bakes(&mut self, shown: &[BakedPlant]) -> Option<Vec<BakedPlant>> {
+        let (restored, results) = (std::mem::take(&mut self.restored), self.baker.results());
+        if restored.is_empty() && results.is_empty() {
             return None;
         }
         let mut plants = shown.to_vec();
@@ -189,7 +191,7 @@ impl LightPanel {
                 shown.clone_from_slice(own);
             }
         }
-        for News { species, individual, ordered, content } in news {
+        for BakeResult { species, individual, requested, content } in results {
             let Some(species) = self.species.get_mut(species) else { continue };
             let Some(plant) = plants.get_mut(species.variants.start + individual) else { continue };
             let stage = match content {
@@ -200,8 +202,8 @@ impl LightPanel {
                 Content::Light { preview, lighting, values, no_surface } => {
                     plant.lighting = lighting;
                     species.values = if individual == 0 { Some(values) } else { species.values };
-                    if let Some(told) = species.no_surface.get_mut(individual) {
-                        *told = no_surface.map(|reason| reason.to_string());
+                    if let Some(slot) = species.no_surface.get_mut(individual) {
+                        *slot = no_surface.map(|reason| reason.to_string());
                     }
                     if preview { 0 } else { 1 }
                 }
@@ -211,7 +213,7 @@ impl LightPanel {
                 }
             };
             if individual + 1 == species.variants.len() {
-                let seconds = ordered.map(|ordered| ordered.elapsed().as_secs_f64());
+                let seconds = requested.map(|requested| requested.elapsed().as_secs_f64());
                 species.times[stage] = seconds.or(species.times[stage]);
             }
         }
@@ -219,15 +221,15 @@ impl LightPanel {
     }
 }
 
-/// A species' light, ready to be pasted into its entry of a scene file.
+/// A species' lighting, ready to be pasted into its entry in a scene file.
 fn snippet(name: &str, lighting: &Lighting) -> String {
     // A line break in a name must not end the comment.
     format!("// species {name:?}\nlighting: {},\n", lighting.to_ron())
 }
 
-/// Brings the forest in step with what was baked.
-pub fn follow_light(mut panel: ResMut<LightPanel>, mut session: ResMut<Session>, mut forests: Query<&mut Forest>) {
-    let Some(plants) = panel.follow(&session.stage.plants) else { return };
+/// Applies finished bakes to the forest.
+pub fn apply_bakes(mut panel: ResMut<LightPanel>, mut session: ResMut<Session>, mut forests: Query<&mut Forest>) {
+    let Some(plants) = panel.take_bakes(&session.stage.plants) else { return };
     let plants = Arc::new(plants);
     for mut forest in &mut forests {
         forest.plants = plants.clone();
@@ -237,7 +239,6 @@ pub fn follow_light(mut panel: ResMut<LightPanel>, mut session: ResMut<Session>,
 
 #[cfg(test)]
 mod tests {
-
     use super::*;
     use crate::{progress::Silent, scene::Scene};
 
@@ -258,12 +259,12 @@ mod tests {
         Ok(Stage::build(&Scene::parse(SCENE, "light.ron".as_ref())?, &mut Silent)?)
     }
 
-    /// Lets everything be baked that was ordered; the plants that are shown in the end.
+    /// Waits for all requested bakes; returns the plants that are shown in the end.
     fn settle(panel: &mut LightPanel, mut shown: Vec<BakedPlant>) -> Vec<BakedPlant> {
         loop {
             panel.baker.wait();
             let busy = (0..panel.species.len()).any(|species| panel.baker.progress(species).is_some());
-            if let Some(plants) = panel.follow(&shown) {
+            if let Some(plants) = panel.take_bakes(&shown) {
                 shown = plants;
             } else if !busy {
                 return shown;
@@ -284,7 +285,7 @@ mod tests {
         let stage = stage()?;
         let mut panel = LightPanel::new(&stage);
         assert!(panel.toggle());
-        panel.turn(Turn::Value { up: true, fine: false });
+        panel.handle(PanelInput::Value { up: true, fine: false });
         let lit = settle(&mut panel, stage.plants.to_vec());
         assert!(same_light(&lit[2..], &stage.plants[2..]));
         for (lit, own) in lit.iter().zip(&stage.plants[..2]) {
@@ -294,30 +295,30 @@ mod tests {
         }
         assert!(panel.species[0].times.iter().all(Option::is_some) && panel.species[0].values.is_some());
         assert_eq!(panel.notes().as_deref(), Some("oak \"1\": Expressive()"));
-        panel.turn(Turn::Reset);
+        panel.handle(PanelInput::Reset);
         assert!(same_light(&settle(&mut panel, lit), &stage.plants) && panel.notes().is_none());
         Ok(())
     }
 
     #[test]
-    fn a_threshold_above_the_field_is_told_and_keeps_the_leaves_normals() -> Outcome {
+    fn a_threshold_above_the_field_is_reported_and_keeps_the_leaves_normals() -> Outcome {
         let stage = stage()?;
         let mut panel = LightPanel::new(&stage);
         panel.toggle();
-        panel.turn(Turn::Species(true));
+        panel.handle(PanelInput::Species(true));
         let shown = settle(&mut panel, stage.plants.to_vec());
         assert!(
             same_light(&shown, &stage.plants) && panel.species[1].values.is_some_and(|values| values.exponent == 2.0)
         );
-        panel.turn(Turn::Line(true));
-        panel.turn(Turn::Line(true));
+        panel.handle(PanelInput::Line(true));
+        panel.handle(PanelInput::Line(true));
         for _ in 0..60 {
-            panel.turn(Turn::Value { up: true, fine: false });
+            panel.handle(PanelInput::Value { up: true, fine: false });
         }
         let shown = settle(&mut panel, shown);
         assert!(!shown[2].lighting.is_realigned());
-        assert!(panel.species[1].no_surface[0].as_ref().is_some_and(|told| told.contains("threshold")));
-        panel.turn(Turn::Reset);
+        assert!(panel.species[1].no_surface[0].as_ref().is_some_and(|reason| reason.contains("threshold")));
+        panel.handle(PanelInput::Reset);
         assert!(settle(&mut panel, shown)[2].lighting.is_realigned() && panel.species[1].no_surface[0].is_none());
         Ok(())
     }
@@ -327,10 +328,10 @@ mod tests {
         let stage = stage()?;
         let mut panel = LightPanel::new(&stage);
         panel.toggle();
-        panel.turn(Turn::Value { up: true, fine: false });
-        panel.turn(Turn::Line(false));
-        panel.turn(Turn::Value { up: false, fine: false });
-        let written = panel.turn(Turn::Write).ok_or("nothing written")?;
+        panel.handle(PanelInput::Value { up: true, fine: false });
+        panel.handle(PanelInput::Line(false));
+        panel.handle(PanelInput::Value { up: false, fine: false });
+        let written = panel.handle(PanelInput::Write).ok_or("nothing written")?;
         assert_eq!(written, "// species \"oak \\\"1\\\"\"\nlighting: Expressive(share: 0.833),\n");
         let scene = Scene::parse(&SCENE.replace("lighting: Local", &written), "pasted.ron".as_ref())?;
         assert_eq!(scene.species[0].lighting.as_ref(), Some(&panel.species[0].tuning.lighting()));
@@ -338,10 +339,10 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_without_species_has_nothing_to_turn() -> Outcome {
+    fn a_scene_without_species_has_nothing_to_adjust() -> Outcome {
         let stage = Stage::build(&Scene::default(), &mut Silent)?;
         let mut panel = LightPanel::new(&stage);
-        assert!(!panel.toggle() && !panel.open && panel.turn(Turn::Reset).is_none());
+        assert!(!panel.toggle() && !panel.open && panel.handle(PanelInput::Reset).is_none());
         Ok(())
     }
 }

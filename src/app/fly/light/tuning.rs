@@ -1,7 +1,8 @@
-//! What can be turned in the light of a species, by which steps and within which ranges. Pure.
+//! The values of a species' lighting that can be adjusted, with their steps and ranges. Pure.
 //!
-//! Numbers that span decades go by factors, shares by equal steps; either is rounded, so that what is written into a scene
-//! file reads well. A number that was not set yet starts from what follows from the plant.
+//! Numbers that span decades are multiplied by a factor, fractions move by equal steps. Both are rounded, so that a
+//! scene file stays readable. A number that was not set yet starts from its automatic value, which follows from the
+//! plant.
 
 use std::ops::RangeInclusive;
 
@@ -10,16 +11,16 @@ use crate::{
     scene::{Lighting, lighting::word},
 };
 
-/// Something that can be turned.
+/// A value that can be adjusted: a line of the panel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Line {
-    /// The scene's own light or that of an implicit surface.
+    /// The scene's own lighting or that of an implicit surface.
     Light,
     /// ρ.
     Radius,
     /// τ.
     Threshold,
-    /// What the ambient term is a function of.
+    /// The field that the ambient term is computed from.
     Ambient,
     /// First radius of the depth field.
     AmbientRadius,
@@ -29,11 +30,11 @@ pub enum Line {
     Exponent,
     /// k_a_min.
     Least,
-    /// Where normals come from.
+    /// The source of the normals.
     Normals,
-    /// Share of a leaf's own normal.
+    /// Weight of a leaf's own normal.
     OwnNormal,
-    /// Share of the leaves that are generators.
+    /// Fraction of the leaves that are generators.
     Share,
 }
 
@@ -52,25 +53,25 @@ pub const LINES: [Line; 11] = [
     Line::Share,
 ];
 
-/// How a number is turned.
+/// How a number is adjusted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Step {
-    /// By a factor; below the number is the lower end of the range.
+    /// By a factor; below the number given here comes the lower end of the range.
     Factor(f64),
-    /// By a hundredth or five.
+    /// By one hundredth or five.
     Hundredths,
 }
 
-/// Factor of a step, and of a fine one. Rounding to three digits must not eat the latter.
+/// Factor of a step, and of a fine one. Rounding to three digits must not cancel the latter.
 const FACTORS: (f64, f64) = (1.2, 1.02);
 /// Hundredths of a step, and of a fine one.
 const HUNDREDTHS: (f64, f64) = (5.0, 1.0);
 
 impl Line {
-    /// What the panel calls it.
+    /// Its name in the panel.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Light => "light",
+            Self::Light => "lighting",
             Self::Radius => "radius \u{3c1}",
             Self::Threshold => "threshold \u{3c4}",
             Self::Ambient => "ambient term",
@@ -84,22 +85,24 @@ impl Line {
         }
     }
 
-    /// What it is and what turning it up does.
+    /// What it is and what a larger value does.
     pub fn tip(self) -> &'static str {
         match self {
-            Self::Light => "How this species is lit in this session: as its scene says, or by an implicit surface.",
-            Self::Radius => "How far a leaf's influence reaches. Larger: a smoother crown.",
+            Self::Light => "How this species is lit in this session: as in its scene, or with an implicit surface.",
+            Self::Radius => "Distance of a leaf's influence. Larger: a smoother crown.",
             Self::Threshold => "Density at the surface. Larger: a surface closer to the densest foliage.",
-            Self::Ambient => "Depth: leaves on the way out, by all radii. Published: density within rho less tau.",
-            Self::AmbientRadius => "First radius of the depth. Larger: gaps between twigs no longer count.",
-            Self::Core => "Depth or density from which on the ambient light is that of the core. Larger: brighter.",
-            Self::Exponent => "Below 1 the crown darkens late on the way inside, above 1 early.",
+            Self::Ambient => {
+                "Depth: leaves on the way out of the crown, at all radii. Published: density within rho minus tau."
+            }
+            Self::AmbientRadius => "First radius of the depth field. Larger: gaps between twigs are ignored.",
+            Self::Core => "Depth or density at which the ambient light reaches that of the core. Larger: brighter.",
+            Self::Exponent => "Below 1 the crown darkens late towards the core, above 1 early.",
             Self::Least => "Ambient light of the crown's core.",
             Self::Normals => {
-                "Nearest: that of the surface's nearest vertex, as published. Smooth: the density's gradient."
+                "Nearest: normal of the surface's nearest vertex, as published. Smooth: gradient of the density."
             }
-            Self::OwnNormal => "Share of each leaf's own normal in the result.",
-            Self::Share => "Share of the leaves that make the surface. Smaller: a faster bake, a little off.",
+            Self::OwnNormal => "Weight of each leaf's own normal in the result.",
+            Self::Share => "Fraction of the leaves that form the surface. Smaller: a faster but less accurate bake.",
         }
     }
 
@@ -122,7 +125,7 @@ impl Line {
         Some((as_written(*range.start())..=as_written(*range.end()), step))
     }
 
-    /// The number; `None` where it is not set, and for lines that are none.
+    /// The number; `None` if it is not set, and for lines that are not numbers.
     fn get(self, settings: &ImplicitSettings) -> Option<f64> {
         let default = ImplicitSettings::default();
         let value = match self {
@@ -139,7 +142,7 @@ impl Line {
         value.map(as_written)
     }
 
-    /// Sets the number, or takes it back.
+    /// Sets the number, or resets it to automatic.
     fn set(self, settings: &mut ImplicitSettings, value: Option<f64>) {
         let value = value.map(|value| value as f32);
         let default = ImplicitSettings::default();
@@ -156,7 +159,7 @@ impl Line {
         }
     }
 
-    /// What the number is where it is not set; `None` as long as nobody knows what follows from the plant.
+    /// The value of a number that is not set; `None` until a bake has derived it from the plant.
     fn automatic(self, used: Option<&ImplicitParameters>) -> Option<f64> {
         let value = match self {
             Self::Light | Self::Normals | Self::Ambient => return None,
@@ -173,7 +176,7 @@ impl Line {
     }
 }
 
-/// The light of a species: what the scene says, and what was made of it.
+/// The lighting of a species: that of the scene, and the user's changes to it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tuning {
     scene: Lighting,
@@ -182,7 +185,7 @@ pub struct Tuning {
 }
 
 impl Tuning {
-    /// The scene's own light.
+    /// The scene's own lighting.
     pub fn new(scene: Lighting) -> Self {
         let (expressive, is_expressive) = match &scene {
             Lighting::Expressive(expressive) => (*expressive, true),
@@ -191,29 +194,29 @@ impl Tuning {
         Self { scene, expressive, is_expressive }
     }
 
-    /// The light as it is now.
+    /// The current lighting.
     pub fn lighting(&self) -> Lighting {
         if self.is_expressive { Lighting::Expressive(self.expressive) } else { self.scene.clone() }
     }
 
-    /// The values of the implicit surface, where it is what lights the species.
+    /// The settings of the implicit surface, if one lights the species.
     pub fn expressive(&self) -> Option<&ImplicitSettings> {
         self.is_expressive.then_some(&self.expressive)
     }
 
-    /// Whether the light is another one than the scene's.
-    pub fn is_turned(&self) -> bool {
+    /// Whether the lighting differs from the scene's.
+    pub fn is_changed(&self) -> bool {
         self.lighting() != self.scene
     }
 
-    /// Lines that can be turned now.
+    /// Lines that can be adjusted now.
     pub fn lines(&self) -> &'static [Line] {
         if self.is_expressive { &LINES } else { &LINES[..1] }
     }
 
-    /// Turns a line up or down, by a small step where `fine`. `used` are the values that the last bake went by. `false`
-    /// where nothing changed: at the end of a range, or a start that is not known yet.
-    pub fn turn(&mut self, line: Line, up: bool, fine: bool, used: Option<&ImplicitParameters>) -> bool {
+    /// Adjusts a line up or down, by a small step if `fine`. `used` are the parameters of the last bake. `false` if
+    /// nothing changed: at the end of a range, or if the automatic value is not known yet.
+    pub fn adjust(&mut self, line: Line, up: bool, fine: bool, used: Option<&ImplicitParameters>) -> bool {
         let before = self.clone();
         match line {
             Line::Light => self.is_expressive = up || matches!(self.scene, Lighting::Expressive(_)),
@@ -225,15 +228,15 @@ impl Tuning {
             _ => {
                 let Some((range, step)) = line.number() else { return false };
                 if let Some(value) = line.get(&self.expressive).or(line.automatic(used)) {
-                    line.set(&mut self.expressive, Some(turned(value, &range, step, up, fine)));
+                    line.set(&mut self.expressive, Some(stepped(value, &range, step, up, fine)));
                 }
             }
         }
         *self != before
     }
 
-    /// Takes a line back: a number to what follows from the plant, normals to the default, the light with all its values to
-    /// the scene's. Whether anything changed.
+    /// Resets a line: a number to its automatic value, normals to the default, the lighting with all its values to the
+    /// scene's. Returns whether anything changed.
     pub fn reset(&mut self, line: Line) -> bool {
         let before = self.clone();
         match line {
@@ -245,7 +248,7 @@ impl Tuning {
         *self != before
     }
 
-    /// A line's value as the panel shows it.
+    /// A line's value, as the panel shows it.
     pub fn value(&self, line: Line, used: Option<&ImplicitParameters>) -> String {
         let number = |value: f64| format!("{}{}", three_digits(value), line.unit());
         match (line, line.get(&self.expressive)) {
@@ -255,8 +258,8 @@ impl Tuning {
                     Lighting::Expressive(_) => "expressive",
                     Lighting::Transfer(_) => "transfer",
                 };
-                let whose = if self.is_turned() { "for this session" } else { "the scene's" };
-                format!("{name} ({whose})")
+                let origin = if self.is_changed() { "this session" } else { "from the scene" };
+                format!("{name} ({origin})")
             }
             (Line::Ambient, _) => word(&self.expressive.ambient).to_lowercase(),
             (Line::Normals, _) => word(&self.expressive.normals).to_lowercase(),
@@ -268,13 +271,13 @@ impl Tuning {
     }
 }
 
-/// The decimal number that `value` is written as: 0.833, where `f64::from` has 0.83300000429.
+/// The decimal number that `value` is written as: 0.833, whereas `f64::from` gives 0.83300000429.
 fn as_written(value: f32) -> f64 {
     value.to_string().parse().unwrap_or(f64::from(value))
 }
 
-/// `value` one step further, within `range`.
-fn turned(value: f64, range: &RangeInclusive<f64>, step: Step, up: bool, fine: bool) -> f64 {
+/// `value` after one step, clamped to `range`.
+fn stepped(value: f64, range: &RangeInclusive<f64>, step: Step, up: bool, fine: bool) -> f64 {
     let of = |(coarse, small)| if fine { small } else { coarse };
     let next = match step {
         Step::Factor(least) if up => {
@@ -289,7 +292,8 @@ fn turned(value: f64, range: &RangeInclusive<f64>, step: Step, up: bool, fine: b
             if next < least { *range.start() } else { next }
         }
         Step::Hundredths => {
-            // From between two steps to the nearer end of its way; what rounding left beside a step counts as on it.
+            // A value between two steps goes to the next one; a value that only rounding moved off a step counts as on
+            // it.
             let (step, hundredths) = (of(HUNDREDTHS), value * 100.0);
             let steps =
                 if up { (hundredths / step + 1e-6).floor() + 1.0 } else { (hundredths / step - 1e-6).ceil() - 1.0 };
@@ -299,19 +303,19 @@ fn turned(value: f64, range: &RangeInclusive<f64>, step: Step, up: bool, fine: b
     next.clamp(*range.start(), *range.end())
 }
 
-/// Decimals that leave three digits, for a `value` above 0.
+/// Number of decimals for three significant digits, for a `value` above 0.
 fn decimals(value: f64) -> i32 {
     if value > 0.0 && value.is_finite() { 2 - value.log10().floor() as i32 } else { 0 }
 }
 
-/// To three digits.
+/// Rounds to three significant digits.
 fn rounded(value: f64) -> f64 {
     let decimals = decimals(value);
     let scale = 10f64.powi(decimals.abs());
     if decimals < 0 { (value / scale).round() * scale } else { (value * scale).round() / scale }
 }
 
-/// A number of three digits, or with as many as a whole one has.
+/// Writes a number with three significant digits, whole numbers with all of theirs.
 fn three_digits(value: f64) -> String {
     format!("{:.*}", decimals(value).clamp(0, 9) as usize, rounded(value))
 }
@@ -346,14 +350,14 @@ mod tests {
     }
 
     #[test]
-    fn a_number_starts_from_what_follows_from_the_plant() {
+    fn a_number_starts_from_its_automatic_value() {
         let mut tuning = expressive();
         assert_eq!(tuning.value(Line::Radius, Some(&USED)), "2.36 m (automatic)");
-        assert!(!tuning.turn(Line::Radius, true, false, None));
-        assert!(tuning.turn(Line::Radius, true, false, Some(&USED)));
+        assert!(!tuning.adjust(Line::Radius, true, false, None));
+        assert!(tuning.adjust(Line::Radius, true, false, Some(&USED)));
         assert_eq!(tuning.value(Line::Radius, Some(&USED)), "2.83 m");
-        assert!(tuning.turn(Line::Least, false, false, Some(&USED)));
-        assert!(tuning.turn(Line::Least, true, true, Some(&USED)));
+        assert!(tuning.adjust(Line::Least, false, false, Some(&USED)));
+        assert!(tuning.adjust(Line::Least, true, true, Some(&USED)));
         assert_eq!(tuning.value(Line::Least, None), "0.160");
         assert_eq!(tuning.lighting().to_ron(), "Expressive(radius: 2.83, least: 0.16)");
         assert!(tuning.reset(Line::Radius) && tuning.reset(Line::Least) && !tuning.reset(Line::Least));
@@ -361,24 +365,26 @@ mod tests {
     }
 
     #[test]
-    fn another_light_is_for_the_session_and_back() {
+    fn another_lighting_lasts_for_the_session_and_can_be_reset() {
         let scene = Lighting::Transfer(Transfer { bands: 5, ..Transfer::default() });
         let mut tuning = Tuning::new(scene.clone());
         assert_eq!((tuning.lines(), tuning.lighting().to_ron()), (&[Line::Light][..], "Transfer(bands: 5)".to_owned()));
-        assert!(!tuning.turn(Line::Radius, true, false, Some(&USED)) && !tuning.turn(Line::Light, false, false, None));
-        assert!(tuning.turn(Line::Light, true, false, None) && tuning.is_turned());
-        assert!(tuning.turn(Line::Normals, true, false, None) && !tuning.turn(Line::Normals, true, false, None));
-        assert_eq!(tuning.lighting().to_ron(), "Expressive(normals: Smooth)");
-        // Off and on again keeps the values, taking the light back does not.
-        assert!(tuning.turn(Line::Light, false, false, None) && !tuning.is_turned());
         assert!(
-            tuning.turn(Line::Light, true, false, None)
+            !tuning.adjust(Line::Radius, true, false, Some(&USED)) && !tuning.adjust(Line::Light, false, false, None)
+        );
+        assert!(tuning.adjust(Line::Light, true, false, None) && tuning.is_changed());
+        assert!(tuning.adjust(Line::Normals, true, false, None) && !tuning.adjust(Line::Normals, true, false, None));
+        assert_eq!(tuning.lighting().to_ron(), "Expressive(normals: Smooth)");
+        // Off and on again keeps the values, a reset does not.
+        assert!(tuning.adjust(Line::Light, false, false, None) && !tuning.is_changed());
+        assert!(
+            tuning.adjust(Line::Light, true, false, None)
                 && tuning.expressive().is_some_and(|e| *e != ImplicitSettings::default())
         );
         assert!(tuning.reset(Line::Light));
         assert_eq!(tuning, Tuning::new(scene));
         let mut own = expressive();
-        assert!(!own.turn(Line::Light, false, false, None) && own.expressive().is_some());
+        assert!(!own.adjust(Line::Light, false, false, None) && own.expressive().is_some());
     }
 
     #[test]
@@ -388,7 +394,7 @@ mod tests {
             let mut tuning = expressive();
             for (up, end) in [(false, *range.start()), (true, *range.end()), (false, *range.start())] {
                 let mut steps = 0;
-                while tuning.turn(line, up, false, Some(&USED)) {
+                while tuning.adjust(line, up, false, Some(&USED)) {
                     steps += 1;
                     assert!(steps < 300, "{line:?}");
                 }
@@ -409,7 +415,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn nothing_leaves_its_range_and_what_is_written_is_read(
+        fn values_stay_in_range_and_survive_a_scene_file(
             moves in prop::collection::vec((0..LINES.len(), any::<bool>(), any::<bool>(), 0..12u8), 0..60),
             wild in prop::array::uniform6(prop_oneof![any::<f32>(), 0.0f32..10.0]),
             known in any::<bool>(),
@@ -417,11 +423,11 @@ mod tests {
             let [radius, threshold, ambient_radius, least, core, exponent] = wild;
             let used = ImplicitParameters { radius, threshold, ambient_radius, least, core, exponent };
             let mut tuning = Tuning::new(Lighting::Local);
-            tuning.turn(Line::Light, true, false, None);
+            tuning.adjust(Line::Light, true, false, None);
             for (line, up, fine, kind) in moves {
                 match kind {
                     0 => tuning.reset(LINES[line]),
-                    _ => tuning.turn(LINES[line], up, fine, known.then_some(&used)),
+                    _ => tuning.adjust(LINES[line], up, fine, known.then_some(&used)),
                 };
             }
             for line in LINES {
@@ -434,12 +440,12 @@ mod tests {
         }
 
         #[test]
-        fn a_step_moves_and_the_way_back_leads_back(value in 0.01f64..0.9, fine in any::<bool>(), decade in -1..3i32) {
+        fn a_step_back_undoes_a_step(value in 0.01f64..0.9, fine in any::<bool>(), decade in -1..3i32) {
             for line in [Line::Radius, Line::Threshold, Line::Core, Line::Least] {
                 let Some((range, step)) = line.number() else { continue };
                 let value = if step == Step::Hundredths { (value * 100.0).round() / 100.0 } else { value * 10f64.powi(decade) };
-                let up = turned(value, &range, step, true, fine);
-                let back = turned(up, &range, step, false, fine);
+                let up = stepped(value, &range, step, true, fine);
+                let back = stepped(up, &range, step, false, fine);
                 prop_assert!(up > value);
                 let near = if step == Step::Hundredths { 0.051 } else { 0.011 * value };
                 prop_assert!((back - value).abs() <= near, "{:?} {} {} {}", line, value, up, back);
@@ -448,7 +454,7 @@ mod tests {
     }
 
     #[test]
-    fn every_light_is_written_as_it_is_read() -> Result<(), Box<dyn std::error::Error>> {
+    fn every_lighting_is_written_as_it_is_read() -> Result<(), Box<dyn std::error::Error>> {
         for text in [
             "Local",
             "Transfer()",

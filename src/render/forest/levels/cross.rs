@@ -1,5 +1,5 @@
-//! Crossed billboards [Franzke 2005, 4.3]: three planes a tree, the trees of all variants in one call of pulled vertices.
-//! Casts as one upright plane that faces the light's azimuth and the level one.
+//! Crossed billboards [Franzke 2005, 4.3]: three planes per tree; one draw call with vertex pulling for the trees of
+//! all variants. The shadow caster is one vertical plane that faces the light's azimuth, and the horizontal one.
 
 use std::{ops::Range, sync::Arc};
 
@@ -51,24 +51,24 @@ impl CrossRenderer {
 /// How the sky's light reaches the crosses of a forest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum CrossLight {
-    /// All by normal and k_a.
+    /// All by normal and ambient occlusion (k_a).
     Plain,
-    /// Some by lighting pictures.
+    /// Some by lighting textures.
     Mixed,
-    /// All by lighting pictures.
-    Pictures,
+    /// All by lighting textures.
+    Textured,
 }
 
 impl CrossLight {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Plain, Self::Mixed, Self::Pictures];
+    /// All values.
+    pub const ALL: [Self; 3] = [Self::Plain, Self::Mixed, Self::Textured];
 
-    /// That of crosses of these plants.
+    /// The value for the crosses of these plants.
     pub fn of(plants: &[BakedPlant]) -> Self {
         let lit = plants.iter().filter(|plant| has_light(plant)).count();
         match lit {
             0 => Self::Plain,
-            all if all == plants.len() => Self::Pictures,
+            all if all == plants.len() => Self::Textured,
             _ => Self::Mixed,
         }
     }
@@ -79,7 +79,7 @@ fn has_light(plant: &BakedPlant) -> bool {
     plant.cross().is_some_and(|cross| !cross.textures.light.is_empty())
 }
 
-/// Group 2: colours, properties, sampler, what is known of each plant's crosses.
+/// Group 2: colours, properties, sampler, and the data of each plant's crosses.
 fn cross_layout() -> BindGroupLayoutDescriptor {
     let float = TextureSampleType::Float { filterable: true };
     BindGroupLayoutDescriptor::new(
@@ -96,7 +96,7 @@ fn cross_layout() -> BindGroupLayoutDescriptor {
     )
 }
 
-/// Group 3 where some plants have lighting textures.
+/// Group 3, if some plants have lighting textures.
 fn light_layout() -> BindGroupLayoutDescriptor {
     let float = TextureSampleType::Float { filterable: true };
     BindGroupLayoutDescriptor::new(
@@ -200,21 +200,21 @@ impl LevelRenderer for CrossRenderer {
     }
 }
 
-/// The crosses of a forest's plants; `None` where the device cannot hold them.
+/// The crosses of a forest's plants; `None` if the device cannot hold them.
 struct GpuCrosses {
     drawn: Option<DrawnCrosses>,
 }
 
 struct DrawnCrosses {
-    /// Normals, k_a and foliage, three layers a variant.
+    /// Normals, ambient occlusion (k_a) and foliage, three layers per variant.
     properties: Texture,
     /// [`CrossVariantUniform`](crate::render::forest::CrossVariantUniform)s.
     variants: Buffer,
     /// Group 2.
     bind_group: BindGroup,
-    /// Which pipeline draws them.
+    /// The pipeline that draws them.
     light: CrossLight,
-    /// Group 3, where some have lighting textures.
+    /// Group 3, if some have lighting textures.
     light_textures: Option<BindGroup>,
 }
 
@@ -261,15 +261,15 @@ impl GpuLevel for GpuCrosses {
         }
         upload.gpu.queue.write_buffer(&drawn.variants, 0, bytemuck::cast_slice(&cross_variants(relight.new)));
         if pairs().filter(changed).any(|(old, new)| has_light(old) || has_light(new)) {
-            // Plants whose lighting textures come or go move the layers of the others.
+            // Adding or removing a plant's lighting textures moves the layers of the others.
             drawn.light = CrossLight::of(relight.new);
             drawn.light_textures = upload_light(relight.new, upload.gpu);
         }
     }
 }
 
-/// Three layers a plant of the textures that `of` takes from a cross. A plant without a cross has those of another one,
-/// which its planes without extent do not show.
+/// Three layers per plant of the textures that `of` takes from a cross. A plant without a cross gets those of another
+/// one; its planes have no extent, so they are never seen.
 fn layers(plants: &[BakedPlant], of: fn(&Cross) -> &[MipChain]) -> Vec<&MipChain> {
     let crosses = || plants.iter().filter_map(BakedPlant::cross);
     let Some(blank) = crosses().find_map(|cross| of(cross).first()) else { return Vec::new() };
@@ -281,7 +281,7 @@ fn layers(plants: &[BakedPlant], of: fn(&Cross) -> &[MipChain]) -> Vec<&MipChain
     all
 }
 
-/// The textures of all crosses: that of their properties; what is known of each plant's crosses; the bind group of all.
+/// The property texture of all crosses, the data of each plant's crosses, and their bind group.
 fn upload_textures(plants: &[BakedPlant], gpu: &Gpu) -> (Texture, Buffer, BindGroup) {
     let colors = layers(plants, |cross| &cross.textures.color);
     let properties = layers(plants, |cross| &cross.textures.properties);
@@ -321,7 +321,8 @@ fn upload_light(plants: &[BakedPlant], gpu: &Gpu) -> Option<BindGroup> {
     Some(gpu.bind_group(label, &light_layout(), &BindGroupEntries::single(&view)))
 }
 
-/// Whether crosses have the same planes, colours and outlines. A bake under another light gives equal ones in other memory.
+/// Whether crosses have the same planes, colours and outlines. A bake with another lighting creates equal ones in other
+/// memory.
 fn same_outline(old: &Cross, new: &Cross) -> bool {
     let sizes = |cross: &Cross| -> Vec<(u32, u32, usize)> {
         let chains = cross.textures.properties.iter();

@@ -1,4 +1,4 @@
-//! The representations that Canopy draws, one file each.
+//! The built-in representations, one file each.
 
 mod cross;
 mod model;
@@ -8,7 +8,7 @@ use std::sync::Arc;
 use super::representation::LevelRenderer;
 use crate::render::shaders::CanopyShaders;
 
-/// All of them.
+/// All built-in representations.
 pub fn built_in(shaders: &CanopyShaders) -> [Arc<dyn LevelRenderer>; 2] {
     [Arc::new(model::ModelRenderer::new(shaders)), Arc::new(cross::CrossRenderer::new(shaders))]
 }

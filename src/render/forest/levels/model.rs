@@ -1,4 +1,5 @@
-//! The full model: a plant's parts, instanced, one call a variant and part. Casts as the shadow proxy.
+//! The full model: a plant's parts, instanced, one draw call per variant and part. The shadow caster is the shadow
+//! proxy.
 
 use std::{ops::Range, sync::Arc};
 
@@ -42,7 +43,7 @@ use crate::{
     },
 };
 
-/// Metres a texel of the coarsest shadow map that can show a shadow proxy.
+/// Metres per texel of the coarsest shadow map for which a shadow proxy is fine enough.
 const COARSEST_SHADOW_TEXEL: f64 = 0.2;
 
 /// Draws full models.
@@ -58,22 +59,22 @@ impl ModelRenderer {
     }
 }
 
-/// What light reaches a part's full model, and how.
+/// How light reaches a part's full model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PartLight {
-    /// Sky by normal and k_a, sun by the leaf shader.
+    /// Sky by normal and ambient occlusion (k_a), sun by the leaf shader.
     Plain,
-    /// Sky by transfer.
+    /// Sky by radiance transfer.
     Transfer {
-        /// Whether light takes on colour on its way through the crown.
+        /// Whether light takes on the colour of the leaves inside the crown.
         color: bool,
-        /// What the sun comes by.
+        /// How the sun lights it.
         sun: SunLight,
     },
 }
 
 impl PartLight {
-    /// All of them.
+    /// All values.
     pub const ALL: [Self; 5] = [
         Self::Plain,
         Self::Transfer { color: false, sun: SunLight::LeafShader },
@@ -82,23 +83,23 @@ impl PartLight {
         Self::Transfer { color: true, sun: SunLight::Harmonics },
     ];
 
-    /// The light of a part, with the settings of its transfer if it has one.
+    /// The lighting of a part, with the settings of its transfer if it has one.
     pub fn new(transfer: Option<&TransferSettings>, sun: SunLight) -> Self {
         transfer.map_or(Self::Plain, |settings| Self::Transfer { color: settings.channels == Channels::Rgb, sun })
     }
 }
 
-/// What a part's pipeline depends on beside its light.
+/// What a part's pipeline depends on besides its lighting.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 struct PartSurface {
     /// Wood or foliage.
     kind: PartKind,
-    /// Whether its material has a normal map. Without one no pipeline samples any.
+    /// Whether its material has a normal map. Without one its pipeline samples none.
     normal_map: bool,
 }
 
 impl PartSurface {
-    /// All of them, wood first.
+    /// All values, wood first.
     const ALL: [Self; 4] = [
         Self { kind: PartKind::Wood, normal_map: false },
         Self { kind: PartKind::Wood, normal_map: true },
@@ -107,8 +108,8 @@ impl PartSurface {
     ];
 }
 
-/// Which pipeline draws a part, as the bits that [`LevelRenderer::pipeline`] takes. Wood has the lower numbers, as it is
-/// drawn first: what it hides of the leaves is not shaded.
+/// The pipeline of a part, as the bits that [`LevelRenderer::pipeline`] takes. Wood has the lower numbers, because it
+/// is drawn first: leaves that it hides are not shaded.
 fn features(surface: PartSurface, light: PartLight) -> u32 {
     let surface = PartSurface::ALL.iter().position(|known| *known == surface).unwrap_or(0);
     let light = PartLight::ALL.iter().position(|known| *known == light).unwrap_or(0);
@@ -262,11 +263,11 @@ struct GpuPart {
     uniform: Buffer,
     /// The full model.
     model: GpuMesh,
-    /// What casts the near shadow.
+    /// The shadow proxy, which casts the near shadow.
     proxy: GpuMesh,
     /// Group 2.
     bind_group: BindGroup,
-    /// Which pipeline draws it.
+    /// The pipeline that draws it.
     light: PartLight,
     /// Group 3 of plants that are lit by radiance transfer.
     transfer: Option<BindGroup>,
@@ -282,7 +283,7 @@ impl GpuLevel for GpuModels {
     fn features(&self, target: LevelTarget) -> Vec<u32> {
         let features_of = |part: &GpuPart| match target {
             LevelTarget::View(_) => features(part.surface, part.light),
-            // A shadow is as deep with a normal map as without.
+            // Depth does not depend on the normal map.
             LevelTarget::ShadowMap => features(PartSurface { normal_map: false, ..part.surface }, PartLight::Plain),
         };
         let mut all: Vec<u32> = self.parts.iter().flatten().map(features_of).collect();
@@ -339,7 +340,7 @@ impl GpuLevel for GpuModels {
     }
 }
 
-/// The parts of a plant that the sun lights by `sun`.
+/// The parts of a plant whose sunlight is computed by `sun`.
 fn upload_parts(
     plant: &BakedPlant,
     sun: SunLight,
@@ -386,8 +387,8 @@ fn upload_parts(
     parts
 }
 
-/// The vertices of `mesh`, which is part `part` of a plant, with the normals and the k_a of its `lighting`; what is missing
-/// there is the mesh's own, or 1.
+/// The vertices of `mesh`, which is part `part` of a plant, with the normals and the ambient occlusion (k_a) of its
+/// `lighting`. Values that are missing there are the mesh's own normals, or 1.
 fn vertices(mesh: &PlantMesh, lighting: &BakedLighting, part: usize) -> Vec<PlantVertex> {
     let (normals, ambient) = (lighting.normals(part).unwrap_or(&mesh.normals), lighting.ambient(part));
     let vertex = |(i, &position): (usize, &Vec3)| {
