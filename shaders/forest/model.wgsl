@@ -1,7 +1,7 @@
 // The full model of a tree, near the camera.
-#import canopy::constants::{NORMAL_STEPS, NORMAL_LEAST_LENGTH, WHOLE}
+#import canopy::constants::{NORMAL_STEPS, NORMAL_LEAST_LENGTH, WHOLE, AMBIENT_FITTED}
 #import canopy::frame::{frame, light}
-#import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, leaf_visibility}
+#import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, leaf_visibility}
 #import canopy::lighting::{Surface, shade, exitant, even_sky, leaf_transmission}
 #import canopy::output::finish
 #import canopy::stand::stand_light
@@ -22,7 +22,7 @@ struct Part {
     transmission: vec3<f32>,
     specular_reflectance: f32,
     roughness: f32,
-    // 1 where the ambient visibility is the ambient term of a density field, else 0.
+    // As in `Variant`.
     ambient_term: u32,
     // As in `Surface`.
     lobe_gain: f32,
@@ -191,7 +191,9 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     var surface: Surface;
     surface.albedo = texel.rgb * part.base_color;
 #ifdef FOLIAGE
-    surface.transmission = leaf_transmission(surface.albedo, part.transmission, part.specular_reflectance);
+    let published = is_published(part.ambient_term);
+    let transmission = leaf_transmission(surface.albedo, part.transmission, part.specular_reflectance);
+    surface.transmission = transmission * (1.0 - published);
     surface.albedo = tint_foliage(surface.albedo, look.tint);
     surface.viewer = -normalize(in.relative);
     surface.specular_reflectance = part.specular_reflectance;
@@ -199,8 +201,9 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.lobe_gain = part.lobe_gain;
     surface.lobe_limit = part.lobe_limit;
     // A pixel that covers half a texture of leaves covers several of them, and each faces elsewhere: highlights of one would
-    // sparkle. Normals that point out of the crown are no leaf's at all.
-    surface.gloss_isotropy = max(saturate(2.0 * max(across.x, across.y)), part.realigned);
+    // sparkle. Normals that point out of the crown are no leaf's at all; as published, the crown has the highlight.
+    let isotropy = max(saturate(2.0 * max(across.x, across.y)), part.realigned);
+    surface.gloss_isotropy = isotropy * (1.0 - published * part.realigned);
 #endif
     surface.normal = normal;
     let ground = sample_ground(in.relative);
@@ -213,7 +216,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let sky = in.front_sky;
 #endif
 #else
-    surface.ambient_visibility = with_indirect_ambient(look.ambient_visibility);
+    surface.ambient_visibility = with_indirect_ambient(look.ambient_visibility, part.ambient_term);
     let sky = even_sky(surface, stand_light(ground.surrounding_cover, 1.0 - look.relative_height));
 #endif
     var visibility = terrain_visibility(ground, look.height);
@@ -223,7 +226,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     }
 #ifdef FOLIAGE
 #ifndef TRANSFER
-    visibility *= select(1.0, leaf_visibility(look.ambient_visibility), part.ambient_term == 1u);
+    visibility *= select(1.0, leaf_visibility(look.ambient_visibility), part.ambient_term == AMBIENT_FITTED);
 #endif
 #endif
 #ifdef SUN_HARMONICS

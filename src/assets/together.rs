@@ -83,7 +83,7 @@ pub fn light_together(
                 shading.normals,
                 shading.ambient,
                 bake.report.no_surface,
-                settings.own_normal,
+                &settings,
             ));
             let cross = BakedLevel::Cross(Arc::new(bake_cross(&instance.plant, &lighting, &cross)));
             BakedPlant { lighting: Arc::new(lighting), ..instance.clone() }.with_level(cross)

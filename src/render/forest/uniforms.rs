@@ -84,7 +84,7 @@ pub struct VariantUniform {
     pub indirect_sun_mean: f32,
     /// Its colour.
     pub indirect_sun_color: [f32; 3],
-    /// 1 where its ambient visibility is the ambient term of a density field, else 0.
+    /// How its leaves are lit by their ambient visibility, an [`AmbientTerm`](crate::bake::lighting::AmbientTerm).
     pub ambient_term: u32,
     /// Strength of the lobe of its gloss that carries a share of 1 ([`lobe_gain`]).
     pub lobe_gain: f32,
@@ -126,7 +126,7 @@ pub struct PartUniform {
     pub specular_reflectance: f32,
     /// Root mean square slope of its facets.
     pub roughness: f32,
-    /// 1 where its ambient visibility is the ambient term of a density field, else 0.
+    /// How its leaves are lit by their ambient visibility, an [`AmbientTerm`](crate::bake::lighting::AmbientTerm).
     pub ambient_term: u32,
     /// Strength of the lobe of its gloss that carries a share of 1 ([`lobe_gain`]).
     pub lobe_gain: f32,
@@ -204,7 +204,7 @@ fn variant(plant: &BakedPlant, size: &PlantSize) -> VariantUniform {
         indirect_sun_zenith: zenith,
         indirect_sun_color: scattered_tint(&plant.plant.leaf_colors()).to_array(),
         indirect_sun_mean: mean,
-        ambient_term: u32::from(plant.lighting.has_ambient_term()),
+        ambient_term: plant.lighting.ambient_term() as u32,
         lobe_gain: lobe_gain(gloss.roughness),
         lobe_limit: lobe_peak(gloss.roughness).recip(),
         padding: [0; 2],
@@ -253,7 +253,7 @@ pub fn part_uniform(material: &PlantMaterial, lighting: &BakedLighting) -> PartU
         transmission: material.transmission.to_array(),
         specular_reflectance: gloss.reflectance,
         roughness: gloss.roughness,
-        ambient_term: u32::from(lighting.has_ambient_term()),
+        ambient_term: lighting.ambient_term() as u32,
         lobe_gain: lobe_gain(gloss.roughness),
         lobe_limit: lobe_peak(gloss.roughness).recip(),
     }
@@ -265,9 +265,36 @@ mod tests {
 
     use super::*;
     use crate::{
-        bake::{BakeSettings, bake_plant, lighting::LightingSettings, lighting::implicit::ImplicitSettings},
+        bake::{
+            BakeSettings, bake_plant,
+            lighting::{
+                AmbientTerm, LightingSettings,
+                implicit::{AmbientField, ImplicitSettings},
+            },
+        },
         plant::grow::{GrowParameters, grow},
     };
+
+    #[test]
+    fn the_shaders_know_by_which_equations_leaves_are_lit() -> Result<(), Box<dyn std::error::Error>> {
+        let plant = Arc::new(grow(&GrowParameters::broadleaf(), 1, 5000)?);
+        let expressive = |ambient, radius| {
+            LightingSettings::Expressive(ImplicitSettings { ambient, radius, ..ImplicitSettings::default() })
+        };
+        for (lighting, term) in [
+            (LightingSettings::Local, AmbientTerm::None),
+            (expressive(AmbientField::Depth, None), AmbientTerm::Fitted),
+            (expressive(AmbientField::Published, None), AmbientTerm::Published),
+            // Without a field k_a is 1, and the equations are the published ones still.
+            (expressive(AmbientField::Published, Some(0.0)), AmbientTerm::Published),
+        ] {
+            let (plant, _) = bake_plant(plant.clone(), &BakeSettings { lighting, ..BakeSettings::default() }, None);
+            assert_eq!(plant.lighting.ambient_term(), term);
+            assert_eq!(variants(std::slice::from_ref(&plant), &[plant.size()])[0].ambient_term, term as u32);
+            assert_eq!(part_uniform(&PlantMaterial::default(), &plant.lighting).ambient_term, term as u32);
+        }
+        Ok(())
+    }
 
     #[test]
     fn a_share_of_1_of_their_own_normals_lights_leaves_as_leaves() -> Result<(), Box<dyn std::error::Error>> {
