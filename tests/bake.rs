@@ -200,6 +200,7 @@ fn a_cross_keeps_normal_ambient_and_kind() {
         ambient: vec![vec![0.4; 4]],
         no_surface: Some(NoSurface::NoField),
         ambient_field: AmbientField::Depth,
+        together: false,
     });
     let cross = bake_cross(&plant, &lighting, &CrossSettings { resolution: 64, ..Default::default() });
     for (plane, chain) in cross.planes.iter().zip(&cross.textures.properties) {

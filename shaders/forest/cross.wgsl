@@ -138,7 +138,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.gloss_isotropy = max(surface.isotropic_fraction, variants[variant].realigned * (1.0 - published));
     let ground = sample_ground(in.relative);
     let by_transfer = variants[variant].radiance_transfer == 1u;
-    let stand = stand_light(ground.surrounding_cover, 1.0 - look.relative_height);
+    let stand = stand_light(ground.surrounding_cover * variants[variant].cover_weight, 1.0 - look.relative_height);
     var visibility = terrain_visibility(ground, look.height);
 #ifdef TRANSFER
     let light_layer = cross_variants[variant].first_light_layer + in.layer % PLANES;

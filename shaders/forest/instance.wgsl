@@ -51,6 +51,8 @@ struct Variant {
     // As in `Surface`.
     lobe_gain: f32,
     lobe_limit: f32,
+    // Factor on the cover around it: 0 where its ambient visibility holds the shade of the trees around already, else 1.
+    cover_weight: f32,
 }
 
 struct Instance {

@@ -27,6 +27,7 @@ struct Part {
     // As in `Surface`.
     lobe_gain: f32,
     lobe_limit: f32,
+    cover_weight: f32,
 }
 
 @group(2) @binding(0) var color_texture: texture_2d<f32>;
@@ -217,7 +218,8 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
 #endif
 #else
     surface.ambient_visibility = with_indirect_ambient(look.ambient_visibility, part.ambient_term);
-    let sky = even_sky(surface, stand_light(ground.surrounding_cover, 1.0 - look.relative_height));
+    let neighbours = ground.surrounding_cover * part.cover_weight;
+    let sky = even_sky(surface, stand_light(neighbours, 1.0 - look.relative_height));
 #endif
     var visibility = terrain_visibility(ground, look.height);
     if visibility > 0.0 {

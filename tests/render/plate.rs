@@ -12,11 +12,12 @@ use canopy::{
     components::Sun,
     lod::{FadeBand, Levels},
     plant::{Gloss, PartKind, Plant, PlantMaterial, PlantMesh, PlantPart},
-    render::components::{CanopyCamera, Forest, SunShadowSettings},
-    scatter::{PackedStand, PlantSize, Stand, Tree, packed::DEFAULT_CELL_SIZE},
+    render::components::{CanopyCamera, Forest, Ground, SunShadowSettings},
+    scatter::{CoverMap, PackedStand, PlantSize, Stand, Tree, packed::DEFAULT_CELL_SIZE},
     scene::Pose,
+    terrain::{HeightField, Surroundings, Terrain},
 };
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 use image::{Rgba, RgbaImage};
 
 use super::{SIZE, again, renderer};
@@ -71,14 +72,14 @@ fn lit(plant: &Plant, lighting: ExpressiveLighting) -> BakedPlant {
 /// Luminance of the middle of `plant`, a model up to `fade` metres, seen from above or below at `hour`.
 #[track_caller]
 fn seen(plant: &Plant, fade: f32, above: bool, hour: &str) -> f64 {
-    let light = drawn(local(plant), fade, above, hour);
+    let light = drawn(local(plant), None, fade, above, hour);
     assert!((0.005..0.9).contains(&light), "{light} is no light that can be compared");
     light
 }
 
-/// As [`seen`], however dark it is.
+/// As [`seen`], however dark it is, over `ground`.
 #[track_caller]
-fn drawn(plant: BakedPlant, fade: f32, above: bool, hour: &str) -> f64 {
+fn drawn(plant: BakedPlant, ground: Option<Ground>, fade: f32, above: bool, hour: &str) -> f64 {
     let tree = Tree { position: DVec3::ZERO, yaw: 0.0, scale: 1.0, variant: 0, tint: 0.0, index: 0 };
     let bounds = [PlantSize { radius: 3.0, height: 4.0 }];
     let stand = PackedStand::new(&Stand { trees: vec![tree] }, DEFAULT_CELL_SIZE, &bounds).expect("one tree");
@@ -99,6 +100,9 @@ fn drawn(plant: BakedPlant, fade: f32, above: bool, hour: &str) -> f64 {
         levels: Levels::model_and_cross(FadeBand::new(fade, 0.1)),
         view_distance: 1e4,
     });
+    if let Some(ground) = ground {
+        world.spawn(ground);
+    }
     renderer.set_sun(Sun { instant: instant(hour), ..Sun::default() });
     renderer.set_shadow(SunShadowSettings { cascades: 0, ..SunShadowSettings::default() });
     again(&mut renderer);
@@ -151,7 +155,7 @@ fn a_normal_map_leans_the_surface_as_its_normals_would() {
 /// A crown's light with one normal and one k_a.
 fn crown(ambient_field: AmbientField, normal: Vec3, ambient: f32) -> ExpressiveLighting {
     let (normals, ambient) = (vec![vec![normal; 4]], vec![vec![ambient; 4]]);
-    ExpressiveLighting { normals, ambient, no_surface: None, ambient_field }
+    ExpressiveLighting { normals, ambient, no_surface: None, ambient_field, together: false }
 }
 
 /// [Luft 2007, eq. 1]: k_a once dimmed the direct light too, and never got below 0.13.
@@ -161,7 +165,7 @@ fn as_published_k_a_dims_the_ambient_light_and_nothing_else() {
     for hour in HOURS {
         for (what, fade) in [("model", 1e4), ("cross", 0.0)] {
             let of = |kind: PartKind, field: AmbientField, normal: Vec3, ambient: f32| {
-                drawn(lit(&plate(kind, Vec3::Y, material()), crown(field, normal, ambient)), fade, true, hour)
+                drawn(lit(&plate(kind, Vec3::Y, material()), crown(field, normal, ambient)), None, fade, true, hour)
             };
             let published = |ambient: f32| of(PartKind::Foliage, AmbientField::Published, Vec3::Y, ambient);
             let (sun, half, all) = (published(0.0), published(0.5), published(1.0));
@@ -192,9 +196,46 @@ fn as_published_a_crown_has_the_gloss_of_its_normals() {
     for (what, fade) in [("model", 1e4), ("cross", 0.0)] {
         let own = seen(&plate(PartKind::Foliage, normal, glossy.clone()), fade, true, HOURS[1]);
         let flat = plate(PartKind::Foliage, Vec3::Y, glossy.clone());
-        let ratio = |field| drawn(lit(&flat, crown(field, normal, 1.0)), fade, true, HOURS[1]) / own;
+        let ratio = |field| drawn(lit(&flat, crown(field, normal, 1.0)), None, fade, true, HOURS[1]) / own;
         let (published, fitted) = (ratio(AmbientField::Published), ratio(AmbientField::Depth));
         assert!((published - 1.0).abs() < 0.02, "{what}: {published} of the light with these normals");
         assert!(fitted < 0.95, "{what}: {fitted} with a gloss alike in all directions");
+    }
+}
+
+/// A plain of which crowns cover all or nothing.
+fn plain(covered: bool) -> Ground {
+    let field = HeightField::new(9, 9, DVec2::splat(32.0), vec![0.0; 81]).expect("a plain");
+    let terrain = Arc::new(Terrain::new(field, None, Surroundings::Border));
+    let cover = vec![if covered { 255 } else { 0 }; 64 * 64];
+    let cover = CoverMap { origin: DVec2::splat(-128.0), texel: 4.0, columns: 64, rows: 64, cover };
+    Ground { terrain, cover: Some(Arc::new(cover)), error_pixels: 1.0, view_distance: 1e3 }
+}
+
+/// What is in the common field of trees that are lit together was once counted again, by the cover around each of them.
+#[test]
+fn neighbours_darken_trees_that_are_lit_together_once() {
+    let _gpu = gpu();
+    // A mast makes the plate a low branch, around which are the neighbours' crowns.
+    let mut plant = plate(PartKind::Foliage, Vec3::Y, material());
+    let mast = PlantMesh {
+        positions: vec![Vec3::new(2.5, 0.0, 0.0), Vec3::new(2.6, 0.0, 0.0), Vec3::new(2.55, 12.0, 0.0)],
+        normals: vec![Vec3::Z; 3],
+        uvs: vec![Vec2::ZERO; 3],
+        triangles: vec![[0, 1, 2]],
+    };
+    plant.parts.push(PlantPart { kind: PartKind::Wood, mesh: mast, material: PlantMaterial::default() });
+    for (what, fade) in [("model", 1e4), ("cross", 0.0)] {
+        let of = |together: bool, covered: bool| {
+            let (normals, ambient) = (vec![vec![Vec3::Y; 4], vec![Vec3::Z; 3]], vec![vec![0.5; 4], vec![0.5; 3]]);
+            let field = AmbientField::Depth;
+            let light = ExpressiveLighting { normals, ambient, no_surface: None, ambient_field: field, together };
+            drawn(lit(&plant, light), Some(plain(covered)), fade, true, HOURS[0])
+        };
+        let (open, alone, lit_together) = (of(true, false), of(false, true), of(true, true));
+        assert_eq!(open, of(false, false), "{what}: without neighbours the light is the same");
+        // A control: the cover around matters.
+        assert!(alone < 0.95 * open, "{what}: {alone} of {open} among neighbours");
+        assert!((lit_together / open - 1.0).abs() < 1e-3, "{what}: {lit_together} of {open}, which is what k_a says");
     }
 }

@@ -25,7 +25,7 @@ use crate::bake::lighting::BakedLighting;
 use crate::plant::Plant;
 
 /// Version of the format *and* of the bakes: to be raised whenever either gives other bytes for the same input.
-pub(super) const VERSION: u32 = 13;
+pub(super) const VERSION: u32 = 14;
 
 const MAGIC: [u8; 8] = *b"CANOPYBK";
 const HEAD: usize = 52;
@@ -120,6 +120,7 @@ mod tests {
                 ambient: vec![vec![0.0, 0.5, 1.0]],
                 no_surface: Some(NoSurface::Threshold { threshold: 2.0, greatest: 1.5 }),
                 ambient_field: AmbientField::Published,
+                together: true,
             })),
             levels: vec![
                 BakedLevel::ShadowProxy(Arc::new(vec![mesh])),

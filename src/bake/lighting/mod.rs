@@ -84,10 +84,13 @@ pub struct ExpressiveLighting {
     pub no_surface: Option<NoSurface>,
     /// What k_a is a function of, which decides what the shaders make of it.
     pub ambient_field: AmbientField,
+    /// Whether k_a holds the shade of the plants around, as they were lit together
+    /// ([`bake_implicit_stand`](implicit::bake_implicit_stand)).
+    pub together: bool,
 }
 
 impl ExpressiveLighting {
-    /// What is kept of a bake by `settings` with the normals and the k_a of every part. With an
+    /// What is kept of the bake of one plant by `settings` with the normals and the k_a of every part. With an
     /// [`ImplicitSettings::own_normal`] of 1 a leaf is lit as itself, on both of its sides.
     pub fn new(
         normals: Vec<Vec<Vec3>>,
@@ -97,7 +100,7 @@ impl ExpressiveLighting {
     ) -> Self {
         let own_normal = settings.in_range().own_normal;
         let normals = if own_normal < 1.0 { normals } else { Vec::new() };
-        Self { normals, ambient, no_surface, ambient_field: settings.ambient }
+        Self { normals, ambient, no_surface, ambient_field: settings.ambient, together: false }
     }
 }
 
@@ -254,6 +257,11 @@ impl BakedLighting {
             }
             AmbientField::Depth => AmbientTerm::None,
         }
+    }
+
+    /// Whether k_a holds the shade of the plants around, so that nothing else may count it again.
+    pub fn is_lit_together(&self) -> bool {
+        matches!(self, Self::Expressive(lighting) if lighting.together)
     }
 
     /// What the user ought to know of the bake.

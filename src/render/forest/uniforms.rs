@@ -90,8 +90,10 @@ pub struct VariantUniform {
     pub lobe_gain: f32,
     /// Greatest strength of the lobe where nothing else reflects or transmits (one over [`lobe_peak`]).
     pub lobe_limit: f32,
+    /// Factor on the cover around it: 0 where its k_a holds the shade of the trees around already, else 1.
+    pub cover_weight: f32,
     /// WGSL rounds the size up to 16 bytes.
-    pub padding: [u32; 2],
+    pub padding: u32,
 }
 
 /// `CrossVariant` of `shaders/forest/cross_variant.wgsl`.
@@ -132,6 +134,10 @@ pub struct PartUniform {
     pub lobe_gain: f32,
     /// Greatest strength of the lobe where nothing else reflects or transmits (one over [`lobe_peak`]).
     pub lobe_limit: f32,
+    /// Factor on the cover around it: 0 where its k_a holds the shade of the trees around already, else 1.
+    pub cover_weight: f32,
+    /// WGSL rounds the size up to 16 bytes.
+    pub padding: [u32; 3],
 }
 
 /// Words of four coefficients after the first, of all bands.
@@ -207,7 +213,8 @@ fn variant(plant: &BakedPlant, size: &PlantSize) -> VariantUniform {
         ambient_term: plant.lighting.ambient_term() as u32,
         lobe_gain: lobe_gain(gloss.roughness),
         lobe_limit: lobe_peak(gloss.roughness).recip(),
-        padding: [0; 2],
+        cover_weight: cover_weight(&plant.lighting),
+        padding: 0,
     }
 }
 
@@ -244,6 +251,11 @@ fn realigned(lighting: &BakedLighting) -> f32 {
     f32::from(u8::from(lighting.is_realigned()))
 }
 
+/// Factor on the cover around a plant: neighbours that are in its k_a do not count again.
+fn cover_weight(lighting: &BakedLighting) -> f32 {
+    if lighting.is_lit_together() { 0.0 } else { 1.0 }
+}
+
 /// What the shaders know of a part's material.
 pub fn part_uniform(material: &PlantMaterial, lighting: &BakedLighting) -> PartUniform {
     let gloss = material.gloss.in_range();
@@ -256,6 +268,8 @@ pub fn part_uniform(material: &PlantMaterial, lighting: &BakedLighting) -> PartU
         ambient_term: lighting.ambient_term() as u32,
         lobe_gain: lobe_gain(gloss.roughness),
         lobe_limit: lobe_peak(gloss.roughness).recip(),
+        cover_weight: cover_weight(lighting),
+        padding: [0; 3],
     }
 }
 
