@@ -235,6 +235,8 @@ fn a_small_tree_is_darkened_by_its_tall_neighbour() {
     assert_eq!(close_stage.plants.len(), 3, "one plant for each tree, and the conifer");
     let (near, alone) = (ambient(&close_stage, 3.0), ambient(&far_stage, 80.0));
     assert!(near < 0.95 * alone, "{near} beside its neighbour, {alone} alone");
+    let together = close_stage.plants.iter().filter(|plant| plant.lighting.is_lit_together());
+    assert_eq!(together.count(), 2, "neighbours are in k_a, and shall not count again");
     assert_eq!(build(close, "Expressive()").plants.len(), 2, "instances of two plants otherwise");
 
     let crowd: String = (0..1024).map(|row| format!("{},{},12,tree\n", row % 32 * 3, row / 32 * 3)).collect();

@@ -7,7 +7,7 @@ use canopy::bake::cache::{Cache, CacheKey};
 use canopy::bake::levels::cross::{Cross, CrossSettings, bake_cross};
 use canopy::bake::levels::rasterize::{View, projected_area};
 use canopy::bake::levels::shadow_proxy::{shadow_proxy, simplify_foliage};
-use canopy::bake::lighting::implicit::{ImplicitSettings, NoSurface};
+use canopy::bake::lighting::implicit::{AmbientField, ImplicitSettings, NoSurface};
 use canopy::bake::lighting::{BakedLighting, ExpressiveLighting, LightingSettings};
 use canopy::bake::{BakeError, BakeSettings, BakeSource, BakedLevel, BakedPlant, bake_plant};
 use canopy::lod::Representation;
@@ -199,6 +199,8 @@ fn a_cross_keeps_normal_ambient_and_kind() {
         normals: vec![plant.parts[0].mesh.normals.clone()],
         ambient: vec![vec![0.4; 4]],
         no_surface: Some(NoSurface::NoField),
+        ambient_field: AmbientField::Depth,
+        together: false,
     });
     let cross = bake_cross(&plant, &lighting, &CrossSettings { resolution: 64, ..Default::default() });
     for (plane, chain) in cross.planes.iter().zip(&cross.textures.properties) {

@@ -242,6 +242,7 @@ fn gpu_structs_are_what_the_shaders_think() {
             ambient_term,
             lobe_gain,
             lobe_limit,
+            cover_weight,
         }
     );
     twin!(
@@ -255,7 +256,8 @@ fn gpu_structs_are_what_the_shaders_think() {
             roughness,
             ambient_term,
             lobe_gain,
-            lobe_limit
+            lobe_limit,
+            cover_weight
         }
     );
     twin!(

@@ -1,8 +1,8 @@
-// Crossed billboards [Franzke 2005, 4.3]: two vertical planes and a horizontal one, eighteen pulled vertices per tree.
-#import canopy::constants::{CROSS_VERTICES, PLANES, SPREAD_LEVELS, LIGHT_SCALE, WHOLE, FADE_SPAN, GONE}
+// Crossed billboards [Franzke 2005, 4.3]: two upright planes and a level one, eighteen pulled vertices a tree.
+#import canopy::constants::{CROSS_VERTICES, PLANES, SPREAD_LEVELS, LIGHT_SCALE, WHOLE, FADE_SPAN, GONE, AMBIENT_FITTED}
 #import canopy::cross_variant::cross_variants
 #import canopy::frame::{frame, light}
-#import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, leaf_visibility}
+#import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, leaf_visibility}
 #import canopy::lighting::{Surface, shade, even_sky, leaf_transmission}
 #import canopy::output::finish
 #import canopy::sky::sky_transfer
@@ -126,17 +126,20 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.albedo = mix(texel.rgb, tint_foliage(texel.rgb, look.tint), foliage);
     surface.normal = normal;
     let reflectance = variants[variant].specular_reflectance;
-    surface.transmission = leaf_transmission(texel.rgb, cross_variants[variant].transmission, reflectance) * foliage;
+    let ambient_term = variants[variant].ambient_term;
+    let published = is_published(ambient_term);
+    let transmission = leaf_transmission(texel.rgb, cross_variants[variant].transmission, reflectance) * foliage;
+    surface.transmission = transmission * (1.0 - published);
     surface.viewer = -normalize(in.relative);
     surface.isotropic_fraction = isotropic_fraction(variant, level) * foliage;
     surface.specular_reflectance = reflectance * foliage;
     surface.roughness = variants[variant].roughness;
     surface.lobe_gain = variants[variant].lobe_gain;
     surface.lobe_limit = variants[variant].lobe_limit;
-    surface.gloss_isotropy = max(surface.isotropic_fraction, variants[variant].realigned);
+    surface.gloss_isotropy = max(surface.isotropic_fraction, variants[variant].realigned * (1.0 - published));
     let ground = sample_ground(in.relative);
     let by_transfer = variants[variant].radiance_transfer == 1u;
-    let stand = stand_light(ground.surrounding_cover, 1.0 - look.relative_height);
+    let stand = stand_light(ground.surrounding_cover * variants[variant].cover_weight, 1.0 - look.relative_height);
     var visibility = terrain_visibility(ground, look.height);
 #ifdef TRANSFER
     let light_layer = cross_variants[variant].first_light_layer + in.layer % PLANES;
@@ -150,11 +153,11 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let indirect_sun = light.key_illuminance * variants[variant].indirect_sun_color * indirect;
     var sky = (1.0 + surface.transmission) * (around + indirect_sun);
 #ifdef PLAIN_TOO
-    surface.ambient_visibility = with_indirect_ambient(properties.b);
+    surface.ambient_visibility = with_indirect_ambient(properties.b, ambient_term);
     sky = select(even_sky(surface, stand), sky, by_transfer);
 #endif
 #else
-    surface.ambient_visibility = with_indirect_ambient(properties.b);
+    surface.ambient_visibility = with_indirect_ambient(properties.b, ambient_term);
     let sky = even_sky(surface, stand);
 #endif
     if visibility > 0.0 {
@@ -173,7 +176,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         );
     }
     let sunlit = mix(1.0, hot_spot(surface.viewer), smoothstep(0.25, 0.85, ground.surrounding_cover));
-    let dimmed = select(1.0, leaf_visibility(properties.b), variants[variant].ambient_term == 1u);
+    let dimmed = select(1.0, leaf_visibility(properties.b), ambient_term == AMBIENT_FITTED);
     let among = select(dimmed, sunlit, by_transfer);
     visibility *= mix(1.0, among, foliage);
     var color = shade(surface, visibility, sky);

@@ -4,7 +4,7 @@
 #import canopy::constants::{PLACE_STEPS, YAW_BITS, YAWS, SCALE_SHIFT, SCALE_BITS, SCALE_STEPS, SCALE_OCTAVES, LEAST_SCALE_LOG2}
 #import canopy::constants::{CELL_BITS, VARIANT_LOW_SHIFT, VARIANT_LOW_BITS, VARIANT_HIGH_SHIFT, VARIANT_HIGH_BITS}
 #import canopy::constants::{TINT_SHIFT, TINT_BITS, TINT_STEPS}
-#import canopy::constants::{WHOLE, FADE_SPAN}
+#import canopy::constants::{WHOLE, FADE_SPAN, AMBIENT_PUBLISHED}
 
 struct Tree {
     xz: u32,
@@ -46,11 +46,13 @@ struct Variant {
     indirect_sun_zenith: f32,
     indirect_sun_mean: f32,
     indirect_sun_color: vec3<f32>,
-    // 1 if its ambient occlusion is the ambient term of a density field, else 0.
+    // How its leaves are lit by their ambient visibility: AMBIENT_FITTED, AMBIENT_PUBLISHED, or neither.
     ambient_term: u32,
     // As in `Surface`.
     lobe_gain: f32,
     lobe_limit: f32,
+    // Factor on the cover around it: 0 where its ambient visibility holds the shade of the trees around already, else 1.
+    cover_weight: f32,
 }
 
 struct Instance {
@@ -138,10 +140,17 @@ fn tint_foliage(albedo: vec3<f32>, tint: f32) -> vec3<f32> {
     return albedo * (1.0 + tint * vec3(0.18, 0.07, -0.05));
 }
 
-// Ambient light for an ambient occlusion `k`: light that does not come from the sky comes from other leaves, by their
-// albedo. The fraction is fitted to the path tracer (benches/expressive.rs).
-fn with_indirect_ambient(k: f32) -> f32 {
-    return k + (1.0 - k) * 0.13;
+// Ambient light at an ambient visibility `k`: what does not come from the sky comes from other leaves, by their albedo. The
+// share is fitted to the path tracer (benches/expressive.rs).
+// As published there is none.
+fn with_indirect_ambient(k: f32, ambient_term: u32) -> f32 {
+    return k + (1.0 - k) * select(0.13, 0.0, ambient_term == AMBIENT_PUBLISHED);
+}
+
+// 1 where leaves are lit by [Luft 2007, eq. 1] alone, else 0: no light comes through them, and the gloss is that of the
+// normals out of the crown.
+fn is_published(ambient_term: u32) -> f32 {
+    return select(0.0, 1.0, ambient_term == AMBIENT_PUBLISHED);
 }
 
 // Visibility of the key light behind nearby leaves, for which the shadow maps are too coarse, from the ambient term `k`

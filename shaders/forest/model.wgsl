@@ -1,7 +1,7 @@
 // The full model of a tree, near the camera.
-#import canopy::constants::{NORMAL_STEPS, NORMAL_LEAST_LENGTH, WHOLE}
+#import canopy::constants::{NORMAL_STEPS, NORMAL_LEAST_LENGTH, WHOLE, AMBIENT_FITTED}
 #import canopy::frame::{frame, light}
-#import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, leaf_visibility}
+#import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, leaf_visibility}
 #import canopy::lighting::{Surface, shade, exitant, even_sky, leaf_transmission}
 #import canopy::output::finish
 #import canopy::stand::stand_light
@@ -22,11 +22,12 @@ struct Part {
     transmission: vec3<f32>,
     specular_reflectance: f32,
     roughness: f32,
-    // 1 if the ambient occlusion is the ambient term of a density field, else 0.
+    // As in `Variant`.
     ambient_term: u32,
     // As in `Surface`.
     lobe_gain: f32,
     lobe_limit: f32,
+    cover_weight: f32,
 }
 
 @group(2) @binding(0) var color_texture: texture_2d<f32>;
@@ -191,16 +192,19 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     var surface: Surface;
     surface.albedo = texel.rgb * part.base_color;
 #ifdef FOLIAGE
-    surface.transmission = leaf_transmission(surface.albedo, part.transmission, part.specular_reflectance);
+    let published = is_published(part.ambient_term);
+    let transmission = leaf_transmission(surface.albedo, part.transmission, part.specular_reflectance);
+    surface.transmission = transmission * (1.0 - published);
     surface.albedo = tint_foliage(surface.albedo, look.tint);
     surface.viewer = -normalize(in.relative);
     surface.specular_reflectance = part.specular_reflectance;
     surface.roughness = part.roughness;
     surface.lobe_gain = part.lobe_gain;
     surface.lobe_limit = part.lobe_limit;
-    // A pixel that covers half a texture of leaves covers several leaves with different normals: the highlight of one
-    // would sparkle. Realigned normals do not belong to a leaf at all.
-    surface.gloss_isotropy = max(saturate(2.0 * max(across.x, across.y)), part.realigned);
+    // A pixel that covers half a texture of leaves covers several of them, and each faces elsewhere: highlights of one would
+    // sparkle. Normals that point out of the crown are no leaf's at all; as published, the crown has the highlight.
+    let isotropy = max(saturate(2.0 * max(across.x, across.y)), part.realigned);
+    surface.gloss_isotropy = isotropy * (1.0 - published * part.realigned);
 #endif
     surface.normal = normal;
     let ground = sample_ground(in.relative);
@@ -213,8 +217,9 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let sky = in.front_sky;
 #endif
 #else
-    surface.ambient_visibility = with_indirect_ambient(look.ambient_visibility);
-    let sky = even_sky(surface, stand_light(ground.surrounding_cover, 1.0 - look.relative_height));
+    surface.ambient_visibility = with_indirect_ambient(look.ambient_visibility, part.ambient_term);
+    let neighbours = ground.surrounding_cover * part.cover_weight;
+    let sky = even_sky(surface, stand_light(neighbours, 1.0 - look.relative_height));
 #endif
     var visibility = terrain_visibility(ground, look.height);
     if visibility > 0.0 {
@@ -223,7 +228,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     }
 #ifdef FOLIAGE
 #ifndef TRANSFER
-    visibility *= select(1.0, leaf_visibility(look.ambient_visibility), part.ambient_term == 1u);
+    visibility *= select(1.0, leaf_visibility(look.ambient_visibility), part.ambient_term == AMBIENT_FITTED);
 #endif
 #endif
 #ifdef SUN_HARMONICS

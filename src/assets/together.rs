@@ -79,12 +79,9 @@ pub fn light_together(
         .zip(bake.plants)
         .map(|(&tree, shading)| {
             let instance = &plants[usize::from(stand.trees[tree].variant)];
-            let lighting = BakedLighting::Expressive(ExpressiveLighting::new(
-                shading.normals,
-                shading.ambient,
-                bake.report.no_surface,
-                settings.own_normal,
-            ));
+            let (normals, ambient) = (shading.normals, shading.ambient);
+            let lighting = ExpressiveLighting::new(normals, ambient, bake.report.no_surface, &settings);
+            let lighting = BakedLighting::Expressive(ExpressiveLighting { together: true, ..lighting });
             let cross = BakedLevel::Cross(Arc::new(bake_cross(&instance.plant, &lighting, &cross)));
             BakedPlant { lighting: Arc::new(lighting), ..instance.clone() }.with_level(cross)
         })

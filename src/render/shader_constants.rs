@@ -10,7 +10,10 @@ use super::{
     forest::{transfer, uniforms as forest},
 };
 use crate::{
-    bake::{levels::cross, lighting::implicit::packing},
+    bake::{
+        levels::cross,
+        lighting::{AmbientTerm, implicit::packing},
+    },
     light::{atmosphere::SkyView, night, stand},
     lod,
     scatter::packed,
@@ -76,6 +79,8 @@ pub fn constants() -> Vec<(&'static str, &'static str, Value)> {
         ("WHOLE", "Alpha threshold at which a representation is whole.", lod::WHOLE.into()),
         ("FADE_SPAN", "What fading adds to `WHOLE` until nothing is left.", lod::FADE_SPAN.into()),
         ("GONE", "Alpha threshold from which on nothing is left.", lod::GONE.into()),
+        ("AMBIENT_FITTED", "Leaves that are lit by k_a with fitted constants.", (AmbientTerm::Fitted as u32).into()),
+        ("AMBIENT_PUBLISHED", "Leaves that are lit by k_a as published.", (AmbientTerm::Published as u32).into()),
         ("PLANES", "Planes of a cross.", uint(forest::PLANES)),
         ("CROSS_VERTICES", "Vertices of a tree's cross.", forest::CROSS_VERTICES.into()),
         ("CASTER_VERTICES", "Vertices of a tree's cross as a caster.", forest::CROSS_CASTER_VERTICES.into()),

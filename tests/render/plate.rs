@@ -4,15 +4,20 @@ use std::sync::Arc;
 
 use bevy::{core_pipeline::tonemapping::Tonemapping, prelude::*};
 use canopy::{
-    bake::{BakeSettings, bake_plant, lighting::LightingSettings},
+    bake::{
+        BakeSettings, BakedLevel, BakedPlant, bake_plant,
+        levels::cross::{CrossSettings, bake_cross},
+        lighting::{BakedLighting, ExpressiveLighting, LightingSettings, implicit::AmbientField},
+    },
     components::Sun,
     lod::{FadeBand, Levels},
     plant::{Gloss, PartKind, Plant, PlantMaterial, PlantMesh, PlantPart},
-    render::components::{CanopyCamera, Forest, SunShadowSettings},
-    scatter::{PackedStand, PlantSize, Stand, Tree, packed::DEFAULT_CELL_SIZE},
+    render::components::{CanopyCamera, Forest, Ground, SunShadowSettings},
+    scatter::{CoverMap, PackedStand, PlantSize, Stand, Tree, packed::DEFAULT_CELL_SIZE},
     scene::Pose,
+    terrain::{HeightField, Surroundings, Terrain},
 };
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 use image::{Rgba, RgbaImage};
 
 use super::{SIZE, again, renderer};
@@ -51,11 +56,30 @@ fn plate(kind: PartKind, normal: Vec3, material: PlantMaterial) -> Plant {
     Plant { name: "plate".to_owned(), parts: vec![PlantPart { kind, mesh, material }] }
 }
 
+/// `plant` without a bake of its light.
+fn local(plant: &Plant) -> BakedPlant {
+    let settings = BakeSettings { lighting: LightingSettings::Local, ..BakeSettings::default() };
+    bake_plant(Arc::new(plant.clone()), &settings, None).0
+}
+
+/// `plant` with another light.
+fn lit(plant: &Plant, lighting: ExpressiveLighting) -> BakedPlant {
+    let lighting = BakedLighting::Expressive(lighting);
+    let cross = BakedLevel::Cross(Arc::new(bake_cross(plant, &lighting, &CrossSettings::default())));
+    BakedPlant { lighting: Arc::new(lighting), ..local(plant) }.with_level(cross)
+}
+
 /// Luminance of the middle of `plant`, a model up to `fade` metres, seen from above or below at `hour`.
 #[track_caller]
 fn seen(plant: &Plant, fade: f32, above: bool, hour: &str) -> f64 {
-    let settings = BakeSettings { lighting: LightingSettings::Local, ..BakeSettings::default() };
-    let (baked, _) = bake_plant(Arc::new(plant.clone()), &settings, None);
+    let light = drawn(local(plant), None, fade, above, hour);
+    assert!((0.005..0.9).contains(&light), "{light} is no light that can be compared");
+    light
+}
+
+/// As [`seen`], however dark it is, over `ground`.
+#[track_caller]
+fn drawn(plant: BakedPlant, ground: Option<Ground>, fade: f32, above: bool, hour: &str) -> f64 {
     let tree = Tree { position: DVec3::ZERO, yaw: 0.0, scale: 1.0, variant: 0, tint: 0.0, index: 0 };
     let bounds = [PlantSize { radius: 3.0, height: 4.0 }];
     let stand = PackedStand::new(&Stand { trees: vec![tree] }, DEFAULT_CELL_SIZE, &bounds).expect("one tree");
@@ -70,21 +94,21 @@ fn seen(plant: &Plant, fade: f32, above: bool, hour: &str) -> f64 {
     }
     world.spawn(Forest {
         stand: Arc::new(stand),
-        plants: Arc::new(vec![baked]),
+        plants: Arc::new(vec![plant]),
         suns: Arc::from([]),
         origin: DVec3::ZERO,
         levels: Levels::model_and_cross(FadeBand::new(fade, 0.1)),
         view_distance: 1e4,
     });
+    if let Some(ground) = ground {
+        world.spawn(ground);
+    }
     renderer.set_sun(Sun { instant: instant(hour), ..Sun::default() });
     renderer.set_shadow(SunShadowSettings { cascades: 0, ..SunShadowSettings::default() });
     again(&mut renderer);
     let picture = again(&mut renderer);
     let near = |value: u32, size: u32| value.abs_diff(size / 2) < 8;
-    let color = mean_color(&picture, |column, row| near(column, SIZE.0) && near(row, SIZE.1));
-    let light = luminance(color);
-    assert!((0.005..0.9).contains(&light), "{light} is no light that can be compared");
-    light
+    luminance(mean_color(&picture, |column, row| near(column, SIZE.0) && near(row, SIZE.1)))
 }
 
 /// Leaves once had 1.1 times the sun where nothing is known of the leaves around them.
@@ -125,5 +149,93 @@ fn a_normal_map_leans_the_surface_as_its_normals_would() {
             let ratio = by_map / leaning;
             assert!((ratio - 1.0).abs() < 0.02, "{kind:?}, above {above}, {hour}: {ratio}; {by_map} of {flat} flat");
         }
+    }
+}
+
+/// A crown's light with one normal and one k_a.
+fn crown(ambient_field: AmbientField, normal: Vec3, ambient: f32) -> ExpressiveLighting {
+    let (normals, ambient) = (vec![vec![normal; 4]], vec![vec![ambient; 4]]);
+    ExpressiveLighting { normals, ambient, no_surface: None, ambient_field, together: false }
+}
+
+/// [Luft 2007, eq. 1]: k_a once dimmed the direct light too, and never got below 0.13.
+#[test]
+fn as_published_k_a_dims_the_ambient_light_and_nothing_else() {
+    let _gpu = gpu();
+    for hour in HOURS {
+        for (what, fade) in [("model", 1e4), ("cross", 0.0)] {
+            let of = |kind: PartKind, field: AmbientField, normal: Vec3, ambient: f32| {
+                drawn(lit(&plate(kind, Vec3::Y, material()), crown(field, normal, ambient)), None, fade, true, hour)
+            };
+            let published = |ambient: f32| of(PartKind::Foliage, AmbientField::Published, Vec3::Y, ambient);
+            let (sun, half, all) = (published(0.0), published(0.5), published(1.0));
+            assert!(all > 1.05 * sun && sun > 0.005, "{what}, {hour}: {sun} of the sun, {all} of the sky too");
+            let even = 2.0 * half / (sun + all);
+            assert!((even - 1.0).abs() < 0.02, "{what}, {hour}: k_a of 0.5 leaves {even} of the mean");
+            // On wood k_a is for the ambient light alone in any mode.
+            let board = sun / of(PartKind::Wood, AmbientField::Published, Vec3::Y, 0.0);
+            assert!((board - 1.0).abs() < 0.02, "{what}, {hour}: {board} of a board's sun");
+            let fitted = of(PartKind::Foliage, AmbientField::Depth, Vec3::Y, 0.0);
+            assert!(fitted < 0.7 * sun, "{what}, {hour}: {fitted} with the fitted constants, {sun} of the sun");
+            // What faces away from the sun has no light: neither a floor nor through the leaf.
+            let away = of(PartKind::Foliage, AmbientField::Published, Vec3::NEG_Y, 0.0);
+            assert!(away < 0.02 * all, "{what}, {hour}: {away} in the dark, {all} in the open");
+            let fitted = of(PartKind::Foliage, AmbientField::Depth, Vec3::NEG_Y, 0.0);
+            assert!(fitted > 0.04 * all, "{what}, {hour}: {fitted} with the fitted constants, {all} in the open");
+        }
+    }
+}
+
+/// [Luft 2007, 3.3] realigns normals for the diffuse and the specular light.
+#[test]
+fn as_published_a_crown_has_the_gloss_of_its_normals() {
+    let _gpu = gpu();
+    // Half of the way from the viewer above to the sun.
+    let normal = Vec3::new(0.46, 0.89, 0.0).normalize();
+    let glossy = PlantMaterial { gloss: Gloss::LEAF, transmission: Vec3::ZERO, ..material() };
+    for (what, fade) in [("model", 1e4), ("cross", 0.0)] {
+        let own = seen(&plate(PartKind::Foliage, normal, glossy.clone()), fade, true, HOURS[1]);
+        let flat = plate(PartKind::Foliage, Vec3::Y, glossy.clone());
+        let ratio = |field| drawn(lit(&flat, crown(field, normal, 1.0)), None, fade, true, HOURS[1]) / own;
+        let (published, fitted) = (ratio(AmbientField::Published), ratio(AmbientField::Depth));
+        assert!((published - 1.0).abs() < 0.02, "{what}: {published} of the light with these normals");
+        assert!(fitted < 0.95, "{what}: {fitted} with a gloss alike in all directions");
+    }
+}
+
+/// A plain of which crowns cover all or nothing.
+fn plain(covered: bool) -> Ground {
+    let field = HeightField::new(9, 9, DVec2::splat(32.0), vec![0.0; 81]).expect("a plain");
+    let terrain = Arc::new(Terrain::new(field, None, Surroundings::Border));
+    let cover = vec![if covered { 255 } else { 0 }; 64 * 64];
+    let cover = CoverMap { origin: DVec2::splat(-128.0), texel: 4.0, columns: 64, rows: 64, cover };
+    Ground { terrain, cover: Some(Arc::new(cover)), error_pixels: 1.0, view_distance: 1e3 }
+}
+
+/// What is in the common field of trees that are lit together was once counted again, by the cover around each of them.
+#[test]
+fn neighbours_darken_trees_that_are_lit_together_once() {
+    let _gpu = gpu();
+    // A mast makes the plate a low branch, around which are the neighbours' crowns.
+    let mut plant = plate(PartKind::Foliage, Vec3::Y, material());
+    let mast = PlantMesh {
+        positions: vec![Vec3::new(2.5, 0.0, 0.0), Vec3::new(2.6, 0.0, 0.0), Vec3::new(2.55, 12.0, 0.0)],
+        normals: vec![Vec3::Z; 3],
+        uvs: vec![Vec2::ZERO; 3],
+        triangles: vec![[0, 1, 2]],
+    };
+    plant.parts.push(PlantPart { kind: PartKind::Wood, mesh: mast, material: PlantMaterial::default() });
+    for (what, fade) in [("model", 1e4), ("cross", 0.0)] {
+        let of = |together: bool, covered: bool| {
+            let (normals, ambient) = (vec![vec![Vec3::Y; 4], vec![Vec3::Z; 3]], vec![vec![0.5; 4], vec![0.5; 3]]);
+            let field = AmbientField::Depth;
+            let light = ExpressiveLighting { normals, ambient, no_surface: None, ambient_field: field, together };
+            drawn(lit(&plant, light), Some(plain(covered)), fade, true, HOURS[0])
+        };
+        let (open, alone, lit_together) = (of(true, false), of(false, true), of(true, true));
+        assert_eq!(open, of(false, false), "{what}: without neighbours the light is the same");
+        // A control: the cover around matters.
+        assert!(alone < 0.95 * open, "{what}: {alone} of {open} among neighbours");
+        assert!((lit_together / open - 1.0).abs() < 1e-3, "{what}: {lit_together} of {open}, which is what k_a says");
     }
 }

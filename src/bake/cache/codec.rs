@@ -25,7 +25,7 @@ use crate::bake::lighting::BakedLighting;
 use crate::plant::Plant;
 
 /// Version of the format *and* of the bakes: to be raised whenever either gives other bytes for the same input.
-pub(super) const VERSION: u32 = 12;
+pub(super) const VERSION: u32 = 14;
 
 const MAGIC: [u8; 8] = *b"CANOPYBK";
 const HEAD: usize = 52;
@@ -97,7 +97,7 @@ mod tests {
     use crate::bake::levels::cross::{Cross, CrossPlane, CrossTextures};
     use crate::bake::lighting::ExpressiveLighting;
     use crate::bake::lighting::TransferLighting;
-    use crate::bake::lighting::implicit::NoSurface;
+    use crate::bake::lighting::implicit::{AmbientField, NoSurface};
     use crate::bake::lighting::transfer::{TransferBake, TransferFormat, TransferPart, TransferSettings};
     use crate::lod::Representation;
     use crate::math::MipChain;
@@ -119,6 +119,8 @@ mod tests {
                 normals: vec![vec![Vec3::X, Vec3::Y, Vec3::Z]],
                 ambient: vec![vec![0.0, 0.5, 1.0]],
                 no_surface: Some(NoSurface::Threshold { threshold: 2.0, greatest: 1.5 }),
+                ambient_field: AmbientField::Published,
+                together: true,
             })),
             levels: vec![
                 BakedLevel::ShadowProxy(Arc::new(vec![mesh])),

@@ -17,7 +17,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::plant::Plant;
-use implicit::{ImplicitSettings, NoSurface, bake_implicit};
+use implicit::{AmbientField, ImplicitSettings, NoSurface, bake_implicit};
 use transfer::{PackedPart, PackedTransfer, SCATTERED, TransferFormat, TransferSettings, bake_transfer};
 
 /// How the sun (or the moon, where it is the brighter) lights a plant's full models. Nothing is baked for it.
@@ -82,19 +82,39 @@ pub struct ExpressiveLighting {
     pub ambient: Vec<Vec<f32>>,
     /// Why the foliage has its own normals after all.
     pub no_surface: Option<NoSurface>,
+    /// What k_a is a function of, which decides what the shaders make of it.
+    pub ambient_field: AmbientField,
+    /// Whether k_a holds the shade of the plants around, as they were lit together
+    /// ([`bake_implicit_stand`](implicit::bake_implicit_stand)).
+    pub together: bool,
 }
 
 impl ExpressiveLighting {
-    /// What is kept of a bake with the normals and the k_a of every part and a share of the leaves' own normals,
-    /// [`ImplicitSettings::own_normal`]. With all of them a leaf is lit as itself, on both of its sides.
+    /// What is kept of the bake of one plant by `settings` with the normals and the k_a of every part. With an
+    /// [`ImplicitSettings::own_normal`] of 1 a leaf is lit as itself, on both of its sides.
     pub fn new(
         normals: Vec<Vec<Vec3>>,
         ambient: Vec<Vec<f32>>,
         no_surface: Option<NoSurface>,
-        own_normal: f32,
+        settings: &ImplicitSettings,
     ) -> Self {
-        Self { normals: if own_normal < 1.0 { normals } else { Vec::new() }, ambient, no_surface }
+        let own_normal = settings.in_range().own_normal;
+        let normals = if own_normal < 1.0 { normals } else { Vec::new() };
+        Self { normals, ambient, no_surface, ambient_field: settings.ambient, together: false }
     }
+}
+
+/// How the shaders light leaves by k_a. The numbers are those of the uniforms.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u32)]
+pub enum AmbientTerm {
+    /// Nothing is known of the leaves around a leaf: k_a is 1, or was traced and holds all of their light.
+    #[default]
+    None = 0,
+    /// With the constants that were fitted for [`AmbientField::Depth`].
+    Fitted = 1,
+    /// By [Luft 2007, eq. 1] alone: [`AmbientField::Published`].
+    Published = 2,
 }
 
 /// What is kept of a transfer bake.
@@ -153,8 +173,7 @@ impl BakedLighting {
             LightingSettings::Expressive(settings) => {
                 let baked = bake_implicit(plant, settings);
                 let no_surface = baked.report.no_surface;
-                let own_normal = settings.in_range().own_normal;
-                Self::Expressive(ExpressiveLighting::new(baked.normals, baked.ambient, no_surface, own_normal))
+                Self::Expressive(ExpressiveLighting::new(baked.normals, baked.ambient, no_surface, settings))
             }
             LightingSettings::Transfer(settings) => {
                 let packed = bake_transfer(plant, settings).pack(TransferFormat::Snorm8);
@@ -228,13 +247,21 @@ impl BakedLighting {
         matches!(self, Self::Expressive(lighting) if lighting.no_surface.is_none() && !lighting.normals.is_empty())
     }
 
-    /// Whether k_a is known of the leaves: an ambient term that is not 1 throughout. By it the shaders take light from the sun
-    /// too, for the leaves around a leaf that the shadow maps are too coarse for.
-    pub fn has_ambient_term(&self) -> bool {
-        match self {
-            Self::Expressive(lighting) => lighting.ambient.iter().flatten().any(|ambient| *ambient < 1.0),
-            Self::Local | Self::Transfer(_) => false,
+    /// How the shaders light the leaves by k_a. Where it is 1 throughout there is nothing to fit.
+    pub fn ambient_term(&self) -> AmbientTerm {
+        let Self::Expressive(lighting) = self else { return AmbientTerm::None };
+        match lighting.ambient_field {
+            AmbientField::Published => AmbientTerm::Published,
+            AmbientField::Depth if lighting.ambient.iter().flatten().any(|ambient| *ambient < 1.0) => {
+                AmbientTerm::Fitted
+            }
+            AmbientField::Depth => AmbientTerm::None,
         }
+    }
+
+    /// Whether k_a holds the shade of the plants around, so that nothing else may count it again.
+    pub fn is_lit_together(&self) -> bool {
+        matches!(self, Self::Expressive(lighting) if lighting.together)
     }
 
     /// What the user ought to know of the bake.

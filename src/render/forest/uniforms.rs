@@ -85,14 +85,16 @@ pub struct VariantUniform {
     pub indirect_sun_mean: f32,
     /// The colour of the same.
     pub indirect_sun_color: [f32; 3],
-    /// 1 if its ambient occlusion is the ambient term of a density field, else 0.
+    /// How its leaves are lit by their ambient visibility, an [`AmbientTerm`](crate::bake::lighting::AmbientTerm).
     pub ambient_term: u32,
     /// Strength of the lobe of its gloss that carries a share of 1 ([`lobe_gain`]).
     pub lobe_gain: f32,
     /// Greatest strength of the lobe where nothing else reflects or transmits (one over [`lobe_peak`]).
     pub lobe_limit: f32,
+    /// Factor on the cover around it: 0 where its k_a holds the shade of the trees around already, else 1.
+    pub cover_weight: f32,
     /// WGSL rounds the size up to 16 bytes.
-    pub padding: [u32; 2],
+    pub padding: u32,
 }
 
 /// `CrossVariant` of `shaders/forest/cross_variant.wgsl`.
@@ -127,12 +129,16 @@ pub struct PartUniform {
     pub specular_reflectance: f32,
     /// Root mean square slope of its facets.
     pub roughness: f32,
-    /// 1 if its ambient occlusion is the ambient term of a density field, else 0.
+    /// How its leaves are lit by their ambient visibility, an [`AmbientTerm`](crate::bake::lighting::AmbientTerm).
     pub ambient_term: u32,
     /// Strength of the lobe of its gloss that carries a share of 1 ([`lobe_gain`]).
     pub lobe_gain: f32,
     /// Greatest strength of the lobe where nothing else reflects or transmits (one over [`lobe_peak`]).
     pub lobe_limit: f32,
+    /// Factor on the cover around it: 0 where its k_a holds the shade of the trees around already, else 1.
+    pub cover_weight: f32,
+    /// WGSL rounds the size up to 16 bytes.
+    pub padding: [u32; 3],
 }
 
 /// Words of four coefficients after the first, of all bands.
@@ -206,10 +212,11 @@ fn variant(plant: &BakedPlant, size: &PlantSize) -> VariantUniform {
         indirect_sun_zenith: zenith,
         indirect_sun_color: scattered_tint(&plant.plant.leaf_colors()).to_array(),
         indirect_sun_mean: mean,
-        ambient_term: u32::from(plant.lighting.has_ambient_term()),
+        ambient_term: plant.lighting.ambient_term() as u32,
         lobe_gain: lobe_gain(gloss.roughness),
         lobe_limit: lobe_peak(gloss.roughness).recip(),
-        padding: [0; 2],
+        cover_weight: cover_weight(&plant.lighting),
+        padding: 0,
     }
 }
 
@@ -246,7 +253,12 @@ fn realigned(lighting: &BakedLighting) -> f32 {
     f32::from(u8::from(lighting.is_realigned()))
 }
 
-/// The uniform of a part's material.
+/// Factor on the cover around a plant: neighbours that are in its k_a do not count again.
+fn cover_weight(lighting: &BakedLighting) -> f32 {
+    if lighting.is_lit_together() { 0.0 } else { 1.0 }
+}
+
+/// What the shaders know of a part's material.
 pub fn part_uniform(material: &PlantMaterial, lighting: &BakedLighting) -> PartUniform {
     let gloss = material.gloss.in_range();
     PartUniform {
@@ -255,9 +267,11 @@ pub fn part_uniform(material: &PlantMaterial, lighting: &BakedLighting) -> PartU
         transmission: material.transmission.to_array(),
         specular_reflectance: gloss.reflectance,
         roughness: gloss.roughness,
-        ambient_term: u32::from(lighting.has_ambient_term()),
+        ambient_term: lighting.ambient_term() as u32,
         lobe_gain: lobe_gain(gloss.roughness),
         lobe_limit: lobe_peak(gloss.roughness).recip(),
+        cover_weight: cover_weight(lighting),
+        padding: [0; 3],
     }
 }
 
@@ -267,9 +281,36 @@ mod tests {
 
     use super::*;
     use crate::{
-        bake::{BakeSettings, bake_plant, lighting::LightingSettings, lighting::implicit::ImplicitSettings},
+        bake::{
+            BakeSettings, bake_plant,
+            lighting::{
+                AmbientTerm, LightingSettings,
+                implicit::{AmbientField, ImplicitSettings},
+            },
+        },
         plant::grow::{GrowParameters, grow},
     };
+
+    #[test]
+    fn the_shaders_know_by_which_equations_leaves_are_lit() -> Result<(), Box<dyn std::error::Error>> {
+        let plant = Arc::new(grow(&GrowParameters::broadleaf(), 1, 5000)?);
+        let expressive = |ambient, radius| {
+            LightingSettings::Expressive(ImplicitSettings { ambient, radius, ..ImplicitSettings::default() })
+        };
+        for (lighting, term) in [
+            (LightingSettings::Local, AmbientTerm::None),
+            (expressive(AmbientField::Depth, None), AmbientTerm::Fitted),
+            (expressive(AmbientField::Published, None), AmbientTerm::Published),
+            // Without a field k_a is 1, and the equations are the published ones still.
+            (expressive(AmbientField::Published, Some(0.0)), AmbientTerm::Published),
+        ] {
+            let (plant, _) = bake_plant(plant.clone(), &BakeSettings { lighting, ..BakeSettings::default() }, None);
+            assert_eq!(plant.lighting.ambient_term(), term);
+            assert_eq!(variants(std::slice::from_ref(&plant), &[plant.size()])[0].ambient_term, term as u32);
+            assert_eq!(part_uniform(&PlantMaterial::default(), &plant.lighting).ambient_term, term as u32);
+        }
+        Ok(())
+    }
 
     #[test]
     fn a_share_of_1_of_their_own_normals_lights_leaves_as_leaves() -> Result<(), Box<dyn std::error::Error>> {

@@ -137,8 +137,7 @@ impl Task {
                 }
                 let baked = bake_implicit(&self.plant, &settings);
                 let (values, no_surface) = (baked.report.parameters, baked.report.no_surface);
-                let own_normal = settings.in_range().own_normal;
-                let lighting = ExpressiveLighting::new(baked.normals, baked.ambient, no_surface, own_normal);
+                let lighting = ExpressiveLighting::new(baked.normals, baked.ambient, no_surface, &settings);
                 let lighting = Arc::new(BakedLighting::Expressive(lighting));
                 Content::Light { preview: *preview, lighting, values, no_surface }
             }

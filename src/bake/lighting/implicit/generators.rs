@@ -1,9 +1,10 @@
-//! Generator points of the foliage [Luft 2007, 3.1]: one a primitive at its centre of mass, or an even choice of them.
+//! Generator points of the foliage [Luft 2007, 3.1]: one a primitive at its centre of mass, or one a vertex [Luft 2006, 4.1],
+//! or an even choice of them.
 //!
 //! The mass of a leaf card is what its alpha leaves of it, a seventh to a half in the models that this was tried on: by
 //! whole cards no two of them would have densities that mean the same.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -15,11 +16,11 @@ use crate::plant::{PartKind, PlantMesh, PlantPart, geometry, surface::Surface};
 /// A generator point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Generator {
-    /// Centre of mass of its primitive, metres.
+    /// Centre of mass of its primitive, or its vertex; metres.
     pub position: Vec3,
     /// Leaf area that it stands for, one side, square metres.
     pub area: f32,
-    /// Number of primitives that it stands for.
+    /// Number of primitives that it stands for; of vertices where those are the generators.
     pub primitives: f32,
 }
 
@@ -28,6 +29,9 @@ pub struct Generator {
 pub enum Weighting {
     /// Each primitive counts 1, as published. A finer tessellation of the same leaves makes the crown darker.
     Primitives,
+    /// The foliage's vertices are the generators and each counts 1 [Luft 2006, 4.1]. It depends on the tessellation as well,
+    /// and leaves that share vertices count less. Of vertices in one place, as at a seam of the texture, one counts.
+    Vertices,
     /// Each counts its leaf area over ρ² (and a constant), so that the sum is the leaf area index over one radius:
     /// in foliage of the leaf-area density u (1/m) it is u ρ. Neither the tessellation nor the plant's size matters,
     /// so the same τ and d_min suit any model.
@@ -42,7 +46,7 @@ impl Weighting {
     /// Weight of `generator` in a field of radius ρ `radius` in metres; finite, 0 or more.
     pub fn weight(self, generator: &Generator, radius: f32) -> f32 {
         let weight = match self {
-            Self::Primitives => generator.primitives,
+            Self::Primitives | Self::Vertices => generator.primitives,
             Self::LeafArea => generator.area / radius / radius / BUMP_VOLUME,
         };
         if weight.is_finite() { weight.max(0.0) } else { 0.0 }
@@ -59,11 +63,38 @@ pub fn generators(part: &PlantPart) -> Vec<Generator> {
 
 /// As [`generators`], with the mesh of `part` moved to where `mesh` has it.
 pub(super) fn generators_of(part: &PlantPart, mesh: &PlantMesh) -> Vec<Generator> {
+    with_corners(part, mesh).into_iter().map(|(_, generator)| generator).collect()
+}
+
+/// A generator for each place at which `mesh`, that of `part`, has a vertex of a valid triangle, in the order of the
+/// triangles. It has a third of the area of each triangle there, so that their sum is that of [`generators`].
+pub(super) fn vertex_generators_of(part: &PlantPart, mesh: &PlantMesh) -> Vec<Generator> {
+    let mut places = HashMap::new();
+    let mut generators: Vec<Generator> = Vec::new();
+    for (corners, triangle) in with_corners(part, mesh) {
+        for position in corners.map(|corner| mesh.positions[corner]) {
+            let index = *places.entry(place(position)).or_insert(generators.len());
+            if index == generators.len() {
+                generators.push(Generator { position, area: 0.0, primitives: 1.0 });
+            }
+            generators[index].area += triangle.area / 3.0;
+        }
+    }
+    generators
+}
+
+/// Equal for positions that are the same place.
+fn place(position: Vec3) -> [u32; 3] {
+    // Adding zero turns -0.0 into 0.0.
+    (position + Vec3::ZERO).to_array().map(f32::to_bits)
+}
+
+/// Valid triangles as corners, each with its generator.
+fn with_corners(part: &PlantPart, mesh: &PlantMesh) -> Vec<([usize; 3], Generator)> {
     let surface = Surface::new(part);
     let mut seen = HashSet::new();
     let mut is_first = |corners: [usize; 3]| {
-        // Adding zero turns -0.0 into 0.0, which is the same place.
-        let mut places = corners.map(|corner| (mesh.positions[corner] + Vec3::ZERO).to_array().map(f32::to_bits));
+        let mut places = corners.map(|corner| place(mesh.positions[corner]));
         places.sort_unstable();
         seen.insert(places)
     };
@@ -76,9 +107,10 @@ pub(super) fn generators_of(part: &PlantPart, mesh: &PlantMesh) -> Vec<Generator
             PartKind::Foliage => covered(&surface, corners.map(|corner| mesh.uvs[corner])),
         };
         let [p, q, r] = corners.map(|corner| mesh.positions[corner]);
-        Generator { position: a * p + b * q + c * r, area: share * geometry::area(mesh, *corners), primitives: 1.0 }
+        let area = share * geometry::area(mesh, *corners);
+        (*corners, Generator { position: a * p + b * q + c * r, area, primitives: 1.0 })
     };
-    triangles.par_iter().map(of_triangle).filter(|generator| generator.position.is_finite()).collect()
+    triangles.par_iter().map(of_triangle).filter(|(_, generator)| generator.position.is_finite()).collect()
 }
 
 /// The share of a triangle with these texture coordinates that passes the alpha test, and the centre of that share as
@@ -208,6 +240,26 @@ mod tests {
         assert!(nothing.len() == 2 && nothing.iter().all(|g| g.area == 0.0 && g.position.is_finite()));
         let wood: f32 = generators(&card(PartKind::Wood, [0, 0])).iter().map(|g| g.area).sum();
         assert_eq!(wood, 0.5);
+    }
+
+    #[test]
+    fn vertices_count_once_a_place_and_share_the_area() {
+        // Two leaves that touch in a corner; the second one has a seam, a vertex that nothing uses and one that is no place.
+        let o = Vec3::ZERO;
+        let mesh = PlantMesh {
+            positions: vec![o, Vec3::X, Vec3::Y, -o, -Vec3::X, -Vec3::Y, -Vec3::X, -Vec3::ONE, Vec3::ONE, Vec3::NAN],
+            normals: vec![Vec3::Z; 10],
+            uvs: vec![Vec2::ZERO; 10],
+            triangles: vec![[0, 1, 2], [3, 4, 5], [6, 7, 5], [0, 1, 9]],
+        };
+        let part = PlantPart { kind: PartKind::Foliage, mesh: mesh.clone(), material: PlantMaterial::default() };
+        let found = vertex_generators_of(&part, &mesh);
+        let positions: Vec<Vec3> = found.iter().map(|generator| generator.position).collect();
+        assert_eq!(positions, [o, Vec3::X, Vec3::Y, -Vec3::X, -Vec3::Y, -Vec3::ONE]);
+        let sum = |list: &[Generator]| list.iter().map(|generator| generator.area).sum::<f32>();
+        assert!((sum(&found) - sum(&generators(&part))).abs() < 1e-6 && sum(&found) > 1.0);
+        assert!(found.iter().all(|generator| Weighting::Vertices.weight(generator, 0.3) == 1.0));
+        assert_eq!(even_share(&found, 0.1)[0].primitives, 6.0);
     }
 
     #[test]

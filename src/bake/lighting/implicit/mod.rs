@@ -23,9 +23,21 @@
 //!
 //! Realigned normals point out of the crown: they must not be flipped by the side of a leaf that faces the camera.
 //!
-//! Departures from the paper: generators count their leaf area (the paper's count is [`Weighting::Primitives`]);
-//! automatic parameters; the smooth variant; [`AmbientField::Depth`]. The published density is blind beyond ρ, so one ρ
-//! cannot both smooth the crown's shape and tell how much light comes in, and a value of d_min suits one plant only.
+//! Departures from the paper, and how to draw it as published:
+//!
+//! | here | as published |
+//! |---|---|
+//! | generators count their leaf area | [`Weighting::Primitives`]; the vertices of [Luft 2006]: [`Weighting::Vertices`] |
+//! | ρ, τ, k_a_min, d_min and n follow from the model | state them: [`ImplicitSettings`] |
+//! | k_a by depth, a floor under the ambient light, direct light dimmed by k_a, gloss alike in all directions, light through leaves | [`AmbientField::Published`]: eq. 1 to 4 alone |
+//! | [`NormalSource::Gradient`], a choice | [`NormalSource::NearestVertex`], the default |
+//! | k_a is packed as a length of 0.25 to 1 ([`packing`]) | the length is k_a; not to be had |
+//!
+//! Why: the published density is blind beyond ρ, so one ρ cannot both smooth the crown's shape and tell how much light comes
+//! in, and a value of d_min suits one plant only. In either mode I_a of eq. 1 is the light of the sky and the ground by the
+//! direction of the normal, dimmed by the trees around where a plant does not stand alone, and S_i holds the terrain's shadow.
+//! Crosses, which the paper does not have, replace what the shadow map cannot know of their own crown by constants
+//! (`shaders/forest/cross.wgsl`).
 //!
 //! Pure functions: the same plant and settings give the same bytes, with any number of threads. Cost: `benches/README.md`.
 
@@ -148,7 +160,7 @@ fn parts_of(plant: &Plant) -> Vec<Part<'_>> {
 
 /// What a bake stands on.
 struct Basis {
-    /// One for each primitive of the foliage.
+    /// One for each primitive or vertex of the foliage.
     leaves: Vec<Generator>,
     /// How many of them make the field.
     generators: usize,
@@ -160,7 +172,7 @@ struct Basis {
 /// Generators, field and values of a lone plant, by `settings` that are in range.
 fn basis(parts: &[Part], settings: &ImplicitSettings) -> Basis {
     let extent = extent(parts);
-    let leaves = generators_of(parts, PartKind::Foliage);
+    let leaves = foliage_generators(parts, settings.weighting);
     let radius = parameters::radius(&leaves, extent, settings);
     let ambient_radius = parameters::ambient_radius(radius, extent, settings);
     let generators = generators::even_share(&leaves, settings.generator_share);
@@ -221,6 +233,17 @@ fn centered(mut parts: Vec<Part>) -> (Vec<Part>, Vec3) {
     (parts, center)
 }
 
+/// The foliage's generators, as `weighting` counts them.
+fn foliage_generators(parts: &[Part], weighting: Weighting) -> Vec<Generator> {
+    match weighting {
+        Weighting::Primitives | Weighting::LeafArea => generators_of(parts, PartKind::Foliage),
+        Weighting::Vertices => {
+            let foliage = parts.iter().filter(|part| part.source.kind == PartKind::Foliage);
+            foliage.flat_map(|part| generators::vertex_generators_of(part.source, &part.mesh)).collect()
+        }
+    }
+}
+
 /// A generator for each primitive of the parts of one kind.
 fn generators_of(parts: &[Part], kind: PartKind) -> Vec<Generator> {
     let parts = parts.iter().filter(|part| part.source.kind == kind);
@@ -236,7 +259,11 @@ fn depth_field(
     settings: &ImplicitSettings,
 ) -> Option<DepthField> {
     (settings.ambient == AmbientField::Depth).then(|| {
-        let mut occluders = leaves;
+        // Leaves hide each other by their area, wherever their vertices are.
+        let mut occluders = match settings.weighting {
+            Weighting::Primitives | Weighting::LeafArea => leaves,
+            Weighting::Vertices => generators_of(parts, PartKind::Foliage),
+        };
         occluders.extend(generators_of(parts, PartKind::Wood));
         DepthField::new(&occluders, parameters.ambient_radius, extent)
     })

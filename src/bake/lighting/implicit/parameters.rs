@@ -7,7 +7,8 @@
 //! - τ: a share of the median of F at the leaves, so that the surface keeps close to the crown whatever its density;
 //! - the ambient field's first radius: a hundredth of the longest extent;
 //! - k_a_min, d_min and n: constants of each [`AmbientField`], as both are in units that mean the same for any plant. They
-//!   were fitted to the traced visibility of ten plants, which `benches/implicit.rs` prints beside what they give.
+//!   were fitted to the traced visibility of ten plants (grown broadleaves, conifers and a bush, scanned oak, pine and
+//!   aspen), which `benches/implicit.rs` prints beside what they give: its errors are those on the plants of the fit.
 
 use std::ops::RangeInclusive;
 
@@ -29,16 +30,27 @@ const THRESHOLD_SHARE: f32 = 0.25;
 /// Leaves that are asked for the density.
 const SAMPLES: usize = 4096;
 
-/// What the ambient term is a function of.
+/// What the ambient term is a function of, and with it how k_a lights the leaves: as published, or with constants that are
+/// fitted to the path tracer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum AmbientField {
     /// F - τ of the field with the radius ρ, as published: the surface of the normals is where the crown begins to
-    /// darken. What lies beyond ρ casts no shade.
+    /// darken. What lies beyond ρ casts no shade. The plant is then lit by eq. 1 alone: k_a on the ambient light and on
+    /// nothing else, without a floor; diffuse and specular light by the realigned normal, times the shadow map; no light
+    /// comes through leaves. k_a_min = 0.2, d_min = 5 and n = 6 where nothing is set are fitted: see [`Depth`](Self::Depth).
     Published,
     /// The mean number of leaves along a ray ([`DepthField`](super::depth_field::DepthField)): the same bumps, for radii that
     /// double from the ambient radius to the plant's extent, wood counted as well. Nearer to what is seen from a leaf,
     /// whatever the plant, and independent of ρ and τ, which belong to the normals then: those want a smooth crown, and
     /// light wants every gap.
+    ///
+    /// Lit with constants of our own (`shaders/forest/instance.wgsl`): the light of other leaves is 0.13 of the ambient light
+    /// that k_a takes away, the direct light is times min(0.35 + 2 k_a, 1.1) for leaves that the shadow map is too coarse for,
+    /// leaves pass on light from behind, and their gloss is alike in all directions. 0.13 is fitted to the path tracer on a grown
+    /// broadleaf and conifer and a scanned oak, pine and aspen; the factor on the direct light is a guess that the same plants
+    /// bear out (`docs/measurements/expressive-against-ground-truth.md`). k_a_min = 0, d_min = 8 and n = 4 are fitted to traced
+    /// visibility of ten plants (`docs/measurements/implicit-surfaces.md`). Both reports judge the constants on the plants of
+    /// the fit; other plants may be farther from the truth.
     #[default]
     Depth,
 }
@@ -81,7 +93,8 @@ pub struct ImplicitSettings {
     pub radius: Option<f32>,
     /// τ in units of the field (see [`Weighting`]), 0..=1e6. Larger: a surface closer to the densest foliage.
     pub threshold: Option<f32>,
-    /// What the ambient term is a function of.
+    /// What the ambient term is a function of: `Depth`, nearer to the truth, or `Published`, lit by the paper's equations
+    /// alone ([`AmbientField`]).
     pub ambient: AmbientField,
     /// First radius of [`AmbientField::Depth`], metres, 0..=1e6. Larger: gaps between twigs no longer count. 0: k_a is 1.
     pub ambient_radius: Option<f32>,
@@ -96,7 +109,8 @@ pub struct ImplicitSettings {
     /// In a scene file: `share`.
     #[serde(rename = "share")]
     pub generator_share: f32,
-    /// What a generator counts.
+    /// What a generator counts: `LeafArea`, `Primitives` [Luft 2007, 3.1] or `Vertices` [Luft 2006, 4.1]. It changes the units
+    /// of [`threshold`](Self::threshold), and of [`core`](Self::core) as published. [`AmbientField::Depth`] goes by leaf area.
     pub weighting: Weighting,
     /// Where the normals come from.
     pub normals: NormalSource,
@@ -114,7 +128,9 @@ pub struct ImplicitSettings {
     pub surface_share: Option<f32>,
     /// Whether all trees of such species are lit together, so that a small tree is darkened by its tall neighbour [Luft
     /// 2007, 5]. Each tree then is a model of its own, of which a scene has at most 64. The first such species' values
-    /// count for all. For who places trees: the bake of one plant does not look at it. Default false.
+    /// count for all. Their neighbours darken them by the common field alone: of the cover around them nothing is counted
+    /// again, trees of other species included. The shadow maps and, in [`AmbientField::Depth`], the factor on the direct
+    /// light count for each. For who places trees: the bake of one plant does not look at it. Default false.
     pub together: bool,
 }
 

@@ -14,9 +14,9 @@ use super::density::DensityField;
 use super::generators::{Generator, even_share};
 use super::{
     ImplicitBake, ImplicitParameters, ImplicitReport, ImplicitSettings, Part, SurfaceMesh, bake_parts, depth_field,
-    extent, generators_of, parameters,
+    extent, foliage_generators, parameters,
 };
-use crate::plant::{PartKind, Plant, PlantMesh};
+use crate::plant::{Plant, PlantMesh};
 
 /// A plant of a stand.
 #[derive(Clone, Copy, Debug)]
@@ -66,7 +66,7 @@ pub fn bake_implicit_stand(plants: &[StandPlant], settings: &ImplicitSettings) -
     let origin = if origin.is_finite() { origin } else { DVec3::ZERO };
 
     let moved: Vec<Vec<Part>> = plants.iter().filter(usable).map(|plant| in_stand(plant, origin)).collect();
-    let leaves: Vec<Vec<Generator>> = moved.iter().map(|parts| generators_of(parts, PartKind::Foliage)).collect();
+    let leaves: Vec<Vec<Generator>> = moved.iter().map(|parts| foliage_generators(parts, settings.weighting)).collect();
     let (parameters, extent) = common_parameters(&moved, &leaves, &settings);
     let leaves = leaves.concat();
     let generators = even_share(&leaves, settings.generator_share);

@@ -101,7 +101,8 @@ pub enum Interior {
     /// brightly as one that scatters; a leaf under a bright spot does not spread it.
     Straight(u8),
     /// Leaves and wood reflect and transmit diffusely, and light is followed over this many of them (1..=8) [Franzke
-    /// 2005, 4.2.3, note 4; Sloan et al. 2002, 5].
+    /// 2005, 4.2.3, note 4; Sloan et al. 2002, 5]. It is followed along some of the lines only, evenly chosen, of which
+    /// there are half as many as [`rays`](TransferSettings::rays): 57 of 512 by default.
     Diffuse(u8),
 }
 
