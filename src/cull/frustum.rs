@@ -9,7 +9,8 @@ pub struct Frustum {
 }
 
 impl Frustum {
-    /// The four side planes of `clip_from_relative`. They meet in the camera, so what lies behind it is outside of them.
+    /// The four side planes of `clip_from_relative`. They meet in the camera, so what lies behind it is outside of
+    /// them.
     pub fn new(clip_from_relative: &Mat4) -> Self {
         let rows = clip_from_relative.transpose();
         let planes = [
