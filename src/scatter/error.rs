@@ -86,7 +86,7 @@ pub enum ScatterError {
         /// The other.
         second: String,
     },
-    /// Cells of number columns that are no (possible) numbers.
+    /// Cells of number columns that are not (possible) numbers.
     #[error("inventory {name}: {total} cell(s) cannot be used; the first: {}", listed(first))]
     BadValues {
         /// Name of the file or source.
