@@ -1,11 +1,11 @@
 //! Kinds of leaves: how much of the light passes through them.
 //!
-//! In the plate model of a leaf [Jacquemoud & Baret 1990, "PROSPECT"] reflected and transmitted light come from the same
-//! scattering, so they have the same colour, and what tells the light through a leaf from the light of its face is the
-//! colourless share that the surface reflects ([`Gloss`](super::Gloss)). How much comes through depends on what the leaf is
-//! made of: many scattering layers send light back, few let it pass. So a kind of leaf has one number: its transmittance
-//! over what its inside reflects, as [`PlantMaterial::transmission`](super::PlantMaterial::transmission) has it, here by the
-//! luminances of a typical leaf.
+//! In the plate model of a leaf [Jacquemoud & Baret 1990, "PROSPECT"] reflected and transmitted light come from the
+//! same scattering, so they have the same colour, and what tells the light through a leaf from the light of its face is
+//! the colourless share that the surface reflects ([`Gloss`](super::Gloss)). How much comes through depends on what the
+//! leaf is made of: many scattering layers send light back, few let it pass. So a kind of leaf has one number: its
+//! transmittance over what its inside reflects, as [`PlantMaterial::transmission`](super::PlantMaterial::transmission)
+//! has it, here by the luminances of a typical leaf.
 //!
 //! | kind | reflectance | transmittance | factor | from |
 //! |---|---|---|--:|---|
@@ -15,9 +15,9 @@
 //! | needle | 0.070 0.128 0.033 | 0.017 0.046 0.000 | 0.5 | PROSPECT-D, thick needle |
 //! | dead | 0.181 0.116 0.065 | 0.107 0.052 0.013 | 0.7 | PROSPECT-D, brown leaf |
 //!
-//! Colours are linear, Rec. 709 primaries, under light of 6504 K. PROSPECT-D: [Féret et al. 2017]; the green leaf has structure
-//! 1.5, chlorophyll 40 and carotenoid 8 µg/cm², water 0.01 and dry matter 0.008 g/cm². Measured: the spectral library of
-//! Helios [Bailey 2019]. A species differs from its kind by a fifth or more; a file's own value
+//! Colours are linear, Rec. 709 primaries, under light of 6504 K. PROSPECT-D: [Féret et al. 2017]; the green leaf has
+//! structure 1.5, chlorophyll 40 and carotenoid 8 µg/cm², water 0.01 and dry matter 0.008 g/cm². Measured: the spectral
+//! library of Helios [Bailey 2019]. A species differs from its kind by a fifth or more; a file's own value
 //! ([`KHR_materials_diffuse_transmission`](super::gltf)) goes before it.
 
 use glam::Vec3;
@@ -26,7 +26,8 @@ use serde::{Deserialize, Serialize};
 /// What a leaf is made of, as far as light through it is concerned.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum LeafKind {
-    /// Green leaves of most broadleaved trees and herbs, in autumn colours too: about as much light passes as is reflected.
+    /// Green leaves of most broadleaved trees and herbs, in autumn colours too: about as much light passes as is
+    /// reflected.
     #[default]
     Thin,
     /// Leaves that have just unfolded: thin and pale, more light passes.

@@ -22,7 +22,7 @@ impl WorldRay {
         Self { origin, direction, t_max: f64::INFINITY }
     }
 
-    /// The place at `t` metres.
+    /// The position at `t` metres.
     pub fn at(&self, t: f64) -> DVec3 {
         self.origin + t * self.direction
     }
@@ -33,17 +33,17 @@ impl WorldRay {
 pub struct Camera {
     /// Where it stands and looks.
     pub view: Viewpoint,
-    /// Width and height of the picture in pixels.
+    /// Width and height of the image in pixels.
     pub size: (u32, u32),
     /// Metres to the near plane, 0 or more: nothing before it is seen.
     pub near: f64,
 }
 
-/// The most pixels of a picture: more than any screen, and few enough that their sums fit into memory.
+/// The most pixels of an image: more than any screen, and few enough that their sums fit into memory.
 const MOST_PIXELS: u64 = 1 << 28;
 
 impl Camera {
-    /// Refuses what is no camera.
+    /// Checks that the camera is valid.
     ///
     /// # Errors
     /// [`ReferenceError::Size`], [`ReferenceError::Value`].
@@ -71,7 +71,7 @@ impl Camera {
         Ok(())
     }
 
-    /// The ray through the place `inside` (0..1 each, from the upper left) of a pixel, from the near plane on.
+    /// The ray through the point `inside` (0..1 each, from the upper left) of a pixel, from the near plane on.
     pub fn ray(&self, column: u32, row: u32, inside: Vec2) -> WorldRay {
         let (width, height) = (f64::from(self.size.0), f64::from(self.size.1));
         let tangent = (0.5 * self.view.field_of_view).tan();

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! Little-endian. The fingerprint is that of everything the pixels depend on ([`super::PathTracer::fingerprint`]), the
-//! hash at the end that of all bytes before it. The file appears whole or not at all: it is written beside its place,
+//! hash at the end that of all bytes before it. The file appears whole or not at all: it is written under another name,
 //! then renamed.
 
 use std::fs;

@@ -1,4 +1,4 @@
-//! A picture that grows sample by sample, and the loop that makes it grow.
+//! The film: an image that accumulates samples, and the loop that renders them.
 
 use std::ops::ControlFlow;
 
@@ -69,9 +69,9 @@ impl Film {
         self.sums.iter().map(|sum| (*sum * share).as_vec3()).collect()
     }
 
-    /// Standard error of the picture's luminance: the root of the pixels' mean variance, over the picture's mean. An
+    /// Standard error of the image's luminance: the root of the pixels' mean variance, over the image's mean. An
     /// estimate from the samples' own spread, as of independent samples: an upper bound for stratified ones. `None`
-    /// below two samples, and for a black picture.
+    /// below two samples, and for a black image.
     pub fn relative_error(&self) -> Option<f64> {
         let n = f64::from(self.samples);
         let (mut variance, mut mean) = (0.0, 0.0);

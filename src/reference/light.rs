@@ -1,4 +1,4 @@
-//! The light of a reference picture: the environment, the disc that casts shadows, and what the camera sees of the sky.
+//! The light of a reference render: the environment, the disc that casts shadows, and what the camera sees of the sky.
 
 use std::f32::consts::PI;
 
@@ -32,7 +32,7 @@ pub struct VisibleDisc {
     pub angular_radius: f32,
 }
 
-/// All light of a picture.
+/// All light of a render.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Light {
     /// Radiance from everywhere, without the discs.
@@ -49,8 +49,8 @@ impl Light {
         Self { environment: Environment::Even(radiance), key: None, visible: Vec::new() }
     }
 
-    /// The light that the renderer draws with: its sky picture, its key light, the discs of sun and moon. Stars are
-    /// left out. `below` replaces what the sky picture has below the horizon by one radiance in nits: for plants alone,
+    /// The light that the renderer draws with: its sky texture, its key light, the discs of sun and moon. Stars are
+    /// left out. `below` replaces the sky texture below the horizon by one radiance in nits: for plants alone,
     /// the ground's; a scene with a ground of its own needs none.
     pub fn of(state: &LightState, below: Option<Vec3>) -> Self {
         let key = Disc {

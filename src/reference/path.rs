@@ -25,7 +25,7 @@ pub struct TraceSettings {
     /// comes straight from sun and sky only. `u32::MAX`: as often as it will (default). A stand of grown
     /// broadleaves seen from above loses 7 % of its light at 0 bounces, 0.7 % at one, 0.07 % at two.
     pub bounces: u32,
-    /// Seed of the random numbers. Pictures of different seeds have independent noise.
+    /// Seed of the random numbers. Renders with different seeds have independent noise.
     pub seed: u64,
     /// Which normals cosines are counted from.
     pub normals: Normals,

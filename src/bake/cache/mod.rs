@@ -63,9 +63,9 @@ impl Cache {
         Self { folder: folder.into() }
     }
 
-    /// The user's cache: the folder `$CANOPY_CACHE` where that is set and not empty, else the folder `canopy` where the system
-    /// keeps caches: `$XDG_CACHE_HOME` or `~/.cache` on Linux, `~/Library/Caches` on macOS, `%LOCALAPPDATA%` on Windows.
-    /// `None` where there is neither.
+    /// The user's cache: the folder `$CANOPY_CACHE` where that is set and not empty, else the folder `canopy` where the
+    /// system keeps caches: `$XDG_CACHE_HOME` or `~/.cache` on Linux, `~/Library/Caches` on macOS, `%LOCALAPPDATA%` on
+    /// Windows. `None` where there is neither.
     pub fn of_user() -> Option<Self> {
         user_folder(std::env::var_os("CANOPY_CACHE"), dirs::cache_dir()).map(Self::new)
     }

@@ -2,12 +2,12 @@
 //!
 //! | module | makes | after |
 //! |---|---|---|
-//! | [`cross`] | crossed billboards with colour, normal, k_a | [Franzke 2005, 4.3] |
+//! | [`cross`] | crossed billboards with colour, normal, ambient term | [Franzke 2005, 4.3] |
 //! | [`shadow_proxy`] | a lighter model with the same projected area | [Cook et al. 2007] |
-//! | [`rasterize`] | which triangle each sample of a picture sees: what both need | |
+//! | [`rasterize`] | which triangle each sample of an image shows; used by both | |
 //!
-//! A bake for another representation is a module here, a variant of [`BakedLevel`] (at the end: the cache counts them), and
-//! a line in the list of bakers.
+//! A bake for another representation is a module here, a variant of [`BakedLevel`] (at the end: the cache counts them),
+//! and a line in the list of bakers.
 
 pub mod cross;
 pub mod rasterize;
@@ -25,8 +25,8 @@ use crate::plant::{Plant, PlantMesh};
 /// What is baked of a plant for one representation. Who draws plants sees by the pointers what of one has changed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum BakedLevel {
-    /// For [`Representation::MODEL`], a lighter model (parts in the plant's order) with the same projected area, which casts
-    /// the near shadow.
+    /// For [`Representation::MODEL`], a lighter model (parts in the plant's order) with the same projected area, which
+    /// casts the near shadow.
     ShadowProxy(#[serde(with = "shared")] Arc<Vec<PlantMesh>>),
     /// For [`Representation::CROSS`], crossed billboards.
     Cross(#[serde(with = "shared")] Arc<Cross>),

@@ -134,7 +134,7 @@ impl Piece {
                 }
                 let baked = bake_implicit(&self.plant, &settings);
                 let (values, no_surface) = (baked.report.parameters, baked.report.no_surface);
-                let own_normal = settings.in_range().own_normal;
+                let own_normal = settings.sanitized().own_normal;
                 let lighting = ExpressiveLighting::new(baked.normals, baked.ambient, no_surface, own_normal);
                 let lighting = Arc::new(BakedLighting::Expressive(lighting));
                 Content::Light { preview: *preview, lighting, values, no_surface }
@@ -301,7 +301,7 @@ impl Baker {
         let mut state = self.shared.state();
         state.orders += 1;
         // A share that is no larger than a preview's needs none.
-        let slow = order.cross.is_none() || order.settings.in_range().generator_share > PREVIEW_SHARE;
+        let slow = order.cross.is_none() || order.settings.sanitized().generator_share > PREVIEW_SHARE;
         let previewed = if slow { 0 } else { order.plants.len() };
         let (number, ordered) = (state.orders, Instant::now());
         let job = Job { number, ordered, previewed, lit: Vec::new(), crossed: 0, order };

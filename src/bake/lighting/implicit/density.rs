@@ -8,13 +8,13 @@
 //! Generators and points are both sorted into compact groups of eight (`partition.rs`). For a group
 //! of points the tree over the generators is walked once: boxes that are out of reach are skipped, boxes that lie
 //! within reach as a whole give a polynomial (`moments.rs`), and what remains, the rim of the ball, is
-//! summed in pairs, eight points side by side in vector registers (glam's, as compilers do not find them here). So the time grows with the surface of the ball of
-//! influence, and not with its volume: a large ρ is as cheap as a small one.
+//! summed in pairs, eight points side by side in vector registers (glam's, as compilers do not find them here). So the
+//! time grows with the surface of the ball of influence, and not with its volume: a large ρ is as cheap as a small one.
 //!
 //! Accuracy: pairs are f32, sums of pairs and polynomials f64. Rounding moves each 1 - (d/ρ)² by at most
-//! 3e-7, which only matters where all generators in reach are near the rim; there the point is summed again in f64. The relative
-//! error of F is at most 1e-5 (measured: 1e-6), whatever the plant's size and place. Points are independent of each
-//! other, so the result is the same for any number of threads.
+//! 3e-7, which only matters where all generators in reach are near the rim; there the point is summed again in f64. The
+//! relative error of F is at most 1e-5 (measured: 1e-6), whatever the plant's size and position. Points are independent
+//! of each other, so the result is the same for any number of threads.
 
 use glam::{DVec3, Vec3, Vec3A, Vec4};
 use rayon::prelude::*;
@@ -181,7 +181,7 @@ impl DensityField {
         partition::compact_order(points, LANES)
     }
 
-    /// Calls `put` with the place and the field of each point of `order`, a result of [`Self::order`]; the gradient
+    /// Calls `put` with the index and the field of each point of `order`, a result of [`Self::order`]; the gradient
     /// means nothing where it is not asked for.
     pub(super) fn evaluate_in<const GRADIENT: bool>(
         &self,
@@ -237,8 +237,8 @@ impl DensityField {
         })
     }
 
-    /// Calls `at_rim` with each group at the rim of the ball around `region` and returns the moments, about the region's
-    /// centre, of all generators that reach all of it.
+    /// Calls `at_rim` with each group at the rim of the ball around `region` and returns the moments, about the
+    /// region's centre, of all generators that reach all of it.
     fn walk(&self, region: &Aabb, mut at_rim: impl FnMut(u32)) -> Option<Moments> {
         let reach = self.radius * self.radius;
         let beyond = reach * ROOM;

@@ -62,10 +62,10 @@ pub(super) fn generators_of(part: &PlantPart, mesh: &PlantMesh) -> Vec<Generator
     let surface = Surface::new(part);
     let mut seen = HashSet::new();
     let mut is_first = |corners: [usize; 3]| {
-        // Adding zero turns -0.0 into 0.0, which is the same place.
-        let mut places = corners.map(|corner| (mesh.positions[corner] + Vec3::ZERO).to_array().map(f32::to_bits));
-        places.sort_unstable();
-        seen.insert(places)
+        // Adding zero turns -0.0 into 0.0, which is the same position.
+        let mut corner_bits = corners.map(|corner| (mesh.positions[corner] + Vec3::ZERO).to_array().map(f32::to_bits));
+        corner_bits.sort_unstable();
+        seen.insert(corner_bits)
     };
     let triangles: Vec<([usize; 3], bool)> =
         geometry::triangles(mesh).map(|(_, corners)| (corners, is_first(corners))).collect();

@@ -22,7 +22,7 @@
 use half::f16;
 use serde::{Deserialize, Serialize};
 
-use super::{SCATTERED, TransferBake, TransferPart, TransferSettings};
+use super::{INDIRECT_SUN_COEFFICIENTS, TransferBake, TransferPart, TransferSettings};
 use crate::light::sh::MAX_BANDS;
 
 /// How a coefficient is stored.
@@ -58,10 +58,10 @@ pub struct PackedPart {
     pub scale: [f32; MAX_BANDS],
     /// Vertex by vertex.
     pub bytes: Vec<u8>,
-    /// What 127 stands for in `scattered`.
-    pub scattered_scale: f32,
-    /// [`TransferPart::scattered`], a signed byte each, in any format.
-    pub scattered: Vec<u8>,
+    /// What 127 stands for in `indirect_sun`.
+    pub indirect_sun_scale: f32,
+    /// [`TransferPart::indirect_sun`], a signed byte each, in any format.
+    pub indirect_sun: Vec<u8>,
 }
 
 impl TransferFormat {
@@ -100,12 +100,12 @@ impl TransferBake {
 impl PackedTransfer {
     /// Whether the settings are in their ranges, all parts have whole vertices of them, and all scales are finite.
     pub fn is_whole(&self) -> bool {
-        self.settings == self.settings.in_range()
+        self.settings == self.settings.sanitized()
             && self.parts.iter().all(|part| {
                 (1..=2).contains(&part.sides)
                     && part.vertex_bytes == self.format.vertex_bytes(&self.settings, part.sides)
                     && part.bytes.len().is_multiple_of(part.vertex_bytes)
-                    && part.scale.iter().chain([&part.scattered_scale]).all(|scale| scale.is_finite())
+                    && part.scale.iter().chain([&part.indirect_sun_scale]).all(|scale| scale.is_finite())
             })
     }
 
@@ -123,9 +123,9 @@ impl PackedTransfer {
                     self.decode(bytes, part, side, &mut target[start..]);
                 }
             }
-            let code = |code: &u8| f32::from((*code as i8).max(-127)) / 127.0 * part.scattered_scale;
-            out.scattered = part.scattered.iter().map(code).collect();
-            out.scattered.resize(vertices * SCATTERED, 0.0);
+            let code = |code: &u8| f32::from((*code as i8).max(-127)) / 127.0 * part.indirect_sun_scale;
+            out.indirect_sun = part.indirect_sun.iter().map(code).collect();
+            out.indirect_sun.resize(vertices * INDIRECT_SUN_COEFFICIENTS, 0.0);
             out
         };
         TransferBake { settings: self.settings, parts: self.parts.iter().map(unpack).collect() }
@@ -188,10 +188,10 @@ fn pack_part(part: &TransferPart, settings: &TransferSettings, format: TransferF
         }
         bytes.resize((vertex + 1) * vertex_bytes, 0);
     }
-    let greatest = part.scattered.iter().fold(0.0f32, |max, value| max.max(value.abs()));
+    let greatest = part.indirect_sun.iter().fold(0.0f32, |max, value| max.max(value.abs()));
     let code = |value: &f32| ((127.0 * value / greatest).clamp(-127.0, 127.0).round() as i8) as u8;
-    let scattered = part.scattered.iter().map(code).collect();
-    PackedPart { sides, vertex_bytes, scale, bytes, scattered_scale: greatest, scattered }
+    let indirect_sun = part.indirect_sun.iter().map(code).collect();
+    PackedPart { sides, vertex_bytes, scale, bytes, indirect_sun_scale: greatest, indirect_sun }
 }
 
 /// Appends a vertex.
@@ -258,7 +258,7 @@ mod tests {
 
     #[test]
     fn errors_are_within_their_bounds() {
-        for channels in [Channels::One, Channels::Rgb] {
+        for channels in [Channels::Luminance, Channels::Rgb] {
             let bake = bake(channels);
             let exact = bake.pack(TransferFormat::Float32).unpack();
             assert_eq!((&exact.parts[0].front, &exact.parts[0].back), (&bake.parts[0].front, &bake.parts[0].back));
@@ -286,7 +286,7 @@ mod tests {
 
     #[test]
     fn darkness_and_missing_bytes_are_zeros() {
-        let mut bake = bake(Channels::One);
+        let mut bake = bake(Channels::Luminance);
         bake.parts[0].front[..9].fill(0.0);
         bake.parts[0].front[9] = -1e-9;
         let mut packed = bake.pack(TransferFormat::Snorm8);

@@ -31,8 +31,8 @@ pub fn direction_set(n: u32) -> Vec<Vec3> {
 pub(super) struct Directions {
     /// Unit vectors along the lines, in the upper hemisphere.
     pub lines: Vec<Vec3>,
-    /// For each line and ray, bands² values: what an unhidden ray adds to the coefficients, times its cosine over the sum
-    /// of all cosines to its side.
+    /// For each line and ray, bands² values: what an unhidden ray adds to the coefficients, times its cosine over the
+    /// sum of all cosines to its side.
     rows: Vec<f32>,
     coefficients: usize,
     /// The lines that are followed to what they meet.

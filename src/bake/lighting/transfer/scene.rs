@@ -69,8 +69,8 @@ pub(super) struct Links {
 }
 
 impl Links {
-    /// From the links of each line, each with `2 * slot + side`; those of one side stay in the order of the lines. Their
-    /// weights are scaled to the share of even surroundings that is `hidden` from each side.
+    /// From the links of each line, each with `2 * slot + side`; those of one side stay in the order of the lines.
+    /// Their weights are scaled to the share of even surroundings that is `hidden` from each side.
     pub fn new(by_line: Vec<Vec<(u32, Link)>>, hidden: &[Vec<f32>; 2]) -> Self {
         let keys = 2 * hidden[0].len();
         let mut starts = vec![0u32; keys + 1];
