@@ -4,7 +4,7 @@
 //! | module | makes | after |
 //! |---|---|---|
 //! | [`lighting`] | how a plant is lit, and the data that is baked for it: | |
-//! | [`lighting::implicit`] | normals and ambient term from the crown's implicit surface, and the surface | [Luft 2007] |
+//! | [`lighting::implicit`] | normals, ambient term and surface of the crown's density field | [Luft 2007] |
 //! | [`lighting::transfer`] | radiance transfer of the sky, per vertex and side | [Franzke 2005, 4.2.3] |
 //! | [`levels`] | the representations that are baked: | |
 //! | [`levels::cross`] | crossed billboards with colour, normal, ambient term | [Franzke 2005, 4.3] |

@@ -1,4 +1,4 @@
-//! Triangles of a plant as bakes and tracers read them: checked corners, areas and connected elements.
+//! Triangles of a plant for bakes and tracers: checked corners, areas and connected elements.
 //!
 //! All of them walk a mesh through [`triangles`], so a mesh that breaks its own rules (an index out of range, a
 //! position that is not finite) loses those triangles and nothing else.
@@ -25,10 +25,10 @@ pub(crate) fn area(mesh: &PlantMesh, corners: [usize; 3]) -> f32 {
     mesh.area(corners.map(|corner| corner as u32))
 }
 
-/// Triangles of a mesh that hang together: a leaf card, a twig, a trunk.
+/// Connected triangles of a mesh: a leaf card, a twig, a trunk.
 #[derive(Clone, Debug)]
 pub(crate) struct Element {
-    /// Places in `PlantMesh::triangles`, ascending.
+    /// Indices in `PlantMesh::triangles`, ascending.
     pub triangles: Vec<u32>,
     /// Area of one side, square metres.
     pub area: f32,

@@ -1,17 +1,16 @@
-//! The leaf, the bark and the ground as light sees them: diffuse reflection, diffuse transmission, and the gloss of
-//! leaves.
+//! Scattering by leaves, bark and ground: diffuse reflection, diffuse transmission, and the gloss of leaves.
 //!
-//! The twin of `shade` in `shaders/common/lighting.wgsl` [Franzke 2005, 4.2.2]: a surface sends back `reflected / pi`
-//! of the light on the viewer's side, and `transmitted / pi` of the light on the other. A leaf with gloss reflects
-//! diffusely what has been inside it alone, and the rest of its base colour around the mirror direction, on either side
-//! ([`Lobe`]). Which share is which, and the colour of the light through a leaf, `plant/gloss.rs` derives, as for the
-//! shader.
+//! The twin of `shade` in `shaders/common/lighting.wgsl` [Franzke 2005, 4.2.2]: a surface scatters
+//! `reflected / pi` of the light on the viewer's side to the viewer, and `transmitted / pi` of the light on the other
+//! side. A leaf with gloss reflects only its subsurface albedo diffusely, and the rest of its base colour around the
+//! mirror direction, on either side ([`Lobe`]). `plant/gloss.rs` derives both, and the colour of the light through a
+//! leaf, as it does for the shader.
 //!
-//! The shader takes the gloss out of the key light alone and has leaves smaller than a pixel reflect like a ball. Here
-//! the lobe is there for all light, and each leaf mirrors about its own normal.
+//! The shader applies the lobe only to the key light, and leaves smaller than a pixel reflect like a ball. Here the
+//! lobe applies to all light, and each leaf reflects about its own normal.
 //!
-//! Energy: all shares together may not exceed 1. A material that says otherwise is scaled down, channel by channel, to
-//! reflect and transmit 1 together in the ratio that it states; the lobe fits itself into what they leave.
+//! Energy: reflection and transmission together must not exceed 1. A material that exceeds it is scaled down, channel
+//! by channel, to a sum of 1 in the same ratio; the lobe is limited to the rest.
 
 use std::f32::consts::{PI, TAU};
 
@@ -20,14 +19,14 @@ use glam::{Vec2, Vec3};
 use super::lobe::Lobe;
 use crate::plant::Gloss;
 
-/// What a material does with light.
+/// Fractions of light that a material reflects and transmits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Shares {
-    /// Share that is reflected diffusely.
+    /// Fraction that is reflected diffusely.
     pub reflected: Vec3,
-    /// Share that is transmitted diffusely.
+    /// Fraction that is transmitted diffusely.
     pub transmitted: Vec3,
-    /// What is reflected around the mirror direction.
+    /// Specular reflection around the mirror direction.
     pub lobe: Option<Lobe>,
 }
 
@@ -58,7 +57,7 @@ impl Shares {
 pub(crate) struct Bsdf {
     /// Unit normal of the flat surface, on the viewer's side.
     geometric: Vec3,
-    /// Unit normal that the cosine counts from; within a right angle of `geometric`.
+    /// Unit normal for shading; within a right angle of `geometric`.
     shading: Vec3,
     /// Unit vector to the viewer.
     to_viewer: Vec3,

@@ -12,12 +12,12 @@ pub struct WorldRay {
     pub origin: DVec3,
     /// Unit vector.
     pub direction: DVec3,
-    /// Metres to which it reaches; may be infinite.
+    /// Maximum distance, metres; may be infinite.
     pub t_max: f64,
 }
 
 impl WorldRay {
-    /// A ray without end.
+    /// A ray of infinite length.
     pub fn new(origin: DVec3, direction: DVec3) -> Self {
         Self { origin, direction, t_max: f64::INFINITY }
     }
@@ -28,14 +28,14 @@ impl WorldRay {
     }
 }
 
-/// A pinhole camera: the perspective projection that the renderer draws a [`Viewpoint`] with, and its near plane.
+/// A pinhole camera: the renderer's perspective projection of a [`Viewpoint`], and its near plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Where it stands and looks.
+    /// Position and direction.
     pub view: Viewpoint,
     /// Width and height of the image in pixels.
     pub size: (u32, u32),
-    /// Metres to the near plane, 0 or more: nothing before it is seen.
+    /// Distance to the near plane, metres, 0 or more: nothing in front of it is visible.
     pub near: f64,
 }
 

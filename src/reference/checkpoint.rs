@@ -63,7 +63,7 @@ impl Film {
         };
         let damaged = |what| ReferenceError::Checkpoint { path: path.to_owned(), what };
         if !bytes.starts_with(MAGIC) {
-            return Err(damaged("this is not a checkpoint of a reference picture, or it is one of another version"));
+            return Err(damaged("this is not a checkpoint of a reference render, or it has another version"));
         }
         let Some((content, hash)) = bytes.split_last_chunk::<HASH>() else { return Err(damaged("it is truncated")) };
         if blake3::hash(content).as_bytes() != hash {

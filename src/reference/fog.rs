@@ -1,7 +1,7 @@
 //! The renderer's fog on what the camera sees: the twin of `apply_fog` in `shaders/common/sky.wgsl`.
 //!
-//! The fog is a look, fitted to the sky, and no transport of light; a reference has it so that its renders can be laid
-//! beside the renderer's. It acts on the camera's own rays, not on those between surfaces.
+//! The fog is a visual effect fitted to the sky, not light transport. A reference has it so that its renders can be
+//! compared with the renderer's. It acts on the camera's own rays, not on those between surfaces.
 
 use std::f32::consts::PI;
 

@@ -1,8 +1,8 @@
-//! From radiance to files and to what a screen shows.
+//! From radiance to files and to images for a screen.
 //!
-//! A screen shows a reference as the renderer would show the same radiance: exposure, night sight, tone curve, sRGB and
-//! the noise against banding, in the renderer's order. The renderer applies night sight to each sample before they are
-//! averaged; here it acts on the pixel's mean, which differs by night and at edges only.
+//! A reference is displayed as the renderer would display the same radiance: exposure, night vision, tone curve, sRGB
+//! and dithering, in the renderer's order. The renderer applies night vision to each sample before averaging; here it
+//! acts on the pixel's mean, which differs only at night and at edges.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -42,7 +42,7 @@ impl ToneTable {
         Ok(Self { size, texels: texels.into_iter().map(finite).collect() })
     }
 
-    /// What a screen shows, linear, of exposed radiance: trilinear as a GPU samples it.
+    /// Linear display colour of exposed radiance: trilinear, as a GPU samples it.
     pub fn map(&self, exposed: Vec3) -> Vec3 {
         let last = (self.size - 1) as f32;
         let stop = |value: f32| {
@@ -70,16 +70,16 @@ impl ToneTable {
 pub struct Development<'a> {
     /// From nits to display values.
     pub exposure: f32,
-    /// Night sight.
+    /// Night vision.
     pub night: ScotopicTint,
-    /// The tone curve; without one, what is brighter than white is clipped.
+    /// The tone curve; without one, values brighter than white are clipped.
     pub tone: Option<&'a ToneTable>,
-    /// Whether the noise is added by which Bevy breaks up bands, half a code of 255 at most.
+    /// Whether Bevy's dithering against banding is applied, at most half a code of 255.
     pub dither: bool,
 }
 
 impl<'a> Development<'a> {
-    /// As the renderer develops the light `state`.
+    /// The renderer's conversion for the light `state`.
     pub fn of(state: &LightState, tone: Option<&'a ToneTable>) -> Self {
         Self { exposure: state.exposure, night: state.scotopic, tone, dither: true }
     }

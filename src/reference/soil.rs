@@ -1,8 +1,8 @@
 //! The colour of the renderer's ground: the twin of the albedo in `shaders/terrain/terrain.wgsl`.
 //!
-//! The renderer reads its noise through mips, a reference at full resolution, as its samples average it; what depends
-//! on the noise by a soft step is therefore not quite the same where a pixel covers several texels. The detail of the
-//! normal, which the renderer adds near the camera, is left out.
+//! The renderer samples its noise through mips. A reference samples it at full resolution, because its samples average
+//! it. Where a pixel covers several texels, terms that depend on the noise by a smooth step therefore differ slightly.
+//! The detail of the normal, which the renderer adds near the camera, is left out.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::terrain::ground_noise::{NOISE_SIDE, noise_image};
 /// Points along an axis of the terrain from which its mean cover is taken.
 const MEAN_POINTS: u32 = 64;
 
-/// What the colour of the ground depends on.
+/// Everything that the colour of the ground depends on.
 #[derive(Clone, Debug)]
 pub struct Soil {
     noise: RgbaImage,
@@ -27,7 +27,7 @@ pub struct Soil {
 }
 
 impl Soil {
-    /// The soil of `terrain`, of whose ground `cover` lies under crowns.
+    /// The soil of `terrain`, with the canopy cover `cover`.
     pub fn new(terrain: &Terrain, cover: Option<Arc<CoverMap>>) -> Self {
         let extent = terrain.extent();
         let mut soil = Self { noise: noise_image(), cover, extent, mean_cover: 0.0 };

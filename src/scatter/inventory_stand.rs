@@ -17,12 +17,12 @@ const SAME_PLACE_M: f64 = 0.01;
 /// Lines that a message of the warnings lists.
 const LISTED: usize = 5;
 
-/// How a species of an inventory is drawn.
+/// The plants and sizes of a species of an inventory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InventorySpecies {
     /// Its name in the file; letter case and surrounding blanks do not count.
     pub name: String,
-    /// Which plants are of this species; one is drawn by lot for each tree.
+    /// Indices of the species' plants; each tree picks one at random.
     pub variants: Range<u16>,
     /// Height of each variant's plant at scale 1, metres, as many as there are variants.
     pub plant_heights_m: Vec<f32>,
@@ -58,7 +58,7 @@ impl InventorySpecies {
     }
 }
 
-/// What of an inventory could not be taken as it is written. Lines are those of the file.
+/// Rows of an inventory that could not be used as written. Lines are those of the file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct InventoryWarnings {
     /// Lines of trees outside the ground; they are left out.
@@ -72,7 +72,7 @@ pub struct InventoryWarnings {
 }
 
 impl InventoryWarnings {
-    /// Whether the inventory was taken as it is.
+    /// Whether the whole inventory was used as written.
     pub fn is_empty(&self) -> bool {
         self.outside.is_empty()
             && self.duplicates.is_empty()
@@ -199,7 +199,7 @@ fn key(name: &str) -> String {
     name.trim().to_lowercase()
 }
 
-/// Places of earlier trees, in squares of the distance below which two are the same.
+/// Positions of earlier trees, in squares of the distance below which two are the same.
 #[derive(Default)]
 struct Places {
     squares: HashMap<(i64, i64), Vec<(f64, f64, u64)>>,

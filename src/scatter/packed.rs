@@ -1,4 +1,4 @@
-//! A stand as the GPU reads it: 16 bytes a tree, trees sorted by square cells of ground.
+//! A stand for the GPU: 16 bytes per tree, trees sorted by square cells of ground.
 //!
 //! ```text
 //! word 0  xz    u16 x | u16 z << 16         position in the cell, 0..=65535 for 0..=cell size (WGSL unpack2x16unorm)
@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Cells are counted from the base cell of the stand's [`CellGrid`]: cell (ix, iz) of the grid covers
-//! [(base + ix) s, (base + ix + 1) s) along X and the same along Z. A stand may so lie anywhere, and is at most
+//! [(base + ix) s, (base + ix + 1) s) along X and the same along Z. So a stand can lie anywhere; it is at most
 //! 2¹⁴ cells wide (1,048 km at 64 m).
 //!
 //! An f32 position would have steps of 0.125 m at 2,000 km and needs 12 bytes; cells give the same step everywhere, and
@@ -33,7 +33,7 @@ use rayon::prelude::*;
 use super::ScatterError;
 use super::stand::{MAX_SCALE, MIN_SCALE, Stand, Tree};
 
-/// Side of a cell unless something else is wanted, metres; reaches to ±2,097,152 m.
+/// Default side of a cell, metres; positions up to ±2,097,152 m are possible.
 pub const DEFAULT_CELL_SIZE: f64 = 64.0;
 
 /// The most plant variants a packed stand can name.
@@ -139,7 +139,7 @@ impl CellGrid {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct PackedTree {
-    /// Place inside the cell: x in the lower 16 bits, z in the upper.
+    /// Position in the cell: x in the lower 16 bits, z in the upper.
     pub xz: u32,
     /// Height of the foot above the datum, metres.
     pub y: f32,
@@ -215,7 +215,7 @@ impl PackedTree {
         DVec3::new(axis(ix, self.xz & 0xFFFF), self.y.into(), axis(iz, self.xz >> 16))
     }
 
-    /// Turn about the trunk, radians, 0 to 2π.
+    /// Yaw about the trunk, radians, 0 to 2π.
     pub fn yaw(&self) -> f32 {
         (self.look & mask(YAW_BITS)) as f32 * (TAU / (1 << YAW_BITS) as f32)
     }
@@ -225,7 +225,7 @@ impl PackedTree {
         ((self.look >> SCALE_SHIFT & mask(SCALE_BITS)) as f32 * (SCALE_OCTAVES / SCALE_STEPS) + LEAST_SCALE_LOG2).exp2()
     }
 
-    /// Which plant stands here.
+    /// Index of its plant.
     pub fn variant(&self) -> u16 {
         let high = self.cell >> VARIANT_HIGH_SHIFT;
         (self.look >> VARIANT_LOW_SHIFT & mask(VARIANT_LOW_BITS) | high << VARIANT_LOW_BITS) as u16

@@ -24,7 +24,7 @@ use crate::bake::levels::{BAKED, BakedLevel};
 use crate::bake::lighting::BakedLighting;
 use crate::plant::Plant;
 
-/// Version of the format *and* of the bakes: to be raised whenever either gives other bytes for the same input.
+/// Version of the format *and* of the bakes: raise it whenever either gives different bytes for the same input.
 pub(super) const VERSION: u32 = 12;
 
 const MAGIC: [u8; 8] = *b"CANOPYBK";
@@ -57,7 +57,7 @@ fn sealed(payload: &[u8], key: &[u8; 32]) -> Vec<u8> {
     file
 }
 
-/// Reads a file that should hold `plant` baked under `key`. `None` where anything at all is not as it must be.
+/// Reads a file that should hold `plant` baked under `key`. `None` if anything is wrong with it.
 pub(super) fn decode(file: &[u8], key: &CacheKey, plant: &Arc<Plant>) -> Option<BakedPlant> {
     let (head, rest) = file.split_at_checked(HEAD)?;
     let (sum, payload) = rest.split_at_checked(PAYLOAD - HEAD)?;

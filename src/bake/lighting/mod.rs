@@ -3,8 +3,8 @@
 //! | model | baked | vertex bytes beyond position, normal, texture coordinates |
 //! |---|---|--:|
 //! | [`LightingSettings::Local`] | nothing | 0 |
-//! | [`LightingSettings::Expressive`] | realigned normals, ambient term ([`implicit`]) | 0: stored as the normal's length |
-//! | [`LightingSettings::Transfer`] | radiance transfer of each side of each vertex ([`transfer`]) | see there; foliage, 4 bands: 40 |
+//! | [`LightingSettings::Expressive`] | realigned normals, ambient term ([`implicit`]) | 0: see [`implicit::packing`] |
+//! | [`LightingSettings::Transfer`] | radiance transfer of each side ([`transfer`]) | see there; foliage, 4 bands: 40 |
 //!
 //! The models are alternatives: data that a plant does not use is not baked, stored or uploaded.
 

@@ -7,8 +7,8 @@
 //! (`light.rs`).
 //!
 //! ```text
-//!   plant, lighting --rasterise (rasterize.rs)--> samples --resolve--> texels --color.rs------> base colour, alpha
-//!                                                                             \-properties.rs-> normal, ambient, foliage
+//! plant, lighting --rasterise (rasterize.rs)--> samples --resolve--> texels --color.rs-----> base colour, alpha
+//!                                                                           \-properties.rs-> normal, ambient term, foliage
 //! ```
 //!
 //! Cost: three images of (resolution * supersampling)² samples. Limits: a plane looks right along its normal and

@@ -1,8 +1,8 @@
 //! Coefficients as bytes for the GPU and the cache.
 //!
 //! ```text
-//! Float32, Float16:  vertex = front, and for foliage back; each bands² × channels numbers, as in TransferPart; padding to
-//!                    4 bytes
+//! Float32, Float16:  vertex = front, and for foliage back; each bands² × channels numbers, as in
+//!                    TransferPart; padding to 4 bytes
 //! Snorm8:            vertex = means, codes
 //!   means            one f16 a side and channel, c_0; padding to 4 bytes
 //!   codes            for each side and channel (bands² - 1) × i8, 127 c_i / (c_0 scale_l), rounded; padding to 4 bytes
@@ -11,9 +11,9 @@
 //! Codes begin at whole words, so that a shader unpacks four of them at once.
 //!
 //! A transfer function is not negative, so by the addition theorem the coefficients of its band l are at most
-//! sqrt(2 l + 1) c_0 long, and fitted ones not much longer: eight bits relative to c_0 are spent on what can occur, in
-//! the dark inside of a crown as in the light. `scale_l` is the largest ratio among the part's sides that get at least
-//! a 64th of the light of the brightest; what exceeds it in darker ones is clamped.
+//! sqrt(2 l + 1) c_0 long, and fitted ones not much longer: eight bits relative to c_0 cover exactly the possible
+//! range, in the dark interior of a crown as in the light. `scale_l` is the largest ratio among the part's sides that
+//! get at least a 64th of the light of the brightest; larger ratios of darker sides are clamped.
 //!
 //! Errors, for light of the coefficients l: Float16 at most 2^-11 of each coefficient (2^-25 below 6e-5); Snorm8 at
 //! most `|c_0| sum_l scale_l / 254 sum_m |l_lm|` and 2^-11 of c_0's share. `benches/transfer.rs` has what that
@@ -39,11 +39,11 @@ pub enum TransferFormat {
 /// A plant's transfer as bytes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PackedTransfer {
-    /// The settings it was baked with.
+    /// The settings of the bake.
     pub settings: TransferSettings,
     /// How its coefficients are stored.
     pub format: TransferFormat,
-    /// One a part, in the plant's order.
+    /// One per part, in the plant's order.
     pub parts: Vec<PackedPart>,
 }
 
@@ -52,7 +52,7 @@ pub struct PackedTransfer {
 pub struct PackedPart {
     /// 1 for wood, 2 for foliage.
     pub sides: usize,
-    /// From one vertex to the next, bytes; a multiple of 4.
+    /// Stride between vertices in bytes, a multiple of 4.
     pub vertex_bytes: usize,
     /// [`TransferFormat::Snorm8`]: what 127 stands for in each band, relative to c_0. Zero in the first band.
     pub scale: [f32; MAX_BANDS],

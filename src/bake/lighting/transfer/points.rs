@@ -6,8 +6,8 @@ use glam::Vec3;
 
 use crate::plant::{PartKind, Plant, PlantMesh, geometry};
 
-/// Rays start this share of the plant's longest extent away from their vertex, so that they meet neither the
-/// triangles that meet there nor what touches them: 0.3 mm for a tree of 20 m.
+/// Distance between a vertex and the origin of its rays, as a fraction of the plant's longest extent, so that they hit
+/// neither the triangles of the vertex nor those that touch them: 0.3 mm for a tree of 20 m.
 const START: f32 = 1.0 / 65_536.0;
 
 /// Marks a vertex that has no point.
@@ -20,7 +20,7 @@ pub(super) struct Point {
     pub position: Vec3,
     /// Unit length.
     pub normal: Vec3,
-    /// Whether the back is wanted as well.
+    /// Whether the back side is computed as well.
     pub two_sided: bool,
 }
 
@@ -28,7 +28,7 @@ pub(super) struct Point {
 pub(super) struct Points {
     /// The points; an index into this list is a slot.
     pub list: Vec<Point>,
-    /// How far from its point a ray starts, metres.
+    /// Distance between a point and the origin of its rays, metres.
     pub start: f32,
     /// The slot of each vertex of each part, or [`NO_SLOT`].
     slots: Vec<Vec<u32>>,

@@ -1,4 +1,4 @@
-//! The directions of the rays, and what each adds to the coefficients.
+//! The directions of the rays, and the contribution of each to the coefficients.
 
 use std::f64::consts::TAU;
 
@@ -40,7 +40,7 @@ pub(super) struct Directions {
 }
 
 impl Directions {
-    /// For `settings` in range.
+    /// The rays for sanitized `settings`.
     pub fn new(settings: &TransferSettings) -> Self {
         let bands = usize::from(settings.bands);
         // The first half of the set is the upper hemisphere.

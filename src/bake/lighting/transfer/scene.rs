@@ -1,4 +1,4 @@
-//! What a bake of transfer works on: the plant's points, and the rays that connect them with what they met.
+//! The scene of a transfer bake: the plant's points, and the rays that connect them with the surfaces that they hit.
 
 use glam::Vec3;
 
@@ -30,7 +30,7 @@ impl Scene<'_> {
     }
 }
 
-/// A ray that met a surface, which may send light back along it.
+/// A ray that hit a surface, which may scatter light back along it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Link {
     /// The part and its triangle that were met, and whether from the front.
