@@ -1,17 +1,17 @@
-//! Where the cascades of the sun's shadow lie. Pure functions, without history.
+//! The positions of the shadow cascades. Pure functions, without history.
 //!
 //! A cascade is a box around the camera, not around a slice of its frustum: rotating the camera redraws nothing. Its
 //! centre is the camera's position rounded to a grid of a quarter of the served radius in the light's frame (a whole
 //! number of texels, so that nothing crawls), and the light's direction is rounded to a grid so fine that no shadow
-//! lags by more than half a texel. Both are functions of the moment alone: the same arguments give the same map, and
-//! a map is drawn again only when one of them steps.
+//! lags by more than half a texel. Both depend only on the current arguments: equal arguments give equal maps, and a
+//! map is rendered again only when one of them changes.
 
 use glam::{DMat3, DVec3, Mat4, Vec3};
 
-/// Share of the served radius by which the box's centre steps.
+/// Step of the box's centre as a fraction of the served radius.
 const STEP_SHARE: f64 = 0.25;
 
-/// Where one cascade lies, in a scene's f64 metres. Equal boxes have equal maps (for equal casters).
+/// The box of one cascade, in a scene's f64 metres. Equal boxes have equal maps (for equal casters).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CascadeBox {
     /// Centre in scene metres.

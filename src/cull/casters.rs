@@ -40,8 +40,8 @@ impl SeenShadows<'_> {
 /// Casters of one cascade, whose box lies in scene metres; `origin` is the stand's own origin there.
 ///
 /// `casting` has a range of distances from the box's centre, metres, for each level: a tree casts in the first level
-/// whose range holds it, and not at all where none does. `groupings` has one entry a level. With `seen`, casters whose
-/// shadow no pixel of the view can show are left out.
+/// whose range contains it, and not at all if there is none. `groupings` has one entry per level. With `seen`, casters
+/// whose shadow is visible in no pixel of the view are left out.
 pub fn cull_cascade(
     stand: &PackedStand,
     sizes: &[PlantSize],

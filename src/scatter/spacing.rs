@@ -1,4 +1,4 @@
-//! A least distance between trees: who comes first stands, who comes too near later does not.
+//! Minimum distance between trees: a tree is rejected if an earlier one is too near.
 
 use glam::DVec2;
 
@@ -37,7 +37,7 @@ impl SpacingGrid {
         }
     }
 
-    /// Takes `point` in unless one that was taken in before is nearer than the distance.
+    /// Adds `point` unless an earlier point is nearer than the distance. Returns whether it was added.
     pub fn insert(&mut self, point: DVec2) -> bool {
         let cell_of = |p: DVec2| {
             let cell = ((p - self.origin) * self.per_cell).max(DVec2::ZERO);

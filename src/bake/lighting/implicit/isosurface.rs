@@ -5,8 +5,8 @@
 //! can be missed, neither a lone twig nor a hollow, and every edge that the surface crosses has all its four cells: the
 //! mesh is closed and manifold, each edge has two triangles. The field is evaluated at the corners of what remains.
 //!
-//! Limits: what is thinner than a cell and slips between its corners is not seen. More than [`MOST_CELLS`] cells are
-//! not kept; the cells are doubled until they fit, which the bake's report tells.
+//! Limits: features that are thinner than a cell and lie between its corners are missed. There are at most
+//! [`MOST_CELLS`] cells: their size is doubled until they fit, and the bake's report has the size.
 
 use glam::{UVec3, Vec3, Vec3A};
 use rayon::prelude::*;
