@@ -83,7 +83,7 @@ fn stand(plant: &Arc<Plant>, trees: u64) -> ReferenceScene {
     };
     let instances: Vec<Instance> = (0..trees).map(place).collect();
     let color = GroundColor::Even(Vec3::new(0.08, 0.10, 0.04));
-    let ground = Ground { shape: GroundShape::Terrain(terrain), color, reach: 3000.0 };
+    let ground = Ground { shape: GroundShape::Terrain(terrain), color, max_distance: 3000.0 };
     ReferenceScene::new(std::slice::from_ref(plant), &instances, Some(ground)).expect("the stand is possible")
 }
 

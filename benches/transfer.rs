@@ -31,7 +31,7 @@ mod vertices;
 use std::sync::Arc;
 use std::time::Instant;
 
-use canopy::bake::lighting::transfer::{Interior, TransferSettings};
+use canopy::bake::lighting::transfer::{Scattering, TransferSettings};
 use canopy::light::{Atmosphere, AtmosphereParams, LightSettings, LightState, SunPosition};
 use canopy::plant::grow::{GrowParameters, grow};
 use canopy::trace::PlantTracer;
@@ -60,7 +60,7 @@ pub struct Arguments {
     /// Turns of each contestant of the first table.
     #[arg(long, default_value_t = 3)]
     turns: usize,
-    /// Which tables: contest, cold, cache, bands, rays, interior, sun.
+    /// Which tables: contest, cold, cache, bands, rays, scattering, sun.
     #[arg(long, value_delimiter = ',', default_value = "contest,cold,cache,bands,rays,sun")]
     only: Vec<String>,
     /// Given by cargo.
@@ -98,7 +98,9 @@ fn main() {
     let lights: Vec<LightState> = DAY.iter().map(light).collect();
     let step = (all.len() / arguments.vertices.max(1)).max(1);
     let vertices: Vec<Vertex> = all.into_iter().step_by(step).collect();
-    let Interior::Diffuse(bounces) = TransferSettings::default().interior else { unreachable!("the default bounces") };
+    let Scattering::Diffuse(bounces) = TransferSettings::default().scattering else {
+        unreachable!("the default bounces")
+    };
     let tracer = PlantTracer::new(&plant);
     let start = Instant::now();
     let truths: Vec<Truth> = vertices

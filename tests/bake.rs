@@ -290,7 +290,7 @@ fn the_cache_gives_back_what_was_baked() {
         assert!(cache.load(&CacheKey::new(&other, &settings), &Arc::new(other)).is_none());
     }
     let left: Vec<PathBuf> = std::fs::read_dir(cache.folder()).unwrap().map(|entry| entry.unwrap().path()).collect();
-    assert_eq!(left, [cache.file(&CacheKey::new(&plant, &small_settings().in_range()))]);
+    assert_eq!(left, [cache.file(&CacheKey::new(&plant, &small_settings().sanitized()))]);
 }
 
 #[test]
@@ -468,7 +468,7 @@ proptest! {
         let implicit =
             ImplicitSettings { radius: Some(radius), threshold: Some(threshold), ..ImplicitSettings::default() };
         let plant = Arc::new(plant);
-        let lighting = BakedLighting::bake(&plant, &LightingSettings::Expressive(implicit).in_range());
+        let lighting = BakedLighting::bake(&plant, &LightingSettings::Expressive(implicit).sanitized());
         prop_assert!(lighting.fits(&plant));
         for part in 0..plant.parts.len() {
             prop_assert!(lighting.ambient(part).iter().all(|k| (0.0..=1.0).contains(k)));

@@ -79,7 +79,7 @@ fn scene(plant: &Arc<Plant>) -> ReferenceScene {
 }
 
 fn plane(albedo: f32) -> Ground {
-    Ground { shape: GroundShape::Plane(0.0), color: GroundColor::Even(Vec3::splat(albedo)), reach: 1e6 }
+    Ground { shape: GroundShape::Plane(0.0), color: GroundColor::Even(Vec3::splat(albedo)), max_distance: 1e6 }
 }
 
 fn shot(position: DVec3, yaw: f64, pitch: f64, size: (u32, u32)) -> Shot {
@@ -597,7 +597,7 @@ fn strange_scenes_give_finite_pictures_or_errors() {
     assert!(refused(Instance { yaw: f32::INFINITY, ..alone() }) && refused(Instance { tint: 2.0, ..alone() }));
     let settings = TraceSettings { limit: f32::NAN, ..FLAT };
     assert!(PathTracer::new(&scene, &sunny(), settings).is_err());
-    let far = Ground { reach: f64::NAN, ..plane(0.5) };
+    let far = Ground { max_distance: f64::NAN, ..plane(0.5) };
     assert!(ReferenceScene::new(&[], &[], Some(far)).is_err());
 }
 

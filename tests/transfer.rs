@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use canopy::bake::lighting::transfer::{
-    Channels, Interior, Projection, TransferBake, TransferFormat, TransferSettings, bake_transfer, exitant_radiance,
-    scattered_share, share,
+    Channels, Projection, Scattering, TransferBake, TransferFormat, TransferSettings, bake_transfer, exitant_radiance,
+    indirect_sun_share, share,
 };
 use canopy::light::{Atmosphere, AtmosphereParams, LightSettings, LightState, SunPosition, sh};
 use canopy::plant::grow::{GrowParameters, grow};
@@ -13,10 +13,10 @@ use glam::{Quat, Vec2, Vec3};
 
 const PROJECTION: TransferSettings = TransferSettings {
     bands: 3,
-    channels: Channels::One,
+    channels: Channels::Luminance,
     rays: 1024,
     projection: Projection::Quadrature,
-    interior: Interior::Diffuse(1),
+    scattering: Scattering::Diffuse(1),
 };
 
 /// A level square grid of `cells`² cells around `center`, its front up.
@@ -114,8 +114,10 @@ fn an_even_sky_lights_a_free_leaf_exactly_by_the_projection() {
         let mut mesh = sheet(Vec3::ZERO, 0.1, 1);
         mesh.positions.iter_mut().chain(&mut mesh.normals).for_each(|v| *v = turn * *v);
         let leaf = plant(vec![foliage(mesh, Vec3::ONE, Vec3::ONE)]);
-        for (rays, interior) in [(16, Interior::Diffuse(3)), (254, Interior::Diffuse(3)), (64, Interior::Straight(2))] {
-            let settings = TransferSettings { rays, interior, ..PROJECTION };
+        for (rays, scattering) in
+            [(16, Scattering::Diffuse(3)), (254, Scattering::Diffuse(3)), (64, Scattering::TransmitOnly(2))]
+        {
+            let settings = TransferSettings { rays, scattering, ..PROJECTION };
             let bake = bake_transfer(&leaf, &settings);
             for side in [bake.parts[0].front_of(1, &settings), bake.parts[0].back_of(1, &settings)] {
                 let got = share(&even(3), side).x;
@@ -129,9 +131,11 @@ fn an_even_sky_lights_a_free_leaf_exactly_by_the_projection() {
 fn an_even_sky_lights_a_free_leaf_fully_by_either_projection() {
     let leaf = plant(vec![foliage(sheet(Vec3::ZERO, 0.1, 1), Vec3::ONE, Vec3::ZERO)]);
     for projection in [Projection::Quadrature, Projection::Fit] {
-        for (bands, channels) in [(2, Channels::Rgb), (3, Channels::Rgb), (3, Channels::One), (6, Channels::One)] {
+        for (bands, channels) in
+            [(2, Channels::Rgb), (3, Channels::Rgb), (3, Channels::Luminance), (6, Channels::Luminance)]
+        {
             let settings = TransferSettings { bands, channels, projection, ..PROJECTION };
-            assert!(settings.is_of_franzke());
+            assert!(settings.within_published_limits());
             let bake = bake_transfer(&leaf, &settings);
             let light = even(usize::from(bands));
             // Four fitted coefficients cannot serve the day's skies and an even one as well.
@@ -156,13 +160,13 @@ fn light_comes_through_a_slab_as_its_transmission_says() {
     let slab = |y: f32, half: f32| foliage(sheet(Vec3::new(0.0, y, 0.0), half, 4), color, transmission);
     let plant = plant(vec![slab(0.0, 400.0), slab(1.0, 400.0)]);
     let middle = 12;
-    for interior in [Interior::Straight(1), Interior::Diffuse(1)] {
-        let settings = TransferSettings { channels: Channels::Rgb, interior, ..PROJECTION };
+    for scattering in [Scattering::TransmitOnly(1), Scattering::Diffuse(1)] {
+        let settings = TransferSettings { channels: Channels::Rgb, scattering, ..PROJECTION };
         let bake = bake_transfer(&plant, &settings);
         let got = share(&even(3), bake.parts[0].front_of(middle, &settings));
-        assert!((got - color * transmission).abs().max_element() < 0.02, "{interior:?}: {got}");
+        assert!((got - color * transmission).abs().max_element() < 0.02, "{scattering:?}: {got}");
     }
-    let none = TransferSettings { channels: Channels::Rgb, interior: Interior::Straight(0), ..PROJECTION };
+    let none = TransferSettings { channels: Channels::Rgb, scattering: Scattering::TransmitOnly(0), ..PROJECTION };
     let dark = share(&even(3), bake_transfer(&plant, &none).parts[0].front_of(middle, &none));
     assert!(dark.max_element() < 0.02, "{dark}");
 }
@@ -172,7 +176,7 @@ fn in_a_white_furnace_everything_is_white() {
     // Half reflected, half transmitted, nothing lost: every surface sends out what it receives.
     let furnace = plant(vec![foliage(cards(120), Vec3::splat(0.5), Vec3::ONE)]);
     for projection in [Projection::Quadrature, Projection::Fit] {
-        let settings = TransferSettings { interior: Interior::Diffuse(8), projection, ..PROJECTION };
+        let settings = TransferSettings { scattering: Scattering::Diffuse(8), projection, ..PROJECTION };
         let bake = bake_transfer(&furnace, &settings);
         let (mut sum, mut count) = (0.0, 0.0f32);
         for side in bake.parts[0].front.chunks_exact(9).chain(bake.parts[0].back.chunks_exact(9)) {
@@ -184,7 +188,7 @@ fn in_a_white_furnace_everything_is_white() {
         assert!((sum / count - 1.0).abs() < 0.02, "{projection:?}: {}", sum / count);
     }
     // And with one bounce less light than with eight, never more than was sent.
-    let less = bake_transfer(&furnace, &TransferSettings { interior: Interior::Diffuse(1), ..PROJECTION });
+    let less = bake_transfer(&furnace, &TransferSettings { scattering: Scattering::Diffuse(1), ..PROJECTION });
     assert!(less.parts[0].front.chunks_exact(9).all(|side| share(&even(3), side).x < 1.05));
 }
 
@@ -195,8 +199,8 @@ fn wood_has_one_side_and_its_inside_is_dark() {
     board.kind = PartKind::Wood;
     let leaf = foliage(sheet(Vec3::NEG_Y, 0.01, 1), Vec3::ONE, Vec3::ZERO);
     let middle = 10 * 21 + 10;
-    for interior in [Interior::Diffuse(1), Interior::Diffuse(8), Interior::Straight(4)] {
-        let settings = TransferSettings { interior, ..PROJECTION };
+    for scattering in [Scattering::Diffuse(1), Scattering::Diffuse(8), Scattering::TransmitOnly(4)] {
+        let settings = TransferSettings { scattering, ..PROJECTION };
         let bake = bake_transfer(&plant(vec![board.clone(), leaf.clone()]), &settings);
         let [wood, leaf] = &bake.parts[..] else { panic!("two parts") };
         assert!(wood.back.is_empty() && wood.back_of(middle, &settings).is_empty());
@@ -206,8 +210,8 @@ fn wood_has_one_side_and_its_inside_is_dark() {
         // The board's back reflects nothing, though the light from below falls on it, and lets nothing through.
         for vertex in 0..4 {
             let (up, down) = (seen(leaf.front_of(vertex, &settings)), seen(leaf.back_of(vertex, &settings)));
-            assert!(up.abs() < 0.02, "{interior:?}: {up} from the inside of wood");
-            assert!((down - 1.0).abs() < 0.02, "{interior:?}: {down} from below");
+            assert!(up.abs() < 0.02, "{scattering:?}: {up} from the inside of wood");
+            assert!((down - 1.0).abs() < 0.02, "{scattering:?}: {down} from below");
         }
     }
 }
@@ -240,23 +244,23 @@ fn what_leaves_send_each_other_of_a_sun_is_told_apart() {
     let tree = plant(vec![lower, upper]);
     let bake = bake_transfer(&tree, &PROJECTION);
     let part = &bake.parts[1];
-    assert_eq!(part.scattered.len(), 4 * 4);
-    for vertex in part.scattered.chunks_exact(4) {
+    assert_eq!(part.indirect_sun.len(), 4 * 4);
+    for vertex in part.indirect_sun.chunks_exact(4) {
         // Two bands hold the clamped cosine c as 1/4 + c/2, and the upper side gets nothing: the mean is half of it.
         for (sun, cosine) in [(Vec3::Y, 1.0), (Vec3::new(0.8, 0.6, 0.0), 0.6)] {
             let expected = 0.5 * 0.5 / std::f32::consts::PI * (0.25 + 0.5 * cosine);
-            let found = scattered_share(vertex, sun);
+            let found = indirect_sun_share(vertex, sun);
             assert!((found / expected - 1.0).abs() < 0.05, "{found} {expected}");
         }
-        assert_eq!(scattered_share(vertex, Vec3::NEG_Y), 0.0);
+        assert_eq!(indirect_sun_share(vertex, Vec3::NEG_Y), 0.0);
     }
-    assert_eq!(scattered_share(&[f32::NAN; 4], Vec3::Y), 0.0);
-    let straight = bake_transfer(&tree, &TransferSettings { interior: Interior::Straight(2), ..PROJECTION });
-    assert!(straight.parts[1].scattered.iter().all(|value| *value == 0.0));
+    assert_eq!(indirect_sun_share(&[f32::NAN; 4], Vec3::Y), 0.0);
+    let straight = bake_transfer(&tree, &TransferSettings { scattering: Scattering::TransmitOnly(2), ..PROJECTION });
+    assert!(straight.parts[1].indirect_sun.iter().all(|value| *value == 0.0));
     for format in [TransferFormat::Float32, TransferFormat::Float16, TransferFormat::Snorm8] {
         let packed = bake.pack(format).unpack();
-        let most = part.scattered.iter().fold(0.0f32, |most, value| most.max(value.abs()));
-        let off = part.scattered.iter().zip(&packed.parts[1].scattered).map(|(a, b)| (a - b).abs());
+        let most = part.indirect_sun.iter().fold(0.0f32, |most, value| most.max(value.abs()));
+        let off = part.indirect_sun.iter().zip(&packed.parts[1].indirect_sun).map(|(a, b)| (a - b).abs());
         assert!(off.fold(0.0f32, f32::max) <= most / 253.0);
     }
 }
@@ -301,8 +305,8 @@ fn what_is_no_plant_does_no_harm() {
         plant(vec![foliage(sheet(Vec3::ZERO, 1e37, 2), Vec3::ONE, Vec3::ONE)]),
     ];
     for (index, plant) in odd.iter().enumerate() {
-        for interior in [Interior::Straight(200), Interior::Diffuse(0)] {
-            let settings = TransferSettings { bands: 0, rays: 0, interior, ..TransferSettings::default() };
+        for scattering in [Scattering::TransmitOnly(200), Scattering::Diffuse(0)] {
+            let settings = TransferSettings { bands: 0, rays: 0, scattering, ..TransferSettings::default() };
             let bake = bake_transfer(plant, &settings);
             assert_eq!((bake.settings.bands, bake.settings.rays), (2, 16));
             assert!(all_finite(&bake), "plant {index}");

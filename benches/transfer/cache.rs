@@ -15,7 +15,7 @@ pub fn cache(plant: &Arc<Plant>, turns: usize) {
     let start = Instant::now();
     bake_plant(Arc::clone(plant), &settings, Some(&cache));
     let cold = start.elapsed().as_secs_f64();
-    let key = CacheKey::new(plant, &settings.in_range());
+    let key = CacheKey::new(plant, &settings.sanitized());
     let bytes = std::fs::metadata(cache.file(&key)).expect("a file").len();
     let (mut whole, mut hashing) = (Vec::new(), Vec::new());
     for _ in 0..turns.max(1) * 5 {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use canopy::bake::lighting::transfer::{
-    Channels, Interior, TransferBake, TransferFormat, TransferSettings, bake_transfer, share,
+    Channels, Scattering, TransferBake, TransferFormat, TransferSettings, bake_transfer, share,
 };
 use canopy::math::luminance;
 use canopy::plant::Plant;
@@ -102,15 +102,15 @@ fn hours(judge: &Judge, bakes: &[TransferBake; 5]) {
 
 /// The table of channels and of what leaves do to light.
 pub fn interior(plant: &Arc<Plant>, judge: &Judge) {
-    println!("\n## Colour and interior: over the day, %\n\n| | luminance | RGB |\n|---|--:|--:|");
+    println!("\n## Colour and scattering: over the day, %\n\n| | luminance | RGB |\n|---|--:|--:|");
     let default = TransferSettings::default();
     let rows = [
         ("default", default),
         ("three channels", TransferSettings { channels: Channels::Rgb, ..default }),
-        ("1 bounce", TransferSettings { interior: Interior::Diffuse(1), ..default }),
-        ("8 bounces", TransferSettings { interior: Interior::Diffuse(8), ..default }),
-        ("no interior light", TransferSettings { interior: Interior::Straight(0), ..default }),
-        ("straight through 3 leaves", TransferSettings { interior: Interior::Straight(3), ..default }),
+        ("1 bounce", TransferSettings { scattering: Scattering::Diffuse(1), ..default }),
+        ("8 bounces", TransferSettings { scattering: Scattering::Diffuse(8), ..default }),
+        ("no interior light", TransferSettings { scattering: Scattering::TransmitOnly(0), ..default }),
+        ("straight through 3 leaves", TransferSettings { scattering: Scattering::TransmitOnly(3), ..default }),
     ];
     for (name, settings) in rows {
         let verdict = judge.judge_bake(&bake_transfer(plant, &settings));

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use canopy::bake::lighting::transfer::{Channels, Interior, TransferSettings, bake_transfer, direction_set};
+use canopy::bake::lighting::transfer::{Channels, Scattering, TransferSettings, bake_transfer, direction_set};
 use canopy::plant::{PartKind, Plant};
 use canopy::trace::{PlantTracer, Ray};
 use glam::{Vec2, Vec3};
@@ -169,7 +169,7 @@ pub fn cold(plant: &Arc<Plant>) {
         ("3 bands, 256 rays", TransferSettings { bands: 3, rays: 256, ..default }),
         ("6 bands", TransferSettings { bands: 6, ..default }),
         ("3 bands in colour", TransferSettings { channels: Channels::Rgb, ..default }),
-        ("straight through up to 3 leaves", TransferSettings { interior: Interior::Straight(3), ..default }),
+        ("straight through up to 3 leaves", TransferSettings { scattering: Scattering::TransmitOnly(3), ..default }),
     ];
     for (name, settings) in settings {
         let start = Instant::now();

@@ -1,5 +1,5 @@
 // Crossed billboards [Franzke 2005, 4.3]: two upright planes and a level one, eighteen pulled vertices a tree.
-#import canopy::constants::{CROSS_VERTICES, PLANES, SPREAD_LEVELS, LIGHT_SCALE, WHOLE, FADE_SPAN, GONE, AMBIENT_FITTED}
+#import canopy::constants::{CROSS_VERTICES, PLANES, ISOTROPIC_LEVELS, LIGHT_SCALE, WHOLE, FADE_SPAN, GONE, AMBIENT_FITTED}
 #import canopy::cross_variant::cross_variants
 #import canopy::frame::{frame, light}
 #import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, leaf_visibility}
@@ -194,9 +194,9 @@ fn hot_spot(viewer: vec3<f32>) -> f32 {
 
 // Fraction of a texel's leaf area with isotropic normals.
 fn isotropic_fraction(variant: u32, level: f32) -> f32 {
-    let at = clamp(level, 0.0, f32(SPREAD_LEVELS - 1u));
+    let at = clamp(level, 0.0, f32(ISOTROPIC_LEVELS - 1u));
     let finer = u32(at);
-    let coarser = min(finer + 1u, SPREAD_LEVELS - 1u);
+    let coarser = min(finer + 1u, ISOTROPIC_LEVELS - 1u);
     let fraction = &cross_variants[variant].isotropic_fraction;
     return mix((*fraction)[finer / 4u][finer % 4u], (*fraction)[coarser / 4u][coarser % 4u], fract(at));
 }

@@ -1,7 +1,7 @@
 // Data of each plant's crossed billboards, for the view and for the shadow maps.
 #define_import_path canopy::cross_variant
 
-#import canopy::constants::{PLANES, SPREAD_VECTORS}
+#import canopy::constants::{PLANES, ISOTROPIC_VECTORS}
 
 struct Plane {
     center: vec4<f32>,
@@ -17,7 +17,7 @@ struct CrossVariant {
     // First layer of its textures, and of its lighting textures.
     first_layer: u32,
     // Fraction of a texel's leaf area with isotropic normals, 0..1, mip by mip.
-    isotropic_fraction: array<vec4<f32>, SPREAD_VECTORS>,
+    isotropic_fraction: array<vec4<f32>, ISOTROPIC_VECTORS>,
     first_light_layer: u32,
 }
 

@@ -112,7 +112,7 @@ fn scene(stage: &Stage) -> Result<ReferenceScene, AppError> {
     let ground = Ground {
         shape: GroundShape::Terrain(stage.terrain.clone()),
         color: GroundColor::Soil(Soil::new(&stage.terrain, stage.cover.clone()).into()),
-        reach: stage.scene.quality.view_distance,
+        max_distance: stage.scene.quality.view_distance,
     };
     Ok(ReferenceScene::new(&plants, &Instance::of_stand(&stage.stand, DVec3::ZERO), Some(ground))?)
 }

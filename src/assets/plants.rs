@@ -99,7 +99,7 @@ pub fn plan(scene: &Scene) -> Result<PlantPlan, StageError> {
     for species in &scene.species {
         let first = plan.individuals.len();
         let lighting = species.lighting.as_ref().map_or_else(LightingSettings::default, Lighting::settings);
-        let gloss = species.gloss.in_range();
+        let gloss = species.gloss.sanitized();
         let individuals = sources(species, gloss)?.into_iter().map(|source| Individual { source, gloss, lighting });
         plan.individuals.extend(individuals);
         plan.variants.push(first as u16..plan.individuals.len() as u16);

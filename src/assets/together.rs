@@ -73,7 +73,7 @@ pub fn light_together(
     if let Some(reason) = bake.report.no_surface {
         progress.warn(&format!("trees lit together: {reason}"));
     }
-    let cross = bake_settings(&scene.quality, LightingSettings::Local).in_range().cross;
+    let cross = bake_settings(&scene.quality, LightingSettings::Local).sanitized().cross;
     let lit: Vec<BakedPlant> = order
         .par_iter()
         .zip(bake.plants)

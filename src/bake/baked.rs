@@ -13,20 +13,20 @@ use crate::lod::Representation;
 use crate::plant::{Plant, PlantMesh};
 use crate::scatter::PlantSize;
 
-/// A plant with everything that is derived from it once and kept in the cache. What is made apart is shared apart: a copy
-/// is cheap, and who draws plants sees by the pointers what of one has changed.
+/// A plant with everything that is derived from it once and kept in the cache. Each product has its own [`Arc`]:
+/// cloning is cheap, and the renderer finds what changed by pointer equality.
 #[derive(Clone, Debug)]
 pub struct BakedPlant {
     /// The full model.
     pub plant: Arc<Plant>,
-    /// What lights the foliage.
+    /// Lighting data of its vertices.
     pub lighting: Arc<BakedLighting>,
-    /// What is baked for its representations, at most once each.
+    /// The baked representations, at most one of each kind.
     pub levels: Vec<BakedLevel>,
 }
 
 impl BakedPlant {
-    /// A lighter model that casts the near shadow, if it was baked.
+    /// The shadow proxy, if it was baked: a lighter model that casts the near shadow.
     pub fn shadow_proxy(&self) -> Option<&Arc<Vec<PlantMesh>>> {
         self.levels.iter().find_map(|level| match level {
             BakedLevel::ShadowProxy(proxy) => Some(proxy),
@@ -34,7 +34,7 @@ impl BakedPlant {
         })
     }
 
-    /// Crossed billboards, if they were baked.
+    /// The crossed billboards, if they were baked.
     pub fn cross(&self) -> Option<&Arc<Cross>> {
         self.levels.iter().find_map(|level| match level {
             BakedLevel::Cross(cross) => Some(cross),
@@ -42,7 +42,7 @@ impl BakedPlant {
         })
     }
 
-    /// Puts `level` in the place of the one of the same representation, if there is one.
+    /// Replaces the level of the same representation by `level`, or adds it if there is none.
     pub fn set_level(&mut self, level: BakedLevel) {
         match self.levels.iter_mut().find(|known| known.representation() == level.representation()) {
             Some(known) => *known = level,
@@ -50,7 +50,7 @@ impl BakedPlant {
         }
     }
 
-    /// The same plant with `level` in the place of the one of the same representation.
+    /// The same plant with `level` set as by [`Self::set_level`].
     #[must_use]
     pub fn with_level(mut self, level: BakedLevel) -> Self {
         self.set_level(level);
@@ -63,22 +63,23 @@ impl BakedPlant {
     }
 }
 
-/// The size of what holds `plant` whatever its yaw.
+/// Height and bounding radius of `plant`, at any yaw.
 pub fn plant_size(plant: &Plant) -> PlantSize {
-    PlantSize::new(plant.height(), plant.reach())
+    PlantSize::new(plant.height(), plant.bounding_radius())
 }
 
-/// How a plant is baked. Values out of range are moved into it.
+/// Settings of a plant's bake. Values out of range are clamped.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BakeSettings {
-    /// The representations that are baked for; all that need a bake unless a program draws fewer of them. Set in code.
+    /// The representations to bake. Default: all that need a bake; a program that draws fewer can leave some out. Set
+    /// in code.
     #[serde(skip_deserializing, default = "all_baked")]
     pub representations: &'static [Representation],
-    /// Which light the foliage gets.
+    /// Lighting model of the foliage.
     pub lighting: LightingSettings,
-    /// Crossed billboards.
+    /// Settings of the crossed billboards.
     pub cross: CrossSettings,
-    /// Triangles of the shadow proxy as a share of the plant's, 0..=1. Smaller: faster and coarser shadows.
+    /// Triangles of the shadow proxy as a fraction of the plant's, 0..=1. Smaller: faster and coarser shadows.
     pub shadow_share: f32,
 }
 
@@ -98,13 +99,13 @@ impl Default for BakeSettings {
 }
 
 impl BakeSettings {
-    /// The settings with every value moved into its range; what is not finite becomes the default.
-    pub fn in_range(self) -> Self {
+    /// The settings with every value clamped to its range; a value that is not finite becomes the default.
+    pub fn sanitized(self) -> Self {
         let share = if self.shadow_share.is_finite() { self.shadow_share } else { Self::default().shadow_share };
         Self {
             representations: self.representations,
-            lighting: self.lighting.in_range(),
-            cross: self.cross.in_range(),
+            lighting: self.lighting.sanitized(),
+            cross: self.cross.sanitized(),
             shadow_share: share.clamp(0.0, 1.0),
         }
     }

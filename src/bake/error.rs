@@ -1,11 +1,11 @@
-//! What can go wrong around a bake.
+//! Errors of the bake cache.
 
 use std::path::PathBuf;
 
-/// What can go wrong around a bake. The bakes themselves cannot fail.
+/// Why a baked plant could not be cached. The bakes themselves cannot fail.
 #[derive(Debug, thiserror::Error)]
 pub enum BakeError {
-    /// The cache folder is not there and cannot be made.
+    /// The cache folder does not exist and cannot be created.
     #[error(
         "cannot create the cache folder {}: {source}; set CANOPY_CACHE to a folder that can be written, or bake \
          without a cache",

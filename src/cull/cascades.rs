@@ -1,22 +1,22 @@
-//! Where the cascades of the sun's shadow lie. Pure functions, without history.
+//! The positions of the shadow cascades. Pure functions, without history.
 //!
-//! A cascade is a box around the camera, not around a slice of its frustum: turning the head redraws nothing. Its
+//! A cascade is a box around the camera, not around a slice of its frustum: rotating the camera redraws nothing. Its
 //! centre is the camera's position rounded to a grid of a quarter of the served radius in the light's frame (a whole
 //! number of texels, so that nothing crawls), and the light's direction is rounded to a grid so fine that no shadow
-//! lags by more than half a texel. Both are functions of the moment alone: the same arguments give the same map, and
-//! a map is drawn again only when one of them steps.
+//! lags by more than half a texel. Both depend only on the current arguments: equal arguments give equal maps, and a
+//! map is rendered again only when one of them changes.
 
 use glam::{DMat3, DVec3, Mat4, Vec3};
 
-/// Share of the served radius by which the box's centre steps.
+/// Step of the box's centre as a fraction of the served radius.
 const STEP_SHARE: f64 = 0.25;
 
-/// Where one cascade lies, in a scene's f64 metres. Equal boxes have equal maps (for equal casters).
+/// The box of one cascade, in a scene's f64 metres. Equal boxes have equal maps (for equal casters).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CascadeBox {
     /// Centre in scene metres.
     pub center: DVec3,
-    /// To the light: the rounded direction that the map is drawn from.
+    /// Unit vector to the light, rounded: the direction that the map is rendered from.
     pub direction: DVec3,
     /// Radius around the camera within which the map may be read, metres.
     pub radius: f64,
@@ -24,15 +24,15 @@ pub struct CascadeBox {
     pub half_width: f64,
     /// Half its depth along the light, metres.
     pub half_depth: f64,
-    /// Metres a texel.
+    /// Size of a texel, metres.
     pub texel: f64,
-    /// How far towards the light a caster may stand and still shade the box, metres from the centre.
-    pub reach_to_light: f64,
+    /// Distance from the centre towards the light within which a caster can shade the box, metres.
+    pub distance_to_light: f64,
 }
 
-/// Farthest caster in metres, and the least sine of the light's elevation that the shadows' length is worked out for.
+/// Farthest caster, metres.
 const FARTHEST_CASTER: f64 = 12_000.0;
-/// Sine of the lowest light whose shadows are followed to their end.
+/// Sine of the lowest elevation of the light for which the full length of shadows is covered.
 pub const LOWEST_SINE: f64 = 2e-3;
 
 impl CascadeBox {
@@ -49,12 +49,12 @@ impl CascadeBox {
         // The tallest tree's shadow at this light, and four boxes for trees that stand higher than the box. A power of
         // two, so that it does not change with every breath of the light.
         let shadow = half_depth + caster_height / sine;
-        let reach_to_light = shadow.max(4.0 * half_depth).log2().ceil().exp2().min(FARTHEST_CASTER).max(half_depth);
+        let distance_to_light = shadow.max(4.0 * half_depth).log2().ceil().exp2().min(FARTHEST_CASTER).max(half_depth);
         let direction = rounded_direction(direction, 0.5 * texel, caster_height, half_depth + shadow);
         let frame = light_frame(direction);
         let seen = frame.transpose() * camera;
         let center = frame * (seen / step).round() * step;
-        Self { center, direction, radius, half_width, half_depth, texel, reach_to_light }
+        Self { center, direction, radius, half_width, half_depth, texel, distance_to_light }
     }
 
     /// Metres relative to [`center`](Self::center) to the map's clip space: xy in -1..1, reversed depth (1 at the
@@ -76,31 +76,31 @@ impl CascadeBox {
         self.clip_from_anchor() * Mat4::from_translation((camera - self.center).as_vec3())
     }
 
-    /// The test for casters, with the light's frame worked out once.
-    pub fn reach(&self) -> CasterReach {
-        CasterReach { place: *self, frame: light_frame(self.direction) }
+    /// The volume that holds all casters of the cascade, with the light's frame computed once.
+    pub fn caster_volume(&self) -> CasterVolume {
+        CasterVolume { bounds: *self, frame: light_frame(self.direction) }
     }
 }
 
-/// Which casters can shade a cascade.
+/// The part of space whose objects (casters) can shade a cascade.
 #[derive(Clone, Copy, Debug)]
-pub struct CasterReach {
-    place: CascadeBox,
+pub struct CasterVolume {
+    bounds: CascadeBox,
     frame: DMat3,
 }
 
-impl CasterReach {
-    /// Whether a caster within the axis-aligned box `min..max` (scene metres) can shade the cascade: it overlaps
-    /// the box across the light, and does not lie wholly behind it.
+impl CasterVolume {
+    /// Whether a caster within the axis-aligned box `min..max` (scene metres) can shade the cascade: seen along the
+    /// light it overlaps the cascade's box, and it does not lie wholly behind it.
     pub fn includes(&self, min: DVec3, max: DVec3) -> bool {
-        let Self { place, frame } = self;
-        let middle = frame.transpose() * (0.5 * (min + max) - place.center);
+        let Self { bounds, frame } = self;
+        let middle = frame.transpose() * (0.5 * (min + max) - bounds.center);
         let half = 0.5 * (max - min);
-        let reach = |axis: DVec3| axis.abs().dot(half);
-        middle.x.abs() <= place.half_width + reach(frame.x_axis)
-            && middle.y.abs() <= place.half_width + reach(frame.y_axis)
-            && middle.z >= -place.half_depth - reach(frame.z_axis)
-            && middle.z <= place.reach_to_light + reach(frame.z_axis)
+        let half_extent = |axis: DVec3| axis.abs().dot(half);
+        middle.x.abs() <= bounds.half_width + half_extent(frame.x_axis)
+            && middle.y.abs() <= bounds.half_width + half_extent(frame.y_axis)
+            && middle.z >= -bounds.half_depth - half_extent(frame.z_axis)
+            && middle.z <= bounds.distance_to_light + half_extent(frame.z_axis)
     }
 }
 
@@ -120,12 +120,12 @@ pub fn light_frame(direction: DVec3) -> DMat3 {
 }
 
 /// The direction on a grid of elevation and azimuth so fine that the shadow of a caster `height` metres above
-/// moves by at most `tolerance` metres across the light; the ray's length is at most `reach` metres.
-fn rounded_direction(direction: DVec3, tolerance: f64, height: f64, reach: f64) -> DVec3 {
+/// moves by at most `tolerance` metres across the light; the ray's length is at most `max_distance` metres.
+fn rounded_direction(direction: DVec3, tolerance: f64, height: f64, max_distance: f64) -> DVec3 {
     let direction = direction.try_normalize().unwrap_or(DVec3::Y);
     let elevation = direction.y.clamp(-1.0, 1.0).asin();
     let azimuth = direction.x.atan2(-direction.z);
-    let ray = (height / elevation.sin().abs().max(1e-6)).min(reach).max(1e-3);
+    let ray = (height / elevation.sin().abs().max(1e-6)).min(max_distance).max(1e-3);
     // Rounding moves by half a cell in each of two angles: a cell of tolerance / ray keeps the sum below tolerance.
     // A power of two, so that the grid itself stays put while the elevation moves.
     let cell = (tolerance / ray).log2().floor().exp2();
@@ -195,7 +195,7 @@ mod tests {
     #[test]
     fn casters_towards_the_light_count_and_those_behind_do_not() {
         let cascade = CascadeBox::new(DVec3::ZERO, 50.0, 1024, DVec3::new(1.0, 1.0, 0.0).normalize(), 30.0);
-        let around = |center: DVec3| cascade.reach().includes(center - 1.0, center + 1.0);
+        let around = |center: DVec3| cascade.caster_volume().includes(center - 1.0, center + 1.0);
         assert!(around(DVec3::ZERO));
         assert!(around(cascade.direction * 120.0));
         assert!(!around(cascade.direction * -200.0));

@@ -1,4 +1,4 @@
-//! Which trees cast into a cascade of the sun's shadow, and in which representation.
+//! Which trees cast shadows into a cascade, and with which representation.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ use super::{
 };
 use crate::scatter::{PackedStand, PlantSize};
 
-/// What a view can see of shadows: a caster counts only if the volume that it shades can be seen.
+/// The shadows that a view can see: a caster counts only if the volume that it shades is visible.
 #[derive(Clone, Debug)]
 pub struct SeenShadows<'a> {
     /// The camera in scene metres.
@@ -20,12 +20,13 @@ pub struct SeenShadows<'a> {
     pub frustum: &'a Frustum,
     /// Lowest ground in scene metres: a shadow goes no farther down.
     pub lowest: f64,
-    /// How far from its own place a visible point may look the map up, metres.
+    /// Maximum distance between a visible point and the position at which it samples the map, metres.
     pub margin: f64,
 }
 
 impl SeenShadows<'_> {
-    /// Whether the shadow of a caster in the sphere (scene metres) may be seen, for a light in `direction` (unit).
+    /// Whether the shadow of a caster within the sphere (scene metres) may be visible, for a light in `direction`
+    /// (unit).
     fn includes(&self, center: DVec3, radius: f64, direction: DVec3) -> bool {
         let radius = radius + self.margin;
         let drop = (center.y + radius - self.lowest).max(0.0);
@@ -38,9 +39,9 @@ impl SeenShadows<'_> {
 
 /// Casters of one cascade, whose box lies in scene metres; `origin` is the stand's own origin there.
 ///
-/// `casting` has a range of distances from the box's centre, metres, for each level: a tree casts in the first level whose
-/// range holds it, and not at all where none does. `groupings` has one entry a level. With `seen`, casters whose shadow
-/// no pixel of the view can show are left out.
+/// `casting` has a range of distances from the box's centre, metres, for each level: a tree casts in the first level
+/// whose range contains it, and not at all if there is none. `groupings` has one entry per level. With `seen`, casters
+/// whose shadow is visible in no pixel of the view are left out.
 pub fn cull_cascade(
     stand: &PackedStand,
     sizes: &[PlantSize],
@@ -51,10 +52,10 @@ pub fn cull_cascade(
     seen: Option<&SeenShadows>,
 ) -> DrawLists {
     let center = cascade.center - origin;
-    let reach = cascade.reach();
+    let volume = cascade.caster_volume();
     let casts = |min: DVec3, max: DVec3| {
         let (middle, radius) = (0.5 * (min + max), 0.5 * (max - min).length());
-        reach.includes(min, max) && seen.is_none_or(|seen| seen.includes(middle, radius, cascade.direction))
+        volume.includes(min, max) && seen.is_none_or(|seen| seen.includes(middle, radius, cascade.direction))
     };
     gather(stand, sizes, center, cascade.direction, casting, groupings, |min, max| casts(min + origin, max + origin))
 }
@@ -75,7 +76,8 @@ pub fn cull_light_view(
     })
 }
 
-/// Trees whose boxes (in the stand's own metres) cast, by their distance from `center` and sorted from the light outwards.
+/// Trees whose boxes (in the stand's own metres) cast, by their distance from `center` and sorted from the light
+/// outwards.
 fn gather(
     stand: &PackedStand,
     sizes: &[PlantSize],

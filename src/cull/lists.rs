@@ -1,22 +1,22 @@
-//! What a view or a cascade draws of one stand.
+//! The trees of one stand that a view or a cascade draws.
 
 use std::ops::Range;
 
-/// How the trees of a level are handed to its draw calls.
+/// How the trees of a level are grouped for its draw calls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Grouping {
-    /// One range a variant: each variant has buffers of its own.
+    /// One range per variant: each variant has its own buffers.
     ByVariant,
-    /// One range for all variants, whose order front to back is kept.
+    /// One range for all variants, sorted front to back.
     Together,
 }
 
-/// What one view draws of one stand: ranges into `visible`, which holds indices of trees.
+/// The trees of one stand that one view draws: ranges into `visible`, which holds indices of trees.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DrawLists {
     /// Indices into the stand's trees.
     pub visible: Vec<u32>,
-    /// For each level its ranges: one a variant, or a single one ([`Grouping`]).
+    /// The ranges of each level: one per variant, or a single one ([`Grouping`]).
     pub levels: Vec<Vec<Range<u32>>>,
 }
 

@@ -1,4 +1,4 @@
-//! Which trees a view draws, and in which representation.
+//! Which trees a view draws, and with which representation.
 
 use glam::{DVec3, Vec3};
 

@@ -1,8 +1,8 @@
-//! How a camera, or an eye, is exposed to the light of an hour: without history, from the illuminance alone.
+//! Exposure of a camera or an eye to the light of an hour: from the illuminance alone, without history.
 //!
-//! Full adaptation would show midnight as bright as noon, none would show it black. As in the eye, the brightness
-//! that is displayed falls with a small power of the illuminance `E`: `exposure * E ~ E^(1 - adaptation)`, and as in
-//! the eye there are two branches, for cones and for rods, that meet at the end of civil twilight:
+//! Full adaptation would show midnight as bright as noon; no adaptation would show it black. As in the eye, the
+//! brightness that is displayed falls with a small power of the illuminance `E`: `exposure * E ~ E^(1 - adaptation)`,
+//! and as in the eye there are two branches, for cones and for rods, that meet at the end of civil twilight:
 //!
 //! ```text
 //! EV100 = day_ev100 + cone_adaptation * log2(max(E, knee) / day) + rod_adaptation * log2(min(E, knee) / knee)
@@ -13,7 +13,7 @@
 //! dusk is brighter than everything that it lights, looks about three times as bright as that. Continuous, and
 //! increasing in `E`, which increases with the sun's elevation.
 //!
-//! Without cones there is no colour: below a few nits sight turns blue and grey (Purkinje). The terms for it follow
+//! Without cones there is no colour: below a few nits vision becomes blue and grey (Purkinje). The terms for it follow
 //! Jensen, Premoze, Shirley, Thompson, Ferwerda & Stark 2000, "Night Rendering".
 
 use glam::{Mat3, Vec3};
@@ -26,17 +26,17 @@ pub struct ExposureSettings {
     /// EV100 at [`ExposureSettings::day_illuminance`], -10 to 25. Up: everything is darker. At 14 a white sheet in full
     /// sun comes out at 1.6, a clear sky at 0.25, summer forest at 0.1, before tone mapping.
     pub day_ev100: f32,
-    /// Horizontal illuminance in lux that `day_ev100` is for, 1 to 1e6.
+    /// Horizontal illuminance in lux to which `day_ev100` belongs, 1 to 1e6.
     pub day_illuminance: f32,
     /// Horizontal illuminance in lux at which rods take over from cones, 1e-3 to 1000.
     pub knee_illuminance: f32,
-    /// Share of adaptation in EV above the knee, 0 (a fixed exposure) to 1 (dusk as bright as day).
+    /// Fraction of adaptation in EV above the knee, 0 (a fixed exposure) to 1 (dusk as bright as day).
     pub cone_adaptation: f32,
-    /// Share of adaptation in EV below the knee, 0 to 1 (night as bright as the end of dusk).
+    /// Fraction of adaptation in EV below the knee, 0 to 1 (night as bright as the end of dusk).
     pub rod_adaptation: f32,
     /// EV added on top, -20 to 20. Up: brighter.
     pub compensation: f32,
-    /// The most that night sight may take of the colours, 0 (colours by night as by day) to 1 (rods alone).
+    /// Maximum desaturation by night vision, 0 (colours at night as by day) to 1 (rods alone).
     pub scotopic_strength: f32,
 }
 
@@ -88,7 +88,7 @@ pub fn exposure_from_ev100(ev100: f32) -> f32 {
     1.0 / (1.2 * ev100.exp2())
 }
 
-/// Night sight: how far colours turn into the blue-grey of rods.
+/// Night vision: how far colours shift to the blue-grey of rods.
 ///
 /// A pixel of the luminance `Y` nits loses `min(amount, strength * rods(Y))` of its colour: what is bright, the glow
 /// of dusk or the moon, keeps its colour by night, and a shadow keeps it by day. `rods` falls from 1 at 0.01 nits to
@@ -97,7 +97,7 @@ pub fn exposure_from_ev100(ev100: f32) -> f32 {
 pub struct ScotopicTint {
     /// Linear Rec. 709 colour of luminance 1 that rod vision is displayed in.
     pub tint: Vec3,
-    /// The bound that the whole picture's adaptation sets: 0 (day: colours as they are) to `strength`.
+    /// The bound that the adaptation to the whole image sets: 0 (day: colours as they are) to `strength`.
     pub amount: f32,
     /// The most that any pixel loses, 0 to 1.
     pub strength: f32,
@@ -120,7 +120,7 @@ const XYZ_FROM_RGB: Mat3 = Mat3::from_cols(
 );
 
 impl ScotopicTint {
-    /// The tint for a horizontal illuminance in lux: the picture's adaptation is to ground of 18 % albedo. `strength`
+    /// The tint for a horizontal illuminance in lux: the eye is adapted to ground of 18 % albedo. `strength`
     /// is kept within 0 to 1.
     pub fn for_illuminance(illuminance: f32, strength: f32) -> Self {
         let strength = if strength.is_finite() { strength.clamp(0.0, 1.0) } else { 1.0 };

@@ -1,9 +1,9 @@
-//! The light room: where sun and moon stand, what the sky sends, and how a camera should be exposed to it.
+//! Sun and moon positions, the light of the sky, and the camera exposure that suits it.
 //!
 //! ```text
-//! instant, place -> SunPosition, Moon --.
-//!                                        +-> LightState: sky picture, SH of the surroundings, key light,
-//! AtmosphereParams -> Atmosphere -------'               exposure, night sight, fog, moon and stars
+//! instant, location -> SunPosition, Moon --.
+//!                                           +-> LightState: sky texture, SH of the surroundings, key light,
+//! AtmosphereParams -> Atmosphere ----------'               exposure, night sight, fog, moon and stars
 //! ```
 //!
 //! [`Atmosphere`] is built once (a quarter of a second), [`LightState`] when the sun has moved (some 25 ms); a frame

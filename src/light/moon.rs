@@ -27,7 +27,8 @@ const MOON_COLOR: Vec3 = Vec3::new(1.213, 0.961, 0.760);
     Debug, Clone, Copy, PartialEq, Eq, Default, Hash, serde::Serialize, serde::Deserialize, bevy::reflect::Reflect,
 )]
 pub enum MoonSetting {
-    /// The real one at the scene's instant and place. A scene that gives its sun by angles has no instant, and no moon.
+    /// The real one at the scene's instant and location. A scene that gives its sun by angles has no instant, and no
+    /// moon.
     #[default]
     Astronomical,
     /// A full moon opposite the sun, as in lunar orbit without its inclination: every night is moonlit and readable.
@@ -181,7 +182,7 @@ fn equatorial_to_local(latitude_deg: f64, sidereal: f64) -> DMat3 {
 }
 
 /// The rotation from our world (+X east, +Y up, -Z north) into the equatorial frame in which the stars stand still
-/// (x to the vernal equinox, z to the north pole), at an instant and place: `star direction = rotation * view
+/// (x to the vernal equinox, z to the north pole), at an instant and location: `star direction = rotation * view
 /// direction`.
 pub fn celestial_rotation(instant: DateTime<Utc>, observer: &Observer) -> Mat3 {
     let sidereal = sidereal_angle(days_since_2000(instant), observer.longitude_deg);

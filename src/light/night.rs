@@ -41,7 +41,7 @@ impl NightSky {
     /// Radiance in nits from the unit direction `view` at an observer at a height above the sea; below the
     /// horizon the ground, dimly lit by it, behind the horizon's haze. What the air scatters into the view is not
     /// integrated; to make up for it (Leinert et al. 1998, 2.2), extinction and slant are those of a zenith cosine
-    /// that flattens out at 0.17, 10 degrees up, without which the horizon were black instead of pale.
+    /// that flattens out at 0.17, 10 degrees up, without which the horizon would be black instead of pale.
     pub fn radiance(&self, atmosphere: &Atmosphere, view: Vec3, observer_height_m: f64) -> Vec3 {
         let view = unit(view);
         let sky = self.above(atmosphere, view.y.max(0.0), observer_height_m);
@@ -86,7 +86,7 @@ impl NightSky {
 pub struct StarField {
     /// Cells along each edge of a cube face, 8 to 1024.
     pub cells: u32,
-    /// Another seed, another sky.
+    /// Seed of the stars' positions.
     pub seed: u32,
 }
 
@@ -111,7 +111,7 @@ const STARS: f32 = 9_000.0;
 pub const LUX_OF_MAGNITUDE_0: f32 = 2.54e-6;
 
 impl StarField {
-    /// The share of cells that hold a star, 0 to 1.
+    /// The fraction of cells that contain a star, 0 to 1.
     pub fn density(&self) -> f32 {
         let n = self.edge() as f32;
         (STARS / (6.0 * n * n)).min(1.0)

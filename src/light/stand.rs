@@ -1,26 +1,27 @@
-//! Light inside a stand of trees: what the neighbours of a tree leave of the sky and of the sun, and what they send
-//! instead.
+//! Light inside a stand of trees: how much sky and sun the neighbours of a tree let through, and how much light they
+//! scatter towards it.
 //!
-//! A stand is a layer of upright crowns, as many everywhere, from the tops (depth 0) to the ground (depth 1). Straight up
-//! they cover the share `cover` of the sky; at an elevation e a ray meets crowns by their tops and by their sides, which are
-//! `4 l / (pi w)` times as large, `w` and `l` being a crown's width and length over the tree's height [Li & Strahler 1985;
-//! Nilson 1971]:
+//! A stand is modelled as a uniform layer of upright crowns, from the tops (depth 0) to the ground (depth 1). Seen
+//! straight up, they cover the fraction `cover` of the sky. At an elevation e a ray meets crowns by their tops and by
+//! their sides. The sides are `4 l / (pi w)` times as large as the tops, where `w` and `l` are a crown's width and
+//! length over the tree's height [Li & Strahler 1985; Nilson 1971]:
 //!
 //! ```text
-//!  left(d, e) = exp(-tau (1 / l + 4 / (pi w) cot e) min(d, l))      tau = -ln(1 - 0.92 cover)
+//!  transmittance(d, e) = exp(-tau (1 / l + 4 / (pi w) cot e) min(d, l))      tau = -ln(1 - 0.92 cover)
 //!
-//!  sky   share of the sky's radiance, in the mean over the upper half, that neighbours leave
-//!  beam  share of the key light that they leave
-//!  down  radiance from above of what they scatter     two-stream equations [Dickinson 1983; Sellers 1985, eq. 1 and 2]
-//!  up    radiance from below: of leaves and ground
+//!  sky_transmittance  of the sky's radiance through the neighbours, mean over the upper hemisphere
+//!  sun_transmittance  of the key light through the neighbours
+//!  downwelling        scattered radiance from above    two-stream equations [Dickinson 1983; Sellers 1985, eq. 1, 2]
+//!  upwelling          radiance from below, of leaves and ground
 //! ```
 //!
-//! A tree's own crown is in none of it: it is in what was baked for the tree. So a ray counts only from where it has left
-//! the own crown, `w / 2` away, and at the tops of an even stand nothing is in the way. The two streams, which are about the
-//! mean leaf of the stand, count all of it. With a cover of 0 there is the sky, and the ground as a lone tree has it.
+//! None of these terms includes the tree's own crown, because the data baked for the tree does. So a ray counts only
+//! from where it leaves the own crown, `w / 2` away, and nothing is in the way at the tops of an even stand. The two
+//! streams describe the mean leaf of the stand and count all crowns. With a cover of 0 the result is the open sky, and
+//! the ground as a lone tree sees it.
 //!
-//! Limits: the layer knows no single tree. A tree that is taller than its neighbours, or that stands at the edge, has the
-//! light of the mean. Leaves have the mean colour of the stand's.
+//! Limits: the layer has no single trees. A tree that is taller than its neighbours, or that stands at the edge, gets
+//! the mean light. Leaves have the mean colour of the stand.
 
 use std::f32::consts::PI;
 
@@ -28,32 +29,33 @@ use glam::Vec3;
 
 use super::state::LightState;
 
-/// Covers that are tabled, evenly from 0 to 1.
+/// Number of covers in the table, evenly from 0 to 1.
 pub const COVERS: usize = 16;
-/// Depths that are tabled, evenly from 0 to 1. After them comes the row of the ground, which has no crown of its own.
+/// Number of depths in the table, evenly from 0 to 1. The row of the ground follows them; it has no crown of its own.
 pub const DEPTHS: usize = 16;
 
-/// Share of a crown's outline that leaves fill.
+/// Fraction of a crown's outline that leaves fill.
 const FILLED: f32 = 0.92;
 /// Albedo of the ground under trees: litter and moss, as `shaders/terrain/terrain.wgsl` draws them.
 const FLOOR: Vec3 = Vec3::new(0.062, 0.058, 0.026);
-/// Layers of the two streams, and how often light is sent through them: leaves reflect and pass on less than half of it.
+/// Layers of the two streams, and number of sweeps through them. Few are enough: leaves scatter less than half of the
+/// light.
 const LAYERS: usize = 48;
 const SWEEPS: usize = 12;
-/// Rings of the upper half of the sky, of equal solid angle, and directions in each.
+/// Rings of the upper hemisphere, of equal solid angle, and directions in each ring.
 const RINGS: usize = 32;
 const AZIMUTHS: usize = 32;
 
-/// What a stand's trees are to light, in the mean.
+/// Mean optical properties of a stand's trees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StandTrees {
-    /// Share that leaves reflect, per channel, 0..=1.
+    /// Fraction of light that leaves reflect, per channel, 0..=1.
     pub reflectance: Vec3,
-    /// Share that passes through leaves, per channel, 0..=1, at most what is not reflected.
+    /// Fraction of light that leaves transmit, per channel, 0..=1, at most what they do not reflect.
     pub transmittance: Vec3,
-    /// A crown's width over the tree's height; moved into 0.05..=2.
+    /// A crown's width over the tree's height; clamped to 0.05..=2.
     pub crown_width: f32,
-    /// A crown's length over the tree's height; moved into 0.1..=1. Below are trunks, which are left out.
+    /// A crown's length over the tree's height; clamped to 0.1..=1. The trunks below it are ignored.
     pub crown_length: f32,
 }
 
@@ -63,89 +65,95 @@ impl StandTrees {
         Self { reflectance: Vec3::ZERO, transmittance: Vec3::ZERO, crown_width: 0.5, crown_length: 0.7 };
 }
 
-/// What a place in the stand is lit by beside its own tree. Radiance in nits per channel.
+/// Light at a cover and depth of the stand, the tree's own crown excluded. Radiance in nits per channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct StandPlace {
-    /// Share of the sky that the neighbours leave, per channel, 0..=1.
-    pub sky: Vec3,
-    /// Share of the key light that they leave in the mean, 0..=1.
-    pub beam: f32,
-    /// Radiance from above of what they scatter.
-    pub down: Vec3,
-    /// Radiance from below.
-    pub up: Vec3,
+pub struct StandSample {
+    /// Mean transmittance of the neighbouring crowns for the sky's radiance, per channel, 0..=1.
+    pub sky_transmittance: Vec3,
+    /// Mean transmittance of the neighbouring crowns for the key light (sun or moon), 0..=1.
+    pub sun_transmittance: f32,
+    /// Downwelling radiance: scattered towards the ground by neighbouring crowns.
+    pub downwelling: Vec3,
+    /// Upwelling radiance: from leaves and ground below.
+    pub upwelling: Vec3,
 }
 
-/// The light of one instant at every cover and depth of a stand.
+/// Table of the light in a stand at one instant, over covers and depths.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StandLight {
-    /// Row by row: depths from 0 to 1, then the ground; covers from 0 to 1 in each.
-    places: Vec<StandPlace>,
+    /// Row by row: depths from 0 to 1, then the ground; in each row covers from 0 to 1.
+    samples: Vec<StandSample>,
 }
 
-/// The mean radiance of a ring and the sine of its elevation.
+/// Sine of a ring's elevation, and its mean radiance.
 type Ring = (f32, Vec3);
 
 impl StandLight {
-    /// The table for a light and the stand's trees: some 34,000 exponentials. Finite and never negative, for any light.
+    /// Computes the table for a light and the stand's trees, with some 34,000 exponentials. Finite and never negative
+    /// for any light.
     pub fn new(light: &LightState, trees: &StandTrees) -> Self {
         let open = albedo(light);
         let rings = rings(light);
         let sun = Sun { sine: light.key_direction.y, illuminance: light.key_illuminance };
-        let mut places = vec![StandPlace::default(); COVERS * (DEPTHS + 1)];
+        let mut samples = vec![StandSample::default(); COVERS * (DEPTHS + 1)];
         for column in 0..COVERS {
             let cover = column as f32 / (COVERS - 1) as f32;
             let layer = Layer::new(cover, trees);
             let streams = Streams::new(&layer, &rings, &sun, trees, open.lerp(FLOOR, cover));
             for row in 0..=DEPTHS {
                 let depth = (row as f32 / (DEPTHS - 1) as f32).min(1.0);
-                let (down, up) = streams.at((depth / layer.length).min(1.0));
-                let place = if row == DEPTHS {
-                    StandPlace { sky: layer.flux_left(&rings), beam: layer.left(1.0, sun.sine), down, up }
+                let (downwelling, upwelling) = streams.at((depth / layer.length).min(1.0));
+                let sample = if row == DEPTHS {
+                    StandSample {
+                        sky_transmittance: layer.sky_flux_transmittance(&rings),
+                        sun_transmittance: layer.transmittance(1.0, sun.sine),
+                        downwelling,
+                        upwelling,
+                    }
                 } else {
-                    StandPlace {
-                        sky: layer.sky_left(depth, &rings),
-                        beam: layer.left_by_neighbours(depth, sun.sine),
-                        down,
-                        up,
+                    StandSample {
+                        sky_transmittance: layer.neighbour_sky_transmittance(depth, &rings),
+                        sun_transmittance: layer.neighbour_transmittance(depth, sun.sine),
+                        downwelling,
+                        upwelling,
                     }
                 };
-                places[row * COVERS + column] = place;
+                samples[row * COVERS + column] = sample;
             }
         }
-        Self { places }
+        Self { samples }
     }
 
-    /// The tabled places: rows of depths from 0 to 1, then of the ground, [`COVERS`] covers in each.
-    pub fn places(&self) -> &[StandPlace] {
-        &self.places
+    /// The samples of the table: rows of depths from 0 to 1, then the ground, with [`COVERS`] covers in each row.
+    pub fn samples(&self) -> &[StandSample] {
+        &self.samples
     }
 
-    /// Between the tabled places, as the shader reads them. `cover` and `depth` are moved into 0..=1.
-    pub fn at(&self, cover: f32, depth: f32) -> StandPlace {
+    /// Interpolates the table as the shader does. `cover` and `depth` are clamped to 0..=1.
+    pub fn at(&self, cover: f32, depth: f32) -> StandSample {
         let clamp = |value: f32, count: usize| (if value > 0.0 { value.min(1.0) } else { 0.0 }) * (count - 1) as f32;
         let (x, y) = (clamp(cover, COVERS), clamp(depth, DEPTHS));
         let (column, row) = ((x as usize).min(COVERS - 2), (y as usize).min(DEPTHS - 2));
-        let place = |row: usize, column: usize| self.places[row * COVERS + column];
+        let sample = |row: usize, column: usize| self.samples[row * COVERS + column];
         let (u, v) = (x - column as f32, y - row as f32);
         mix(
-            &mix(&place(row, column), &place(row, column + 1), u),
-            &mix(&place(row + 1, column), &place(row + 1, column + 1), u),
+            &mix(&sample(row, column), &sample(row, column + 1), u),
+            &mix(&sample(row + 1, column), &sample(row + 1, column + 1), u),
             v,
         )
     }
 }
 
-fn mix(a: &StandPlace, b: &StandPlace, t: f32) -> StandPlace {
-    StandPlace {
-        sky: a.sky.lerp(b.sky, t),
-        beam: a.beam + (b.beam - a.beam) * t,
-        down: a.down.lerp(b.down, t),
-        up: a.up.lerp(b.up, t),
+fn mix(a: &StandSample, b: &StandSample, t: f32) -> StandSample {
+    StandSample {
+        sky_transmittance: a.sky_transmittance.lerp(b.sky_transmittance, t),
+        sun_transmittance: a.sun_transmittance + (b.sun_transmittance - a.sun_transmittance) * t,
+        downwelling: a.downwelling.lerp(b.downwelling, t),
+        upwelling: a.upwelling.lerp(b.upwelling, t),
     }
 }
 
-/// Albedo of the ground that the light's surroundings have; black without light.
+/// Albedo of the ground in the light's surroundings; black without light.
 fn albedo(light: &LightState) -> Vec3 {
     let lit = light.sky_illuminance + light.key_illuminance * light.key_direction.y.max(0.0);
     let albedo = |c: usize| if lit[c] > 0.0 { (PI * light.ground_radiance[c] / lit[c]).clamp(0.0, 1.0) } else { 0.0 };
@@ -155,11 +163,11 @@ fn albedo(light: &LightState) -> Vec3 {
 fn rings(light: &LightState) -> Vec<Ring> {
     let ring = |index: usize| {
         let sine = (index as f32 + 0.5) / RINGS as f32;
-        let reach = (1.0 - sine * sine).sqrt();
+        let cosine = (1.0 - sine * sine).sqrt();
         let sum: Vec3 = (0..AZIMUTHS)
             .map(|azimuth| {
                 let (z, x) = (2.0 * PI * (azimuth as f32 + 0.5) / AZIMUTHS as f32).sin_cos();
-                light.sky_view.sample(Vec3::new(reach * x, sine, reach * z))
+                light.sky_view.sample(Vec3::new(cosine * x, sine, cosine * z))
             })
             .sum();
         (sine, sum / AZIMUTHS as f32)
@@ -167,7 +175,7 @@ fn rings(light: &LightState) -> Vec<Ring> {
     (0..RINGS).map(ring).collect()
 }
 
-/// The ratio of two sums over the sky; 1 where the sky is black.
+/// Ratio of two sums over the sky; 1 where the sky is black.
 fn ratio(part: Vec3, whole: Vec3) -> Vec3 {
     Vec3::from([0, 1, 2].map(|c| if whole[c] > 0.0 { (part[c] / whole[c]).clamp(0.0, 1.0) } else { 1.0 }))
 }
@@ -194,34 +202,34 @@ impl Layer {
         Self { tau: -(1.0 - FILLED * cover).ln(), side: 4.0 / (PI * width), own: 0.5 * width, length }
     }
 
-    /// Share of light from an elevation of this sine that comes down to `depth`.
-    fn left(&self, depth: f32, sine: f32) -> f32 {
+    /// Fraction of light from an elevation of this sine that arrives at `depth`.
+    fn transmittance(&self, depth: f32, sine: f32) -> f32 {
         let sine = sine.clamp(0.02, 1.0);
         let cotangent = (1.0 - sine * sine).sqrt() / sine;
         (-self.tau * (1.0 / self.length + self.side * cotangent) * depth.min(self.length)).exp()
     }
 
-    /// The same of what is beyond the own crown.
-    fn left_by_neighbours(&self, depth: f32, sine: f32) -> f32 {
+    /// The same without the tree's own crown.
+    fn neighbour_transmittance(&self, depth: f32, sine: f32) -> f32 {
         let sine = sine.clamp(0.02, 1.0);
         let tangent = sine / (1.0 - sine * sine).max(1e-6).sqrt();
-        self.left((depth - self.own * tangent).max(0.0), sine)
+        self.transmittance((depth - self.own * tangent).max(0.0), sine)
     }
 
-    fn sky_left(&self, depth: f32, rings: &[Ring]) -> Vec3 {
-        let part = rings.iter().map(|(sine, radiance)| *radiance * self.left_by_neighbours(depth, *sine)).sum();
+    fn neighbour_sky_transmittance(&self, depth: f32, rings: &[Ring]) -> Vec3 {
+        let part = rings.iter().map(|(sine, radiance)| *radiance * self.neighbour_transmittance(depth, *sine)).sum();
         ratio(part, rings.iter().map(|(_, radiance)| *radiance).sum())
     }
 
-    /// Share of the sky's light on level ground that comes through.
-    fn flux_left(&self, rings: &[Ring]) -> Vec3 {
-        let part = rings.iter().map(|(sine, radiance)| *radiance * *sine * self.left(1.0, *sine)).sum();
+    /// Fraction of the sky's irradiance on level ground that the crowns let through.
+    fn sky_flux_transmittance(&self, rings: &[Ring]) -> Vec3 {
+        let part = rings.iter().map(|(sine, radiance)| *radiance * *sine * self.transmittance(1.0, *sine)).sum();
         ratio(part, rings.iter().map(|(sine, radiance)| *radiance * *sine).sum())
     }
 
-    /// Share of even light that a layer of the thickness `depth` within the crowns keeps: the mean of the cosine-weighted
-    /// optical depths.
-    fn kept(&self, depth: f32) -> f32 {
+    /// Transmittance for diffuse light of a layer of the thickness `depth` within the crowns: from the mean of the
+    /// cosine-weighted optical depths.
+    fn diffuse_transmittance(&self, depth: f32) -> f32 {
         (-self.tau * (1.0 / self.length + 0.5 * PI * self.side) * depth).exp()
     }
 }
@@ -231,41 +239,42 @@ struct Sun {
     illuminance: Vec3,
 }
 
-/// Light that leaves scatter, up and down.
+/// Scattered light of the two-stream equations.
 struct Streams {
-    /// Radiance downwards and upwards at each of the layers' bounds.
+    /// Downwelling and upwelling radiance at each boundary between layers.
     bounds: Vec<(Vec3, Vec3)>,
 }
 
 impl Streams {
     fn new(layer: &Layer, rings: &[Ring], sun: &Sun, trees: &StandTrees, ground_albedo: Vec3) -> Self {
         let scattered = trees.reflectance + trees.transmittance;
-        // Leaves that face everywhere send half of the light back the way it came, and of the difference between reflected
-        // and transmitted light a sixth more [Sellers 1985, eq. 3].
+        // Isotropic leaves scatter half of the light backwards, plus a sixth of the difference between reflected and
+        // transmitted light [Sellers 1985, eq. 3].
         let back = 0.5 * scattered + (trees.reflectance - trees.transmittance) / 6.0;
         let onward = scattered - back;
-        // Light on level ground that has met no leaf down to a depth.
+        // Irradiance on a level surface at a depth, of light that has met no leaf.
         let first = |depth: f32| -> Vec3 {
             let solid_angle = 2.0 * PI / RINGS as f32;
-            let of_sun = sun.illuminance * (sun.sine.max(0.0) * layer.left(depth, sun.sine));
-            let of_sky = |(sine, radiance): &Ring| *radiance * (*sine * layer.left(depth, *sine) * solid_angle);
+            let of_sun = sun.illuminance * (sun.sine.max(0.0) * layer.transmittance(depth, sun.sine));
+            let of_sky =
+                |(sine, radiance): &Ring| *radiance * (*sine * layer.transmittance(depth, *sine) * solid_angle);
             of_sun + rings.iter().map(of_sky).sum::<Vec3>()
         };
         let firsts: Vec<Vec3> = (0..=LAYERS).map(|bound| first(layer.length * bound as f32 / LAYERS as f32)).collect();
-        // What each layer takes from it.
+        // The part that each layer intercepts.
         let taken: Vec<Vec3> = firsts.windows(2).map(|bounds| bounds[0] - bounds[1]).collect();
         let floor = firsts[LAYERS];
-        let kept = layer.kept(layer.length / LAYERS as f32);
+        let transmittance = layer.diffuse_transmittance(layer.length / LAYERS as f32);
         let (mut down, mut up) = (vec![Vec3::ZERO; LAYERS + 1], vec![Vec3::ZERO; LAYERS + 1]);
         for _ in 0..SWEEPS {
             for layer in 0..LAYERS {
-                let met = (1.0 - kept) * (down[layer] * onward + up[layer + 1] * back);
-                down[layer + 1] = down[layer] * kept + met + taken[layer] * onward;
+                let met = (1.0 - transmittance) * (down[layer] * onward + up[layer + 1] * back);
+                down[layer + 1] = down[layer] * transmittance + met + taken[layer] * onward;
             }
             up[LAYERS] = ground_albedo * (floor + down[LAYERS]);
             for layer in (0..LAYERS).rev() {
-                let met = (1.0 - kept) * (up[layer + 1] * onward + down[layer] * back);
-                up[layer] = up[layer + 1] * kept + met + taken[layer] * back;
+                let met = (1.0 - transmittance) * (up[layer + 1] * onward + down[layer] * back);
+                up[layer] = up[layer + 1] * transmittance + met + taken[layer] * back;
             }
         }
         let finite =
@@ -273,12 +282,12 @@ impl Streams {
         Self { bounds: down.into_iter().zip(up).map(|(down, up)| (finite(down), finite(up))).collect() }
     }
 
-    /// Radiance downwards and upwards at a share of the crowns' length, 0..=1.
+    /// Downwelling and upwelling radiance at a fraction of the crowns' length, 0..=1.
     fn at(&self, depth: f32) -> (Vec3, Vec3) {
-        let place = depth * LAYERS as f32;
-        let bound = (place as usize).min(LAYERS - 1);
+        let position = depth * LAYERS as f32;
+        let bound = (position as usize).min(LAYERS - 1);
         let (a, b) = (self.bounds[bound], self.bounds[bound + 1]);
-        let t = place - bound as f32;
+        let t = position - bound as f32;
         (a.0.lerp(b.0, t), a.1.lerp(b.1, t))
     }
 }
@@ -303,9 +312,12 @@ mod tests {
         let light = light(35.0);
         let stand = StandLight::new(&light, &leaves(0.1, 0.1));
         for depth in [0.0, 0.4, 1.0] {
-            let place = stand.at(0.0, depth);
-            assert_eq!((place.sky, place.beam, place.down), (Vec3::ONE, 1.0, Vec3::ZERO));
-            let up = (place.up / light.ground_radiance - 1.0).abs().max_element();
+            let sample = stand.at(0.0, depth);
+            assert_eq!(
+                (sample.sky_transmittance, sample.sun_transmittance, sample.downwelling),
+                (Vec3::ONE, 1.0, Vec3::ZERO)
+            );
+            let up = (sample.upwelling / light.ground_radiance - 1.0).abs().max_element();
             // Sums over rings against a finer quadrature.
             assert!(up < 0.01, "{up}");
         }
@@ -317,18 +329,22 @@ mod tests {
             let stand = StandLight::new(&light(elevation), &leaves(0.1, 0.1));
             for cover in 0..10 {
                 let cover = cover as f32 / 10.0;
-                assert_eq!(stand.at(cover, 0.0).sky, Vec3::ONE, "the tops see all of the sky");
+                assert_eq!(stand.at(cover, 0.0).sky_transmittance, Vec3::ONE, "the tops see all of the sky");
                 for depth in 0..10 {
                     let depth = depth as f32 / 10.0;
                     let (here, deeper, denser) =
                         (stand.at(cover, depth), stand.at(cover, depth + 0.1), stand.at(cover + 0.1, depth));
                     for other in [deeper, denser] {
-                        assert!((other.sky - here.sky).max_element() < 1e-6 && other.beam <= here.beam + 1e-6);
+                        assert!(
+                            (other.sky_transmittance - here.sky_transmittance).max_element() < 1e-6
+                                && other.sun_transmittance <= here.sun_transmittance + 1e-6
+                        );
                     }
                 }
             }
-            let ground = &stand.places()[DEPTHS * COVERS..];
-            assert!(ground.windows(2).all(|pair| pair[1].beam < pair[0].beam && pair[1].sky.y < pair[0].sky.y));
+            let ground = &stand.samples()[DEPTHS * COVERS..];
+            assert!(ground.windows(2).all(|pair| pair[1].sun_transmittance < pair[0].sun_transmittance
+                && pair[1].sky_transmittance.y < pair[0].sky_transmittance.y));
         }
     }
 
@@ -336,26 +352,28 @@ mod tests {
     fn a_low_sky_glow_is_hidden_before_a_high_one() {
         let trees = leaves(0.1, 0.1);
         let layer = Layer::new(0.5, &trees);
-        let at = |elevation: f32| layer.left_by_neighbours(0.4, elevation.to_radians().sin());
+        let at = |elevation: f32| layer.neighbour_transmittance(0.4, elevation.to_radians().sin());
         assert!(at(5.0) < 0.7 * at(30.0) && at(30.0) < at(60.0));
         assert_eq!(at(89.0), 1.0, "straight up there is the own crown alone");
         // Broad crowns are met by their tops, slender ones by their sides too.
         let slender = Layer::new(0.5, &StandTrees { crown_width: 0.2, ..trees });
-        assert!(slender.left(0.5, 0.3) < layer.left(0.5, 0.3));
+        assert!(slender.transmittance(0.5, 0.3) < layer.transmittance(0.5, 0.3));
     }
 
     #[test]
-    fn leaves_that_swallow_nothing_lose_no_light() {
+    fn leaves_that_absorb_nothing_lose_no_light() {
         let light = light(40.0);
         let rings = rings(&light);
         let sun = Sun { sine: light.key_direction.y, illuminance: light.key_illuminance };
         let trees = leaves(0.5, 0.5);
         let layer = Layer::new(0.4, &trees);
-        // A ground that swallows all: what comes in from above leaves upwards or arrives there.
+        // Over a black ground, all light from above leaves upwards or arrives at the ground.
         let streams = Streams::new(&layer, &rings, &sun, &trees, Vec3::ZERO);
         let first = |depth: f32| {
-            let ring = |(sine, radiance): &Ring| radiance.y * sine * layer.left(depth, *sine) * 2.0 * PI / RINGS as f32;
-            sun.illuminance.y * sun.sine * layer.left(depth, sun.sine) + rings.iter().map(ring).sum::<f32>()
+            let ring = |(sine, radiance): &Ring| {
+                radiance.y * sine * layer.transmittance(depth, *sine) * 2.0 * PI / RINGS as f32
+            };
+            sun.illuminance.y * sun.sine * layer.transmittance(depth, sun.sine) + rings.iter().map(ring).sum::<f32>()
         };
         let (_, out) = streams.at(0.0);
         let (arrived, _) = streams.at(1.0);
@@ -382,13 +400,13 @@ mod tests {
         for light in [black, light(-3.0), light(0.0), light(89.0)] {
             for trees in [StandTrees::BLACK, leaves(0.5, 0.5), wild, StandTrees { crown_width: 1e9, ..wild }] {
                 let stand = StandLight::new(&light, &trees);
-                for place in stand.places() {
-                    let finite = place.sky.is_finite() && place.beam.is_finite();
-                    assert!(finite && place.down.is_finite() && place.up.is_finite(), "{place:?}");
-                    assert!(place.sky.min_element() >= 0.0 && place.down.min_element() >= 0.0);
-                    assert!(place.up.min_element() >= 0.0 && (0.0..=1.0).contains(&place.beam));
+                for sample in stand.samples() {
+                    let finite = sample.sky_transmittance.is_finite() && sample.sun_transmittance.is_finite();
+                    assert!(finite && sample.downwelling.is_finite() && sample.upwelling.is_finite(), "{sample:?}");
+                    assert!(sample.sky_transmittance.min_element() >= 0.0 && sample.downwelling.min_element() >= 0.0);
+                    assert!(sample.upwelling.min_element() >= 0.0 && (0.0..=1.0).contains(&sample.sun_transmittance));
                 }
-                assert!(stand.at(f32::NAN, f32::INFINITY).up.is_finite());
+                assert!(stand.at(f32::NAN, f32::INFINITY).upwelling.is_finite());
             }
         }
     }

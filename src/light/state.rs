@@ -1,4 +1,4 @@
-//! All light of one instant, computed when the sun has moved and only then.
+//! All light of one instant, computed only when the sun has moved.
 
 use glam::{Mat3, Vec3};
 
@@ -12,14 +12,15 @@ use super::sun::{SUN_ANGULAR_RADIUS, SunPosition, direction_from};
 use super::surroundings::{Surroundings, ground_radiance, sky_illuminance};
 use crate::math::{luminance, smoothstep};
 
-/// With the sun higher than this (sine of 5 degrees) moonlight is below 2e-4 of the daylight, and left out; it fades
-/// in below.
+/// Sine of the sun's elevation (5 degrees) above which moonlight, less than 2e-4 of the daylight, is left out. Below,
+/// it fades in.
 const MOON_OUT: f32 = 0.087;
 
-/// Steps along a view ray for moonlit air: half the sun's, as its error of some percent is not seen by night.
+/// Steps along a view ray for moonlit air: half of those for sunlight, because an error of a few percent is invisible
+/// at night.
 const MOON_STEPS: usize = 20;
 
-/// What [`LightState::new`] can be told.
+/// Settings of [`LightState::new`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LightSettings {
     /// Height of the observer above the sea in metres, -500 to 9000.
@@ -46,7 +47,7 @@ impl Default for LightSettings {
     }
 }
 
-/// The body that casts the shadows.
+/// The key light: the body that casts the shadows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum KeyLight {
     /// The sun: while any of its disc is above the horizon, and when there is no moon.
@@ -59,19 +60,19 @@ pub enum KeyLight {
 ///
 /// Optical depth of a straight path of the length `s` metres from the height `h0` to `h1` above the sea:
 /// `extinction * s * H * (exp(-h0 / H) - exp(-h1 / H)) / (h1 - h0)` with `H` = `scale_height_m` (for `h1` near `h0`:
-/// `extinction * s * exp(-h0 / H)`); what is seen is `surface * T + inscatter * (1 - T)`, `T = exp(-depth)`. The
-/// inscattered colour in the direction `d` is the sky picture's at `d` with `d.y` raised to 0 when it is below
+/// `extinction * s * exp(-h0 / H)`); the visible colour is `surface * T + inscatter * (1 - T)`, `T = exp(-depth)`. The
+/// inscattered colour in the direction `d` is that of the sky texture at `d` with `d.y` raised to 0 when it is below
 /// ([`LightState::fog_radiance`]): then terrain that is wholly fogged at the horizon has the horizon's colour exactly.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FogParams {
     /// Extinction at sea level, 1/m per channel.
     pub extinction: Vec3,
-    /// Height in metres over which it falls to 1/e. One exponential stands for those of air and aerosol: it is fitted
-    /// so that the depth of the lowest 1,500 m is exact in green; up to 2,500 m the error stays below 5 %.
+    /// Height in metres over which it falls to 1/e. One exponential replaces those of air and aerosol. It is fitted so
+    /// that the depth of the lowest 1,500 m is exact in green; up to 2,500 m the error stays below 5 %.
     pub scale_height_m: f32,
 }
 
-/// What a shader needs to draw the night beside the sky picture, which holds its diffuse light already.
+/// Data for drawing the night, besides the sky texture, which already contains its diffuse light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NightTerms {
     /// The moon's disc, when there is a moon above the horizon.
@@ -106,27 +107,28 @@ pub struct LightState {
     pub key: KeyLight,
     /// Unit vector to the body that casts the shadows.
     pub key_direction: Vec3,
-    /// Its illuminance at the observer on a surface facing it, lux per channel. Continuous over the change of bodies:
-    /// zero there.
+    /// Its illuminance at the observer on a surface facing it, lux per channel. It is zero where the key light
+    /// changes from one body to the other, so it is continuous.
     pub key_illuminance: Vec3,
     /// Its angular radius in radians (for soft shadows).
     pub key_angular_radius: f32,
     /// Radiance of the surroundings without the key light's disc, in spherical harmonics ([`super::sh`]), nits: sky
     /// above, the ground's reflection below. Windowed so that no irradiance is negative.
     pub sky_sh: Sh9Rgb,
-    /// Illuminance of the sky (without disc) on the horizontal ground, lux per channel, integrated from the picture.
+    /// Illuminance of the sky (without disc) on the horizontal ground, lux per channel, integrated from the sky
+    /// texture.
     pub sky_illuminance: Vec3,
     /// Radiance of the level ground under sky and key light, nits per channel.
     pub ground_radiance: Vec3,
-    /// The picture of the sky: sunlit air, moonlit air, night sky; without discs and single stars.
+    /// The sky texture: sunlit air, moonlit air, night sky; without discs and single stars.
     pub sky_view: SkyView,
-    /// The illuminance that exposure adapts to, lux: a function of the sun's elevation and the moon only.
+    /// The illuminance that exposure adapts to, lux; it depends only on the sun's elevation and on the moon.
     pub adaptation_illuminance: f32,
     /// Exposure value at ISO 100.
     pub ev100: f32,
-    /// The factor from nits to display values that `ev100` means.
+    /// Factor from nits to display values that corresponds to `ev100`.
     pub exposure: f32,
-    /// Blue shift of night sight.
+    /// Blue shift of night vision.
     pub scotopic: ScotopicTint,
     /// Air between camera and scene.
     pub fog: FogParams,
@@ -135,7 +137,7 @@ pub struct LightState {
 }
 
 impl LightState {
-    /// Computes everything: about 25 ms of processor time, 31 ms with moonlit air, spread over all cores. Deterministic.
+    /// Computes everything: about 25 ms of CPU time, 31 ms with moonlit air, distributed over all cores. Deterministic.
     ///
     /// # Errors
     /// [`LightError::OutOfRange`] for settings outside their ranges.

@@ -1,4 +1,4 @@
-//! Where the sun stands, and how much of its disc is up.
+//! Position of the sun, and the visible part of its disc.
 //!
 //! Position: Reda & Andreas 2003, "Solar Position Algorithm for Solar Radiation Applications" (error 0.0003 degrees),
 //! through the crate `solar-positioning`. Refraction: the same report, eq. 42, whose own rule (none at all once the
@@ -16,7 +16,7 @@ use super::error::{LightError, check_range};
 /// Angular radius of the sun's disc in radians: 0.2666 degrees, the mean over the year (+-1.7 %).
 pub const SUN_ANGULAR_RADIUS: f64 = 0.266_6 * PI / 180.0;
 
-/// Where the observer stands, and the air there (for refraction).
+/// Location of the observer, and the air there (for refraction).
 #[derive(Debug, Clone, Copy, Default, PartialEq, bevy::reflect::Reflect)]
 pub struct Observer {
     /// Geographic latitude in degrees, north positive, -90 to 90.
@@ -66,7 +66,7 @@ impl Observer {
     }
 }
 
-/// The apparent place of the sun's centre in the sky.
+/// The apparent position of the sun's centre in the sky.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SunPosition {
     /// Azimuth in radians, 0 to 2 pi, clockwise from north (east is pi / 2).

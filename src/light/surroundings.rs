@@ -1,4 +1,4 @@
-//! Everything that lights a plant but the disc of the sun or moon: the sky above, the ground's reflection below.
+//! All light on a plant except the disc of the sun or moon: the sky above, the ground's reflection below.
 
 use std::f32::consts::PI;
 
@@ -8,7 +8,7 @@ use super::atmosphere::SkyView;
 use super::sh;
 use crate::math::SphereQuadrature;
 
-/// Rings a hemisphere and azimuths with which the surroundings are projected onto spherical harmonics.
+/// Rings per hemisphere and azimuths with which the surroundings are projected onto spherical harmonics.
 const SH_RINGS: usize = 24;
 const SH_AZIMUTHS: usize = 64;
 
@@ -32,7 +32,7 @@ impl Surroundings<'_> {
     /// others are moved into that range), nits. Not windowed: what is read from them by a dot product with a transfer
     /// ([`crate::bake::lighting::transfer`]) is clamped there.
     ///
-    /// Whatever the yaw of a plant, these are computed once and turned by [`sh::rotate_y`], exactly, at any band.
+    /// They are computed once and rotated into any yaw of a plant by [`sh::rotate_y`], exactly, for any band.
     pub fn project(&self, bands: usize) -> Vec<Vec3> {
         let bands = bands.clamp(1, sh::MAX_BANDS);
         let mut out = vec![Vec3::ZERO; bands * bands];

@@ -1,6 +1,6 @@
-//! The band of distances over which one representation gives way to the next.
+//! The fade band: the range of distances over which one representation replaces the next finer one.
 
-/// Where a representation gives way to the next coarser one.
+/// The distances over which a representation is replaced by the next coarser one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FadeBand {
     /// Distance in metres at which the coarser one begins to appear; below it only the finer one is drawn.
@@ -13,8 +13,8 @@ pub struct FadeBand {
 pub const WHOLE: f32 = 0.5;
 /// The threshold from which on nothing passes the alpha test.
 pub const GONE: f32 = 1.0;
-/// How far the threshold rises over half a band. A little more than from [`WHOLE`] to [`GONE`], so that rounding leaves
-/// nothing behind.
+/// Rise of the threshold over half a band: a little more than from [`WHOLE`] to [`GONE`], so that rounding leaves no
+/// fragment.
 pub const FADE_SPAN: f32 = 0.51;
 
 impl FadeBand {

@@ -18,7 +18,7 @@ impl Representation {
     /// Crossed billboards [Franzke 2005, 4.3].
     pub const CROSS: Self = Self("cross");
 
-    /// The representation of that name.
+    /// The representation with this name.
     pub const fn named(name: &'static str) -> Self {
         Self(name)
     }
@@ -29,7 +29,7 @@ impl Representation {
     }
 }
 
-/// The representations of a forest from near to far, and the bands over which each gives way to the next. Never empty.
+/// The representations of a forest from near to far, and the fade bands between them. Never empty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Levels {
     representations: Vec<Representation>,
@@ -48,8 +48,8 @@ impl Levels {
         Self::only(Representation::MODEL).then(fade, Representation::CROSS)
     }
 
-    /// Beyond `fade`, `representation`. A band that begins before the one in front of it ends is moved behind it, so that
-    /// at most two representations overlap. Beyond [`MAX_LEVELS`] the list stays as it is.
+    /// Beyond `fade`, `representation`. A band that begins before the one in front of it ends is moved behind it, so
+    /// that at most two representations overlap. Beyond [`MAX_LEVELS`] the list stays as it is.
     #[must_use]
     pub fn then(mut self, fade: FadeBand, representation: Representation) -> Self {
         if self.representations.len() < MAX_LEVELS {
@@ -72,12 +72,12 @@ impl Levels {
         self.representations.len()
     }
 
-    /// The band over which `level` comes in; `None` for the nearest one.
+    /// The band over which `level` fades in; `None` for the nearest one.
     pub fn fade_in(&self, level: usize) -> Option<FadeBand> {
         level.checked_sub(1).and_then(|before| self.fades.get(before)).copied()
     }
 
-    /// The band over which `level` goes out; `None` for the farthest one.
+    /// The band over which `level` fades out; `None` for the farthest one.
     pub fn fade_out(&self, level: usize) -> Option<FadeBand> {
         self.fades.get(level).copied()
     }
@@ -94,7 +94,7 @@ impl Levels {
         self.threshold(level, distance) < GONE
     }
 
-    /// The level that alone is drawn, and whole, at every distance from `near` to `far` metres, if there is one.
+    /// The level that is drawn alone, and whole, at all distances from `near` to `far` metres, if there is one.
     pub fn sole_level(&self, near: f64, far: f64) -> Option<usize> {
         (0..self.len()).find(|&level| {
             self.fade_in(level).is_none_or(|fade| near > f64::from(fade.end))

@@ -1,10 +1,11 @@
-//! Levels of detail: which representation of a tree stands at which distance, and how one gives way to the next.
+//! Levels of detail: which representation of a tree is drawn at which distance, and how one replaces another.
 //!
-//! A level of detail is a [`Representation`] in a list, [`Levels`], ordered by distance. Today's list is the full model near
-//! the camera and crossed billboards far away [Franzke 2005, 4.3.3]. Between two neighbours of the list lies a
-//! [`FadeBand`]: both are drawn there, and each one's alpha test moves. The farther one comes in over the first half of
-//! the band, the nearer one goes out over the second, so that the crown is never thinner than one whole representation.
-//! The distance is measured on the ground plane, from the camera to the trunk: a tree changes as a whole.
+//! A level of detail is a [`Representation`] in a list, [`Levels`], ordered by distance. Today's list is the full model
+//! near the camera and crossed billboards far away [Franzke 2005, 4.3.3]. Between two neighbours of the list lies a
+//! [`FadeBand`]: there both are drawn, with moving thresholds of their alpha tests. The farther one fades in over the
+//! first half of the band, the nearer one fades out over the second half, so that the crown is never thinner than one
+//! whole representation. The distance is measured on the ground plane, from the camera to the trunk: a tree changes as
+//! a whole.
 //!
 //! The functions here are the CPU twin of `shaders/forest/instance.wgsl`.
 

@@ -32,8 +32,8 @@ pub fn star_discrepancy(points: &[DVec2]) -> Result<f64, MathError> {
     heights.extend([0.0, 1.0]);
     let mut worst = sorted.first().map_or(1.0, |p| p.x);
     for (i, point) in sorted.iter().enumerate() {
-        let place = heights[..=i].partition_point(|&y| y <= point.y).max(1);
-        heights.insert(place, point.y);
+        let slot = heights[..=i].partition_point(|&y| y <= point.y).max(1);
+        heights.insert(slot, point.y);
         let (x, next_x) = (point.x, sorted.get(i + 1).map_or(1.0, |p| p.x));
         for (k, pair) in heights.windows(2).enumerate() {
             let share = k as f64 * per_point;

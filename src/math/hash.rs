@@ -2,7 +2,7 @@
 //!
 //! A counter-based generator: the finaliser of SplitMix64 ([Steele, Lea, Flood 2014], constants "variant 13" of
 //! [Stafford 2011]) over `key(seed, stream) + golden * index`, so each (seed, stream) is a SplitMix64 sequence entered
-//! at any place. Any thread can ask for any tree, and a tree's looks do not change when its neighbours do.
+//! at any position. Any thread can ask for any tree, and a tree's looks do not change when its neighbours do.
 
 use std::f64::consts::TAU;
 

@@ -1,8 +1,9 @@
-//! Unit vectors in two coordinates: the octahedral encoding [Cigolle et al. 2014, "A Survey of Efficient Representations
-//! for Independent Unit Vectors", 3.1; Meyer et al. 2010].
+//! Unit vectors in two coordinates: the octahedral encoding [Cigolle et al. 2014, "A Survey of Efficient
+//! Representations for Independent Unit Vectors", 3.1; Meyer et al. 2010].
 //!
 //! The sphere is projected onto an octahedron, whose lower half is folded outwards: all directions fill the square
-//! -1..=1 x -1..=1. The axis in the middle of the square is kept exactly; which axis that is depends on what is encoded.
+//! -1..=1 x -1..=1. The axis in the middle of the square is kept exactly; which axis that is depends on what is
+//! encoded.
 
 use glam::{Vec2, Vec3};
 
@@ -15,8 +16,8 @@ fn projected(direction: Vec3) -> Vec3 {
     if point.is_finite() { point } else { Vec3::ZERO }
 }
 
-/// Folds the lower half of the octahedron outwards: `flat` is the projection without the axis, `below` whether the vector
-/// points against the axis.
+/// Folds the lower half of the octahedron outwards: `flat` is the projection without the axis, `below` whether the
+/// vector points against the axis.
 fn folded(flat: Vec2, below: bool) -> Vec2 {
     let sign = |value: f32| if value < 0.0 { -1.0 } else { 1.0 };
     if below { Vec2::new((1.0 - flat.y.abs()) * sign(flat.x), (1.0 - flat.x.abs()) * sign(flat.y)) } else { flat }

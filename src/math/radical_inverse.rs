@@ -142,8 +142,8 @@ pub struct RadicalInverse {
     base: u32,
     /// `base` to the number of digits that one table entry mirrors.
     block: u64,
-    /// `ceil(2⁴⁴ / block)`: the product with an index of 32 bits, over 2⁴⁴, has the integer part of the quotient, as the
-    /// rounding adds less than `2³² * block / 2⁴⁴ <= 1` parts of `block`.
+    /// `ceil(2⁴⁴ / block)`: the product with an index of 32 bits, over 2⁴⁴, has the integer part of the quotient, as
+    /// the rounding adds less than `2³² * block / 2⁴⁴ <= 1` parts of `block`.
     reciprocal: u64,
     /// Mirrors of all numbers below `block`; empty where even two digits are too many for a table.
     table: Vec<u16>,

@@ -3,8 +3,8 @@
 use super::{PartKind, Plant};
 
 impl Plant {
-    /// Feeds `hasher` with everything that a bake or a ray tracer reads of the plant. Not among it: its name, its normal textures
-    /// and the roughness of its leaves' gloss.
+    /// Feeds `hasher` with everything that a bake or a ray tracer reads of the plant. Not among it: its name, its
+    /// normal textures and the roughness of its leaves' gloss.
     pub fn feed_baked_content(&self, hasher: &mut blake3::Hasher) {
         hasher.update(&(self.parts.len() as u64).to_le_bytes());
         for part in &self.parts {

@@ -1,4 +1,4 @@
-//! Triangles of a plant as bakes and tracers read them: checked corners, areas and connected elements.
+//! Triangles of a plant for bakes and tracers: checked corners, areas and connected elements.
 //!
 //! All of them walk a mesh through [`triangles`], so a mesh that breaks its own rules (an index out of range, a
 //! position that is not finite) loses those triangles and nothing else.
@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use super::PlantMesh;
 
-/// The valid triangles of `mesh` with their place in `mesh.triangles`: all three indices in range of positions,
+/// The valid triangles of `mesh` with their index in `mesh.triangles`: all three indices in range of positions,
 /// normals and texture coordinates, all three positions finite.
 pub(crate) fn triangles(mesh: &PlantMesh) -> impl Iterator<Item = (u32, [usize; 3])> + '_ {
     let vertices = mesh.positions.len().min(mesh.normals.len()).min(mesh.uvs.len());
@@ -25,10 +25,10 @@ pub(crate) fn area(mesh: &PlantMesh, corners: [usize; 3]) -> f32 {
     mesh.area(corners.map(|corner| corner as u32))
 }
 
-/// Triangles of a mesh that hang together: a leaf card, a twig, a trunk.
+/// Connected triangles of a mesh: a leaf card, a twig, a trunk.
 #[derive(Clone, Debug)]
 pub(crate) struct Element {
-    /// Places in `PlantMesh::triangles`, ascending.
+    /// Indices in `PlantMesh::triangles`, ascending.
     pub triangles: Vec<u32>,
     /// Area of one side, square metres.
     pub area: f32,
@@ -40,12 +40,12 @@ pub(crate) struct Element {
 /// its ends and not by index, so that both indexed and unwelded meshes fall into the same cards. Two cards that
 /// touch in one point only (at the twig they grow from) stay apart. In the order of each element's first triangle.
 pub(crate) fn elements(mesh: &PlantMesh) -> Vec<Element> {
-    let mut places: HashMap<[u32; 3], u32> = HashMap::with_capacity(mesh.positions.len());
+    let mut indices: HashMap<[u32; 3], u32> = HashMap::with_capacity(mesh.positions.len());
     let mut place_of = |vertex: usize| {
-        // Adding zero turns -0.0 into 0.0, which is the same place.
+        // Adding zero turns -0.0 into 0.0, which is the same position.
         let key = (mesh.positions[vertex] + Vec3::ZERO).to_array().map(f32::to_bits);
-        let next = places.len() as u32;
-        *places.entry(key).or_insert(next)
+        let next = indices.len() as u32;
+        *indices.entry(key).or_insert(next)
     };
     let valid: Vec<(u32, [usize; 3])> = triangles(mesh).collect();
     let mut edges: Vec<(u32, u32, u32)> = Vec::with_capacity(valid.len() * 3);

@@ -1,11 +1,11 @@
 //! Kinds of leaves: how much of the light passes through them.
 //!
-//! In the plate model of a leaf [Jacquemoud & Baret 1990, "PROSPECT"] reflected and transmitted light come from the same
-//! scattering, so they have the same colour, and what tells the light through a leaf from the light of its face is the
-//! colourless share that the surface reflects ([`Gloss`](super::Gloss)). How much comes through depends on what the leaf is
-//! made of: many scattering layers send light back, few let it pass. So a kind of leaf has one number: its transmittance
-//! over what its inside reflects, as [`PlantMaterial::transmission`](super::PlantMaterial::transmission) has it, here by the
-//! luminances of a typical leaf.
+//! In the plate model of a leaf [Jacquemoud & Baret 1990, "PROSPECT"] reflected and transmitted light come from the
+//! same scattering, so they have the same colour. The difference between the light through a leaf and the light from
+//! its face is the white light that the surface reflects ([`Gloss`](super::Gloss)). The amount of transmission depends
+//! on the leaf's structure: many scattering layers reflect light, few let it pass. So a kind of leaf has one number:
+//! its transmittance over its subsurface albedo, as [`PlantMaterial::transmission`](super::PlantMaterial::transmission)
+//! has it, here by the luminances of a typical leaf.
 //!
 //! | kind | reflectance | transmittance | factor | from |
 //! |---|---|---|--:|---|
@@ -15,18 +15,19 @@
 //! | needle | 0.070 0.128 0.033 | 0.017 0.046 0.000 | 0.5 | PROSPECT-D, thick needle |
 //! | dead | 0.181 0.116 0.065 | 0.107 0.052 0.013 | 0.7 | PROSPECT-D, brown leaf |
 //!
-//! Colours are linear, Rec. 709 primaries, under light of 6504 K. PROSPECT-D: [Féret et al. 2017]; the green leaf has structure
-//! 1.5, chlorophyll 40 and carotenoid 8 µg/cm², water 0.01 and dry matter 0.008 g/cm². Measured: the spectral library of
-//! Helios [Bailey 2019]. A species differs from its kind by a fifth or more; a file's own value
-//! ([`KHR_materials_diffuse_transmission`](super::gltf)) goes before it.
+//! Colours are linear, Rec. 709 primaries, under light of 6504 K. PROSPECT-D: [Féret et al. 2017]; the green leaf has
+//! structure 1.5, chlorophyll 40 and carotenoid 8 µg/cm², water 0.01 and dry matter 0.008 g/cm². Measured: the spectral
+//! library of Helios [Bailey 2019]. A species differs from its kind by a fifth or more; a value in a file
+//! ([`KHR_materials_diffuse_transmission`](super::gltf)) has priority.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-/// What a leaf is made of, as far as light through it is concerned.
+/// The structure of a leaf, as far as its transmission is concerned.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum LeafKind {
-    /// Green leaves of most broadleaved trees and herbs, in autumn colours too: about as much light passes as is reflected.
+    /// Green leaves of most broadleaved trees and herbs, in autumn colours too: about as much light passes as is
+    /// reflected.
     #[default]
     Thin,
     /// Leaves that have just unfolded: thin and pale, more light passes.
@@ -43,7 +44,7 @@ impl LeafKind {
     /// All kinds.
     pub const ALL: [Self; 5] = [Self::Thin, Self::Young, Self::Leathery, Self::Needle, Self::Dead];
 
-    /// Transmittance over what the inside reflects, 0..=2: each channel of
+    /// Transmittance over subsurface albedo, 0..=2: each channel of
     /// [`PlantMaterial::transmission`](super::PlantMaterial::transmission).
     pub const fn factor(self) -> f32 {
         match self {
@@ -59,7 +60,7 @@ impl LeafKind {
         Vec3::splat(self.factor())
     }
 
-    /// Share of the light that a typical leaf reflects, its surface's included: linear colour, 0..1.
+    /// Fraction of the light that a typical leaf reflects, gloss included: linear colour, 0..1.
     pub const fn reflectance(self) -> Vec3 {
         match self {
             Self::Thin => Vec3::new(0.065, 0.127, 0.033),
@@ -70,7 +71,7 @@ impl LeafKind {
         }
     }
 
-    /// Share of the light that a typical leaf transmits: linear colour, 0..1.
+    /// Fraction of the light that a typical leaf transmits: linear colour, 0..1.
     pub const fn transmittance(self) -> Vec3 {
         match self {
             Self::Thin => Vec3::new(0.057, 0.123, 0.0),

@@ -1,4 +1,4 @@
-//! What a tree is: wood and foliage as triangle meshes with materials.
+//! The data of a plant: wood and foliage as triangle meshes with materials.
 //!
 //! A [`Plant`] comes from a glTF file ([`gltf`]) or is grown by rule ([`grow`]). It stands with its trunk's
 //! foot at the origin, Y up, in metres. Everything downstream (bakes, levels of detail, passes) reads this type.
@@ -28,7 +28,7 @@ pub use optics::LeafColors;
 pub struct Plant {
     /// Name for messages and reports.
     pub name: String,
-    /// The parts, each with one material. May be empty (a plant of nothing is drawn as nothing).
+    /// The parts, each with one material. May be empty (nothing is drawn then).
     pub parts: Vec<PlantPart>,
 }
 
@@ -67,7 +67,7 @@ pub struct PlantMesh {
 }
 
 impl PlantMesh {
-    /// Whether the mesh is what it promises, but for the length of its normals: lists of one length, indices below it, finite
+    /// Whether the mesh is valid, apart from the length of its normals: lists of equal length, indices below it, finite
     /// values.
     pub fn is_whole(&self) -> bool {
         let vertices = self.positions.len();
@@ -91,22 +91,23 @@ impl PlantMesh {
 pub struct PlantMaterial {
     /// Linear factor on the base colour, 0..1.
     pub base_color: Vec3,
-    /// Base colour: sRGB-encoded RGB, linear straight alpha. `None` is white and opaque.
+    /// Base colour: sRGB-encoded RGB, linear straight alpha. `None`: white and opaque.
     pub base_color_texture: Option<Arc<RgbaImage>>,
-    /// Tangent-space normals as RGB8, OpenGL convention (+Y up). `None` is flat.
+    /// Tangent-space normals as RGB8, OpenGL convention (+Y up). `None`: flat.
     pub normal_texture: Option<Arc<RgbaImage>>,
     /// Threshold of the alpha test, 0..1; foliage only.
     pub alpha_cutoff: f32,
-    /// Linear colour of the light that passes diffusely through a leaf, as a factor on what its inside reflects (its base
-    /// colour without its [`Gloss`]), 0..=[`PlantMaterial::MOST_TRANSMISSION`] each; zero for wood. [`LeafKind`] has what is
-    /// usual, [`PlantMaterial::transmitted`] gives the light itself.
+    /// Linear colour of diffuse transmission, as a factor on the subsurface albedo (the base colour without its
+    /// [`Gloss`]), 0..=[`PlantMaterial::MOST_TRANSMISSION`] each; zero for wood. [`LeafKind`] has typical values,
+    /// [`PlantMaterial::transmitted`] the resulting light.
     pub transmission: Vec3,
-    /// What the surface of a leaf reflects; wood is matt.
+    /// Specular reflection of the leaf's surface; wood is matt.
     pub gloss: Gloss,
 }
 
 impl PlantMaterial {
-    /// The greatest factor of [`PlantMaterial::transmission`]: dark channels of a file's colours need it.
+    /// The greatest factor of [`PlantMaterial::transmission`]; dark channels of a file's colours need it to be this
+    /// large.
     pub const MOST_TRANSMISSION: f32 = 8.0;
 }
 
@@ -163,9 +164,10 @@ impl Plant {
         self.bounds().map_or(0.0, |b| b.max.y.max(0.0))
     }
 
-    /// Radius in metres of the upright cylinder about the trunk's axis that holds the plant whatever its yaw: the axis is
-    /// seldom the middle of the box, whose corners reach farther than its sides (0 for an empty plant).
-    pub fn reach(&self) -> f32 {
+    /// Radius in metres of the upright cylinder about the trunk's axis that holds the plant at any yaw (0 for an empty
+    /// plant). The axis is seldom the centre of the bounding box, and the box's corners are farther away than its
+    /// sides.
+    pub fn bounding_radius(&self) -> f32 {
         self.bounds().map_or(0.0, |b| {
             let far = b.min.abs().max(b.max.abs());
             far.x.hypot(far.z)

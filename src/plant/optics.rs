@@ -1,4 +1,4 @@
-//! What the leaves of a plant do to light in the mean.
+//! Mean optical properties of a plant's leaves, and the dimensions of its crown.
 
 use glam::{Vec2, Vec3, Vec4};
 use image::RgbaImage;
@@ -6,12 +6,12 @@ use image::RgbaImage;
 use super::{PartKind, Plant, PlantMaterial};
 use crate::math::srgb_to_linear;
 
-/// Share of a crown's extents that counts as its width: single twigs reach farther.
+/// Fraction of a crown's extents that counts as its width, because single twigs stick out.
 const CROWN_SHARE: f32 = 0.8;
-/// Texels along each side of a picture that are looked at, at most.
+/// Maximum number of texels that are sampled along each side of an image.
 const SAMPLES: u32 = 64;
 
-/// Shares of the light, per channel, in the mean over the area of all leaves.
+/// Fractions of the light that leaves reflect and transmit, per channel, mean over the area of all leaves.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LeafColors {
     /// Reflected, 0..=1.
@@ -23,7 +23,7 @@ pub struct LeafColors {
 }
 
 impl Plant {
-    /// The colours of the leaves; black, without area, where there are none.
+    /// The mean colours of the leaves; black with an area of 0 if there are none.
     pub fn leaf_colors(&self) -> LeafColors {
         let mut sum = LeafColors::default();
         for part in self.parts.iter().filter(|part| part.kind == PartKind::Foliage) {
@@ -41,16 +41,16 @@ impl Plant {
         }
     }
 
-    /// Width of the crown over the plant's height: the mean of its extents along x and z, of which a crown fills four fifths.
-    /// 0 where there are no leaves or no height.
+    /// Width of the crown over the plant's height: the mean of its extents along x and z, of which a crown fills four
+    /// fifths. 0 where there are no leaves or no height.
     pub fn crown_width(&self) -> f32 {
         let Some(crown) = self.bounds_of(|kind| kind == PartKind::Foliage) else { return 0.0 };
         let (size, height) = (crown.size(), self.height());
         if height > 0.0 { CROWN_SHARE * 0.5 * (size.x + size.z) / height } else { 0.0 }
     }
 
-    /// Length of the crown over the plant's height, 0..=1: that of a crown which is as full from its base to the top and has
-    /// its leaves, in the mean over their areas, at the same height. 0 where there are no leaves or no height.
+    /// Length of the crown over the plant's height, 0..=1: that of an equally dense crown whose leaves have the same
+    /// mean height, weighted by area. 0 if there are no leaves or no height.
     pub fn crown_length(&self) -> f32 {
         let (mut sum, mut areas) = (0.0, 0.0);
         for mesh in self.parts.iter().filter(|part| part.kind == PartKind::Foliage).map(|part| &part.mesh) {
@@ -73,8 +73,8 @@ fn mean(material: &PlantMaterial) -> (Vec3, Vec3) {
     (reflected, transmitted)
 }
 
-/// Means of `values` of the base colour (0..1) over the texels that pass the alpha test; those of the plain base colour where
-/// there is no texture or nothing passes.
+/// Means of `values` of the base colour (0..1) over the texels that pass the alpha test; those of the plain base colour
+/// where there is no texture or nothing passes.
 pub(super) fn mean_over_leaf<const N: usize>(
     material: &PlantMaterial,
     values: impl Fn(Vec3) -> [Vec3; N],
@@ -95,9 +95,9 @@ pub(super) fn mean_over_leaf<const N: usize>(
     if count > 0.0 { sums.map(|sum| sum / count) } else { of(material.base_color) }
 }
 
-/// Linear colour and alpha of `image`, in the mean over the places at which the base colour of `material` passes the alpha
-/// test; over the whole image where it has no texture or nothing passes. `image` has the texture coordinates of the base
-/// colour. White where it has no texels.
+/// Linear colour and alpha of `image`, in the mean over the places at which the base colour of `material` passes the
+/// alpha test; over the whole image where it has no texture or nothing passes. `image` has the texture coordinates of
+/// the base colour. White where it has no texels.
 pub(super) fn mean_texel(image: &RgbaImage, material: &PlantMaterial) -> Vec4 {
     let mean = |passes: &dyn Fn(Vec2) -> bool, over: &RgbaImage| {
         let texels = grid(over).filter(|&place| passes(place)).filter_map(|place| texel(image, place));

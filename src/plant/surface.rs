@@ -11,7 +11,7 @@ use crate::math::srgb_to_linear;
 /// Linear values of the 256 sRGB codes.
 static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|code| srgb_to_linear(code as f32 / 255.0)));
 
-/// The four texels around a texture coordinate, upper row first, and its place between them, 0..1.
+/// The four texels around a texture coordinate, upper row first, and its position between them, 0..1.
 struct Footprint {
     texels: [usize; 4],
     /// Column and row of the first.

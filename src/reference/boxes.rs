@@ -85,38 +85,38 @@ impl BoxTree {
     }
 
     /// Calls `visit` for the items whose boxes the ray meets, roughly from near to far, with the distance at which it
-    /// enters the box (at least 0). `visit` returns how far the ray reaches from then on; below 0 ends the walk.
+    /// enters the box (at least 0). `visit` returns the ray's new maximum distance; below 0 ends the walk.
     pub fn walk(&self, ray: &WorldRay, mut visit: impl FnMut(usize, f64, f64) -> f64) {
         let origin = ray.origin - self.middle;
         // A component of zero becomes one that is too small to matter, so that no 0 × ∞ arises.
         let inverse = ray.direction.map(|d| if d.abs() > 1e-150 { 1.0 / d } else { 1e150f64.copysign(d) });
-        let enter = |node: &Node, reach: f64| {
+        let enter = |node: &Node, max_distance: f64| {
             let low = (node.min.as_dvec3() - origin) * inverse;
             let high = (node.max.as_dvec3() - origin) * inverse;
             let near = low.min(high).max_element().max(0.0);
-            let far = low.max(high).min_element().min(reach);
+            let far = low.max(high).min_element().min(max_distance);
             (near <= far).then_some(near)
         };
-        let mut reach = ray.t_max;
-        let Some(start) = self.nodes.first().and_then(|root| enter(root, reach)) else { return };
+        let mut max_distance = ray.t_max;
+        let Some(start) = self.nodes.first().and_then(|root| enter(root, max_distance)) else { return };
         let mut stack = [(0u32, start); STACK];
         let mut waiting = 1;
         while waiting > 0 {
             waiting -= 1;
             let (index, near) = stack[waiting];
-            if near > reach {
+            if near > max_distance {
                 continue;
             }
             let node = &self.nodes[index as usize];
             if node.link & LEAF != 0 {
-                reach = visit((node.link & !LEAF) as usize, near, reach);
-                if reach < 0.0 {
+                max_distance = visit((node.link & !LEAF) as usize, near, max_distance);
+                if max_distance < 0.0 {
                     return;
                 }
                 continue;
             }
-            let left = enter(&self.nodes[index as usize + 1], reach).map(|t| (index + 1, t));
-            let right = enter(&self.nodes[node.link as usize], reach).map(|t| (node.link, t));
+            let left = enter(&self.nodes[index as usize + 1], max_distance).map(|t| (index + 1, t));
+            let right = enter(&self.nodes[node.link as usize], max_distance).map(|t| (node.link, t));
             match (left, right) {
                 (Some(a), Some(b)) => {
                     let (near, far) = if a.1 <= b.1 { (a, b) } else { (b, a) };
@@ -183,18 +183,18 @@ fn split(items: &mut [Item]) -> usize {
     let count = best.map_or(0, |(_, cut)| {
         let (mut count, mut rest) = (0, Vec::new());
         // A stable partition, so that the tree is the same everywhere.
-        for place in 0..items.len() {
-            if bin(&items[place]) < cut {
-                items[count] = items[place];
+        for slot in 0..items.len() {
+            if bin(&items[slot]) < cut {
+                items[count] = items[slot];
                 count += 1;
             } else {
-                rest.push(items[place]);
+                rest.push(items[slot]);
             }
         }
         items[count..].copy_from_slice(&rest);
         count
     });
-    // All centres in one place, or none that can be compared: halves as they come.
+    // All centres at one position, or none that can be compared: split by order.
     if count == 0 || count == items.len() { items.len() / 2 } else { count }
 }
 
@@ -235,9 +235,9 @@ mod tests {
                     ..WorldRay::new(origin, direction)
                 };
                 let mut seen = Vec::new();
-                tree.walk(&ray, |item, _, reach| {
+                tree.walk(&ray, |item, _, max_distance| {
                     seen.push(item);
-                    reach
+                    max_distance
                 });
                 for (item, b) in boxes.iter().enumerate() {
                     assert!(!hits(b, &ray) || seen.contains(&item), "box {item}, ray {index}");
@@ -252,12 +252,12 @@ mod tests {
         let flat = WorldBox { min: DVec3::ZERO, max: DVec3::new(1.0, 0.0, 1.0) };
         let tree = BoxTree::new(&[flat; 9]);
         let mut seen = 0;
-        tree.walk(&WorldRay::new(DVec3::new(-1.0, 0.0, 0.5), DVec3::X), |_, near, reach| {
+        tree.walk(&WorldRay::new(DVec3::new(-1.0, 0.0, 0.5), DVec3::X), |_, near, max_distance| {
             assert!((near - 1.0).abs() < 1e-6);
             seen += 1;
-            reach
+            max_distance
         });
         assert_eq!(seen, 9);
-        BoxTree::new(&[]).walk(&WorldRay::new(DVec3::ZERO, DVec3::X), |_, _, reach| reach);
+        BoxTree::new(&[]).walk(&WorldRay::new(DVec3::ZERO, DVec3::X), |_, _, max_distance| max_distance);
     }
 }

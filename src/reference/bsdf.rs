@@ -1,15 +1,16 @@
-//! The leaf, the bark and the ground as light sees them: diffuse reflection, diffuse transmission, and the gloss of leaves.
+//! Scattering by leaves, bark and ground: diffuse reflection, diffuse transmission, and the gloss of leaves.
 //!
-//! The twin of `shade` in `shaders/common/lighting.wgsl` [Franzke 2005, 4.2.2]: a surface sends back `reflected / pi` of the
-//! light on the viewer's side, and `transmitted / pi` of the light on the other. A leaf with gloss reflects diffusely what has
-//! been inside it alone, and the rest of its base colour around the mirror direction, on either side ([`Lobe`]). Which share
-//! is which, and the colour of the light through a leaf, `plant/gloss.rs` derives, as for the shader.
+//! The twin of `shade` in `shaders/common/lighting.wgsl` [Franzke 2005, 4.2.2]: a surface scatters
+//! `reflected / pi` of the light on the viewer's side to the viewer, and `transmitted / pi` of the light on the other
+//! side. A leaf with gloss reflects only its subsurface albedo diffusely, and the rest of its base colour around the
+//! mirror direction, on either side ([`Lobe`]). `plant/gloss.rs` derives both, and the colour of the light through a
+//! leaf, as it does for the shader.
 //!
-//! The shader takes the gloss out of the key light alone and has leaves smaller than a pixel reflect like a ball. Here the
-//! lobe is there for all light, and each leaf mirrors about its own normal.
+//! The shader applies the lobe only to the key light, and leaves smaller than a pixel reflect like a ball. Here the
+//! lobe applies to all light, and each leaf reflects about its own normal.
 //!
-//! Energy: all shares together may not exceed 1. A material that says otherwise is scaled down, channel by channel, to
-//! reflect and transmit 1 together in the ratio that it states; the lobe fits itself into what they leave.
+//! Energy: reflection and transmission together must not exceed 1. A material that exceeds it is scaled down, channel
+//! by channel, to a sum of 1 in the same ratio; the lobe is limited to the rest.
 
 use std::f32::consts::{PI, TAU};
 
@@ -18,35 +19,36 @@ use glam::{Vec2, Vec3};
 use super::lobe::Lobe;
 use crate::plant::Gloss;
 
-/// What a material does with light.
+/// Fractions of light that a material reflects and transmits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Shares {
-    /// Share that is reflected diffusely.
+    /// Fraction that is reflected diffusely.
     pub reflected: Vec3,
-    /// Share that is transmitted diffusely.
+    /// Fraction that is transmitted diffusely.
     pub transmitted: Vec3,
-    /// What is reflected around the mirror direction.
+    /// Specular reflection around the mirror direction.
     pub lobe: Option<Lobe>,
 }
 
 impl Shares {
-    /// A surface without gloss, brought to at most 1.
+    /// A surface without gloss; reflected and transmitted light are scaled to a sum of at most 1.
     pub fn matt(reflected: Vec3, transmitted: Vec3) -> Self {
         let (reflected, transmitted) = (share(reflected), share(transmitted));
         let scale = (reflected + transmitted).max(Vec3::ONE).recip();
         Self { reflected: reflected * scale, transmitted: transmitted * scale, lobe: None }
     }
 
-    /// A surface that reflects `reflected` in the mean over all directions, its gloss included.
+    /// A surface with the albedo `reflected` (mean over all directions), gloss included.
     pub fn glossy(reflected: Vec3, transmitted: Vec3, gloss: Gloss) -> Self {
         let whole = Self::matt(reflected, transmitted);
-        let gloss = gloss.in_range();
+        let gloss = gloss.sanitized();
         if gloss.reflectance <= 0.0 {
             return whole;
         }
-        let inside = gloss.inside(whole.reflected);
-        let (sheen, room) = (whole.reflected - inside, Vec3::ONE - inside - whole.transmitted);
-        Self { reflected: inside, lobe: Lobe::new(sheen, room, gloss.roughness), ..whole }
+        let subsurface_albedo = gloss.subsurface_albedo(whole.reflected);
+        let (specular_albedo, room) =
+            (whole.reflected - subsurface_albedo, Vec3::ONE - subsurface_albedo - whole.transmitted);
+        Self { reflected: subsurface_albedo, lobe: Lobe::new(specular_albedo, room, gloss.roughness), ..whole }
     }
 }
 
@@ -55,7 +57,7 @@ impl Shares {
 pub(crate) struct Bsdf {
     /// Unit normal of the flat surface, on the viewer's side.
     geometric: Vec3,
-    /// Unit normal that the cosine counts from; within a right angle of `geometric`.
+    /// Unit normal for shading; within a right angle of `geometric`.
     shading: Vec3,
     /// Unit vector to the viewer.
     to_viewer: Vec3,
@@ -75,14 +77,14 @@ pub(crate) struct Scattered {
     pub density: f32,
 }
 
-/// `value` kept within 0..1; what is no number becomes 0.
+/// `value` clamped to 0..1; NaN becomes 0.
 fn share(value: Vec3) -> Vec3 {
     Vec3::select(value.cmpge(Vec3::ZERO), value, Vec3::ZERO).min(Vec3::ONE)
 }
 
 impl Bsdf {
-    /// A surface of these shares, seen from the unit direction `to_viewer`. `geometric` and `shading` are unit normals of
-    /// either side.
+    /// A surface of these shares, seen from the unit direction `to_viewer`. `geometric` and `shading` are unit normals
+    /// of either side.
     pub fn new(geometric: Vec3, shading: Vec3, shares: Shares, to_viewer: Vec3) -> Self {
         let geometric = if geometric.dot(to_viewer) < 0.0 { -geometric } else { geometric };
         let shading = if shading.dot(geometric) < 0.0 { -shading } else { shading };
@@ -111,8 +113,8 @@ impl Bsdf {
         }
     }
 
-    /// The probabilities that [`Self::sample`] reflects diffusely and by the lobe; the rest transmits. `None` for a black
-    /// surface.
+    /// The probabilities that [`Self::sample`] reflects diffusely and by the lobe; the rest transmits. `None` for a
+    /// black surface.
     fn probabilities(&self) -> Option<(f32, f32)> {
         let (reflected, transmitted) = (self.shares.reflected.element_sum(), self.shares.transmitted.element_sum());
         let sum = reflected + transmitted + self.gloss;
@@ -132,8 +134,8 @@ impl Bsdf {
     }
 
     /// A direction by the cosine or by the lobe, `choice` in 0..1 choosing between them and the sides. `None` where the
-    /// surface is black or where no light comes from the direction: between the two normals' planes, and where a facet sends
-    /// it against another.
+    /// surface is black or where no light comes from the direction: between the two normals' planes, and where a facet
+    /// sends it against another.
     pub fn sample(&self, choice: f32, point: Vec2) -> Option<Scattered> {
         let (diffuse, gloss) = self.probabilities()?;
         if let Some(lobe) = self.lobe().filter(|_| (diffuse..diffuse + gloss).contains(&choice)) {
@@ -180,10 +182,10 @@ pub(crate) fn cone(axis: Vec3, radius: f32, point: Vec2) -> Vec3 {
     // 1 - cos without cancellation: half a degree of arc leaves no digits in f32 otherwise.
     let depth = 2.0 * (0.5 * radius).sin().powi(2) * point.x;
     let height = 1.0 - depth;
-    let reach = (depth * (2.0 - depth)).max(0.0).sqrt();
+    let sine_to_axis = (depth * (2.0 - depth)).max(0.0).sqrt();
     let (sine, cosine) = (TAU * point.y).sin_cos();
     let (u, v) = axis.any_orthonormal_pair();
-    (u * (reach * cosine) + v * (reach * sine) + axis * height).normalize_or(axis)
+    (u * (sine_to_axis * cosine) + v * (sine_to_axis * sine) + axis * height).normalize_or(axis)
 }
 
 /// Shirley & Chiu's concentric map of the unit square onto the unit disc.
@@ -286,8 +288,8 @@ mod tests {
                 let all = bsdf.shares.reflected + bsdf.shares.transmitted;
                 assert!((even - drawn).abs().max_element() < 4e-3, "{even} {drawn}");
                 assert!(((densities + lost) / count as f32 - 1.0).abs() < 2e-3);
-                // Between the planes of two different normals nothing is scattered: energy is lost there, never made. Of a
-                // glossy leaf more comes to some viewers than in the mean, and less to others.
+                // Between the planes of two different normals nothing is scattered: energy is lost there, never made.
+                // Of a glossy leaf more comes to some viewers than in the mean, and less to others.
                 let most = if bsdf.lobe().is_some() { 0.8 * SHINY.reflectance } else { 0.0 };
                 assert!((drawn - all).max_element() < 2e-3 + most);
                 assert!(shading != Vec3::Y || (drawn - all).min_element() > -2e-3);

@@ -12,38 +12,38 @@ pub struct WorldRay {
     pub origin: DVec3,
     /// Unit vector.
     pub direction: DVec3,
-    /// Metres to which it reaches; may be infinite.
+    /// Maximum distance, metres; may be infinite.
     pub t_max: f64,
 }
 
 impl WorldRay {
-    /// A ray without end.
+    /// A ray of infinite length.
     pub fn new(origin: DVec3, direction: DVec3) -> Self {
         Self { origin, direction, t_max: f64::INFINITY }
     }
 
-    /// The place at `t` metres.
+    /// The position at `t` metres.
     pub fn at(&self, t: f64) -> DVec3 {
         self.origin + t * self.direction
     }
 }
 
-/// A pinhole camera: the perspective projection that the renderer draws a [`Viewpoint`] with, and its near plane.
+/// A pinhole camera: the renderer's perspective projection of a [`Viewpoint`], and its near plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Where it stands and looks.
+    /// Position and direction.
     pub view: Viewpoint,
-    /// Width and height of the picture in pixels.
+    /// Width and height of the image in pixels.
     pub size: (u32, u32),
-    /// Metres to the near plane, 0 or more: nothing before it is seen.
+    /// Distance to the near plane, metres, 0 or more: nothing in front of it is visible.
     pub near: f64,
 }
 
-/// The most pixels of a picture: more than any screen, and few enough that their sums fit into memory.
+/// The most pixels of an image: more than any screen, and few enough that their sums fit into memory.
 const MOST_PIXELS: u64 = 1 << 28;
 
 impl Camera {
-    /// Refuses what is no camera.
+    /// Checks that the camera is valid.
     ///
     /// # Errors
     /// [`ReferenceError::Size`], [`ReferenceError::Value`].
@@ -71,7 +71,7 @@ impl Camera {
         Ok(())
     }
 
-    /// The ray through the place `inside` (0..1 each, from the upper left) of a pixel, from the near plane on.
+    /// The ray through the point `inside` (0..1 each, from the upper left) of a pixel, from the near plane on.
     pub fn ray(&self, column: u32, row: u32, inside: Vec2) -> WorldRay {
         let (width, height) = (f64::from(self.size.0), f64::from(self.size.1));
         let tangent = (0.5 * self.view.field_of_view).tan();

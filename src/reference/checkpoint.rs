@@ -5,7 +5,7 @@
 //! ```
 //!
 //! Little-endian. The fingerprint is that of everything the pixels depend on ([`super::PathTracer::fingerprint`]), the
-//! hash at the end that of all bytes before it. The file appears whole or not at all: it is written beside its place,
+//! hash at the end that of all bytes before it. The file appears whole or not at all: it is written under another name,
 //! then renamed.
 
 use std::fs;
@@ -63,7 +63,7 @@ impl Film {
         };
         let damaged = |what| ReferenceError::Checkpoint { path: path.to_owned(), what };
         if !bytes.starts_with(MAGIC) {
-            return Err(damaged("this is not a checkpoint of a reference picture, or it is one of another version"));
+            return Err(damaged("this is not a checkpoint of a reference render, or it has another version"));
         }
         let Some((content, hash)) = bytes.split_last_chunk::<HASH>() else { return Err(damaged("it is truncated")) };
         if blake3::hash(content).as_bytes() != hash {

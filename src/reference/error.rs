@@ -1,14 +1,14 @@
-//! What can be wrong with a reference scene, its picture or its checkpoint.
+//! What can be wrong with a reference scene, its image or its checkpoint.
 
 use std::path::PathBuf;
 
-/// Why a reference picture cannot be made.
+/// Why a reference image cannot be rendered.
 #[derive(Debug, thiserror::Error)]
 pub enum ReferenceError {
     /// An instance that stands nowhere or has no size.
     #[error("instance {instance}: {what} is {value}; {remedy}")]
     Instance {
-        /// Its place in the list.
+        /// Its index in the list.
         instance: usize,
         /// Which of its values.
         what: &'static str,
@@ -20,7 +20,7 @@ pub enum ReferenceError {
     /// An instance of a plant that is not there.
     #[error("instance {instance} is of plant {plant}, but there are {count} plants")]
     UnknownPlant {
-        /// Its place in the list.
+        /// Its index in the list.
         instance: usize,
         /// The plant that it names.
         plant: usize,
@@ -45,8 +45,8 @@ pub enum ReferenceError {
         /// Vertex of the part.
         vertex: usize,
     },
-    /// A picture without pixels, or with too many.
-    #[error("{width}x{height} is not a size of a picture (expected WIDTHxHEIGHT with 1 to {limit} pixels in all)")]
+    /// An image without pixels, or with too many.
+    #[error("{width}x{height} is not a size of an image (expected WIDTHxHEIGHT with 1 to {limit} pixels in all)")]
     Size {
         /// Width in pixels.
         width: u32,
@@ -55,7 +55,7 @@ pub enum ReferenceError {
         /// The most pixels.
         limit: u64,
     },
-    /// A camera or a light with a value that is no number, or outside its range.
+    /// A camera or a light with a value that is not a number, or outside its range.
     #[error("{what} is {value}; give {range}")]
     Value {
         /// Which value.

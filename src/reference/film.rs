@@ -1,4 +1,4 @@
-//! A picture that grows sample by sample, and the loop that makes it grow.
+//! The film: an image that accumulates samples, and the loop that renders them.
 
 use std::ops::ControlFlow;
 
@@ -12,12 +12,12 @@ use super::path::PathTracer;
 use super::sampler::PathSampler;
 use crate::math::luminance;
 
-/// Pixels along a tile's side: what one task renders.
+/// Edge of a tile in pixels; a task renders one tile.
 const TILE: u32 = 16;
-/// Raised when the same scene is traced otherwise than before, so that no older film is gone on with.
+/// To be raised when the same scene is traced differently, so that no older film is resumed.
 const MODEL: u32 = 2;
 
-/// Sums of radiance over the samples done so far.
+/// Sums of radiance over the samples so far.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
     size: (u32, u32),
@@ -38,7 +38,7 @@ pub struct Shot {
 }
 
 impl Film {
-    /// A film for `shot`, without a sample.
+    /// An empty film for `shot`.
     ///
     /// # Errors
     /// As [`Camera::check`].
@@ -58,7 +58,7 @@ impl Film {
         self.size
     }
 
-    /// Samples done for every pixel.
+    /// Number of samples per pixel so far.
     pub fn samples(&self) -> u32 {
         self.samples
     }
@@ -69,9 +69,9 @@ impl Film {
         self.sums.iter().map(|sum| (*sum * share).as_vec3()).collect()
     }
 
-    /// Standard error of the picture's luminance: the root of the pixels' mean variance, over the picture's mean. An
-    /// estimate from the samples' own spread, as of independent samples: an upper bound for stratified ones. `None`
-    /// below two samples, and for a black picture.
+    /// Standard error of the image's luminance: the root of the pixels' mean variance, over the image's mean. It is
+    /// estimated from the variance of the samples as if they were independent: an upper bound for stratified ones.
+    /// `None` below two samples, and for a black image.
     pub fn relative_error(&self) -> Option<f64> {
         let n = f64::from(self.samples);
         let (mut variance, mut mean) = (0.0, 0.0);
@@ -93,12 +93,12 @@ fn luminance_of(sum: DVec3) -> f64 {
 }
 
 impl PathTracer<'_> {
-    /// Adds samples to `film` until each pixel has `until`. After each pass of one sample a pixel, `hear` gets the
-    /// film, to show or to keep; it may break the work off, and a later call goes on with the same result as if it had
-    /// not.
+    /// Adds samples to `film` until each pixel has `until`. After each pass of one sample per pixel, `hear` gets
+    /// the film, to show or to save it. It may stop the work; a later call continues with the same result as without
+    /// the interruption.
     ///
-    /// Every sample is a function of seed, pixel and number; a pixel's samples are added in their order. So the film's
-    /// bytes depend neither on threads nor on interruptions.
+    /// Every sample is a function of seed, pixel and sample number, and a pixel's samples are added in order. So the
+    /// film's bytes depend neither on threads nor on interruptions.
     ///
     /// # Errors
     /// As [`Camera::check`]; [`ReferenceError::Size`] for a film of another size than the camera's.

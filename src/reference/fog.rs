@@ -1,7 +1,7 @@
 //! The renderer's fog on what the camera sees: the twin of `apply_fog` in `shaders/common/sky.wgsl`.
 //!
-//! The fog is a look, fitted to the sky, and no transport of light; a reference has it so that its pictures can be laid
-//! beside the renderer's. It acts on the camera's own rays, not on those between surfaces.
+//! The fog is a visual effect fitted to the sky, not light transport. A reference has it so that its renders can be
+//! compared with the renderer's. It acts on the camera's own rays, not on those between surfaces.
 
 use std::f32::consts::PI;
 
@@ -44,8 +44,8 @@ impl Fog {
         (sh::irradiance(&self.sky_sh, normal) / PI).max(Vec3::ZERO)
     }
 
-    /// What is left of `radiance` (nits) that comes from the place `relative` to the camera in metres, and what the air
-    /// adds.
+    /// What remains of `radiance` (nits) that comes from the position `relative` to the camera in metres, and what the
+    /// air adds.
     pub fn apply(&self, radiance: Vec3, relative: Vec3) -> Vec3 {
         let transmittance = (-self.params.extinction * self.path(relative)).exp();
         let direction = relative / relative.length().max(1e-3);

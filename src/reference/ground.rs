@@ -59,9 +59,9 @@ impl GroundShape {
         DVec3::new(position.x, self.height(position.x, position.z) + LIFT, position.z)
     }
 
-    /// Where `ray` enters the ground, up to `reach` metres away.
-    pub(crate) fn crossing(&self, ray: &WorldRay, reach: f64) -> Option<Crossing> {
-        let end = ray.t_max.min(reach);
+    /// Where `ray` enters the ground, up to `max_distance` metres away.
+    pub(crate) fn crossing(&self, ray: &WorldRay, max_distance: f64) -> Option<Crossing> {
+        let end = ray.t_max.min(max_distance);
         let above = ray.origin.y - self.height(ray.origin.x, ray.origin.z);
         if above < -TOLERANCE {
             return Some(Crossing::Buried);
@@ -94,8 +94,8 @@ fn descent(terrain: &Terrain, ray: &WorldRay, end: f64) -> Option<f64> {
         return None;
     }
     let above = |t: f64| {
-        let place = ray.at(t);
-        place.y - terrain.height(place.x, place.z)
+        let point = ray.at(t);
+        point.y - terrain.height(point.x, point.z)
     };
     let level = ray.direction.x.hypot(ray.direction.z);
     let short = 0.5 * terrain.field().spacing().min_element();
@@ -196,10 +196,10 @@ mod tests {
         let hills = hills();
         for index in 0..400 {
             let mut sampler = PathSampler::new(1, 0, index);
-            let place = (sampler.pair().as_dvec2() - 0.5) * 900.0;
-            let normal = hills.normal(place.x, place.y);
+            let point = (sampler.pair().as_dvec2() - 0.5) * 900.0;
+            let normal = hills.normal(point.x, point.y);
             let direction = crate::reference::bsdf::cosine_hemisphere(normal, sampler.pair());
-            let origin = hills.lifted(DVec3::new(place.x, 0.0, place.y));
+            let origin = hills.lifted(DVec3::new(point.x, 0.0, point.y));
             if let Some(crossing) = hills.crossing(&WorldRay::new(origin, direction.as_dvec3()), 3000.0) {
                 assert!(matches!(crossing, Crossing::At(t) if t > 0.1), "{crossing:?} {}", normal.dot(direction));
             }

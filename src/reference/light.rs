@@ -1,4 +1,4 @@
-//! The light of a reference picture: the environment, the disc that casts shadows, and what the camera sees of the sky.
+//! The light of a reference render: the environment, the disc that casts shadows, and what the camera sees of the sky.
 
 use std::f32::consts::PI;
 
@@ -10,7 +10,7 @@ use super::sky::{Environment, Sky};
 use crate::light::LightState;
 use crate::light::sun::SUN_ANGULAR_RADIUS;
 
-/// A sun or a moon: a disc of even radiance.
+/// A sun or a moon: a disc of uniform radiance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disc {
     /// Unit vector to its middle.
@@ -21,7 +21,7 @@ pub struct Disc {
     pub angular_radius: f32,
 }
 
-/// A disc as the camera sees it; it lights nothing.
+/// A disc that the camera sees; it lights nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VisibleDisc {
     /// Unit vector to its middle.
@@ -32,25 +32,25 @@ pub struct VisibleDisc {
     pub angular_radius: f32,
 }
 
-/// All light of a picture.
+/// All light of a render.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Light {
-    /// Radiance from everywhere, without the discs.
+    /// Radiance from all directions, without the discs.
     pub environment: Environment,
     /// The light that casts shadows.
     pub key: Option<Disc>,
-    /// What the camera sees before the environment.
+    /// Discs that the camera sees in front of the environment.
     pub visible: Vec<VisibleDisc>,
 }
 
 impl Light {
-    /// Even light from everywhere, nits per channel.
+    /// Uniform light from all directions, nits per channel.
     pub fn even(radiance: Vec3) -> Self {
         Self { environment: Environment::Even(radiance), key: None, visible: Vec::new() }
     }
 
-    /// The light that the renderer draws with: its sky picture, its key light, the discs of sun and moon. Stars are
-    /// left out. `below` replaces what the sky picture has below the horizon by one radiance in nits: for plants alone,
+    /// The light that the renderer draws with: its sky texture, its key light, the discs of sun and moon. Stars are
+    /// left out. `below` replaces the sky texture below the horizon by one radiance in nits: for plants alone,
     /// the ground's; a scene with a ground of its own needs none.
     pub fn of(state: &LightState, below: Option<Vec3>) -> Self {
         let key = Disc {
@@ -76,7 +76,7 @@ impl Light {
         }
     }
 
-    /// The same without the light that casts shadows; its disc is still seen.
+    /// The same without the light that casts shadows; its disc stays visible.
     pub fn without_key(self) -> Self {
         Self { key: None, ..self }
     }
@@ -86,7 +86,7 @@ impl Light {
         Self { environment: Environment::Even(Vec3::ZERO), ..self }
     }
 
-    /// The light, checked and ready to be drawn from, over a scene with or without a ground.
+    /// Checks the light and prepares it for sampling, for a scene with or without a ground.
     pub(crate) fn prepare(&self, ground: bool) -> Result<PreparedLight, ReferenceError> {
         let unit = |what, direction: Vec3| {
             let length = f64::from(direction.length());
@@ -124,7 +124,7 @@ impl Light {
     }
 }
 
-/// Light that directions can be drawn from.
+/// Light whose directions can be sampled.
 #[derive(Clone, Debug)]
 pub(crate) struct PreparedLight {
     pub sky: Sky,

@@ -1,4 +1,4 @@
-//! The gloss of a leaf: light that its surface reflects without letting it in, around the mirror direction.
+//! The specular lobe of a leaf: light that its surface reflects without letting it in, around the mirror direction.
 //!
 //! The lobe has the form of `leaf_gloss` in `shaders/common/lighting.wgsl`, the specular term of [Franzke 2005, 4.2.2]:
 //!
@@ -10,14 +10,14 @@
 //! ```
 //!
 //! # Energy
-//! Light that one facet sends against another is lost (single scattering), and facets of a rough leaf are seldom met at the
-//! grazing angles where F is large: with the strength `sheen` the lobe carries, in the mean over all directions, 0.76 of it
-//! at a width of 0.1, 0.46 at 0.4 and 0.23 at 1. That share of a leaf's light has been measured whole, so the strength is
-//! raised to carry it ([`lobe_gain`]), here and in the shader.
+//! Light that one facet sends against another is lost (single scattering), and facets of a rough leaf are seldom met at
+//! the grazing angles where F is large: a lobe whose strength is the specular albedo reflects, in the mean over all
+//! directions, only 0.76 of it at a width of 0.1, 0.46 at 0.4 and 0.23 at 1. The measured albedo is the whole, so the
+//! strength is raised accordingly ([`lobe_gain`]), here and in the shader.
 //!
-//! A viewer in the surface's plane gets most: 4.7 to 1 times the strength ([`lobe_peak`]). Where that is more than a bright leaf's
-//! diffuse light leaves, the lobe is scaled down, channel by channel; for a viewer anywhere else it is then less than there
-//! is. A green leaf, which absorbs most, is far from it.
+//! A viewer in the surface's plane gets most: 4.7 to 1 times the strength ([`lobe_peak`]). Where that and a bright
+//! leaf's diffuse light would exceed 1, the lobe is scaled down, channel by channel; viewers elsewhere then get too
+//! little. A green leaf, which absorbs most light, is far from that limit.
 
 use std::f32::consts::{FRAC_1_PI, TAU};
 
@@ -32,21 +32,22 @@ pub(crate) struct Lobe {
     strength: Vec3,
     /// Root mean square slope of the facets, 0.1..=1.
     width: f32,
-    /// About what comes of a strength of 1 to a viewer before the surface, and what in its plane.
+    /// Approximate light that a strength of 1 reflects to a viewer in front of the surface, and to one in its plane.
     before: f32,
     peak: f32,
 }
 
 impl Lobe {
-    /// The lobe that carries the share `sheen` of the light, or what the diffuse light leaves of it in `room`; both 0..1.
-    /// `width`: 0.1..=1. `None` where there is nothing to carry.
-    pub fn new(sheen: Vec3, room: Vec3, width: f32) -> Option<Self> {
+    /// A lobe that reflects the fraction `specular_albedo` of the light, at most `room`, which the diffuse light leaves
+    /// over; both 0..1. `width`: 0.1..=1. `None` if the lobe reflects nothing.
+    pub fn new(specular_albedo: Vec3, room: Vec3, width: f32) -> Option<Self> {
         let (gain, peak) = (lobe_gain(width), lobe_peak(width));
-        let strength = (sheen * gain).min(room.max(Vec3::ZERO) / peak);
+        let strength = (specular_albedo * gain).min(room.max(Vec3::ZERO) / peak);
         (strength.max_element() > 0.0).then_some(Self { strength, width, before: 0.75 / gain, peak })
     }
 
-    /// About what the lobe returns to a viewer at the cosine `to_viewer` to the normal, summed over the channels.
+    /// Approximate light that the lobe reflects to a viewer at the cosine `to_viewer` to the normal, summed over
+    /// channels.
     pub fn weight(&self, to_viewer: f32) -> f32 {
         let grazing = (1.0 - to_viewer).clamp(0.0, 1.0).powi(5);
         self.strength.element_sum() * (self.before + (self.peak - self.before) * grazing)
@@ -63,7 +64,7 @@ impl Lobe {
         self.strength * (fresnel * self.distribution(nm) * 0.5 * nl / masking.max(f32::MIN_POSITIVE))
     }
 
-    /// Probability density with which [`Self::sample`] finds `to_light`, 1/sr, for a viewer before the surface.
+    /// Probability density with which [`Self::sample`] draws `to_light`, 1/sr, for a viewer in front of the surface.
     pub fn density(&self, normal: Vec3, to_viewer: Vec3, to_light: Vec3) -> f32 {
         let nv = normal.dot(to_viewer).max(0.0);
         let Some((nm, _)) = middle(normal, to_viewer, to_light) else { return 0.0 };
@@ -72,8 +73,8 @@ impl Lobe {
         0.5 * self.distribution(nm) / (nv + (squared + (1.0 - squared) * nv * nv).sqrt())
     }
 
-    /// A direction mirrored at a facet that the viewer sees, drawn as in Dupuy & Benyoub 2023, "Sampling Visible GGX Normals
-    /// with Spherical Caps". It may lie behind the surface, where the lobe is 0.
+    /// A direction mirrored at a facet that the viewer sees, drawn as in Dupuy & Benyoub 2023, "Sampling Visible GGX
+    /// Normals with Spherical Caps". It may lie behind the surface, where the lobe is 0.
     pub fn sample(&self, normal: Vec3, to_viewer: Vec3, point: Vec2) -> Vec3 {
         let (u, v) = normal.any_orthonormal_pair();
         let stretch = Vec3::new(self.width, self.width, 1.0);
@@ -90,13 +91,13 @@ impl Lobe {
     /// Density of the facets' normals at the cosine `nm` to the normal, 1/sr.
     fn distribution(&self, nm: f32) -> f32 {
         let squared = self.width * self.width;
-        let spread = nm * nm * (squared - 1.0) + 1.0;
-        squared * FRAC_1_PI / (spread * spread)
+        let denominator = nm * nm * (squared - 1.0) + 1.0;
+        squared * FRAC_1_PI / (denominator * denominator)
     }
 }
 
-/// Cosines of the facet that mirrors one direction to the other: to the normal, and to either direction. `None` where they
-/// are opposite, so that any facet along the surface would do, and for facets that face into it.
+/// Cosines of the facet that mirrors one direction to the other: to the normal, and to either direction. `None` where
+/// they are opposite, so that any facet along the surface would do, and for facets that face into it.
 fn middle(normal: Vec3, to_viewer: Vec3, to_light: Vec3) -> Option<(f32, f32)> {
     let between = to_viewer + to_light;
     let length = between.length();
@@ -113,8 +114,8 @@ mod tests {
     const WIDTHS: [f32; 4] = [0.1, 0.25, 0.4, 1.0];
 
     /// A lobe that is not scaled down.
-    fn lobe(sheen: f32, width: f32) -> Lobe {
-        Lobe::new(Vec3::splat(sheen), Vec3::ONE, width).unwrap()
+    fn lobe(specular_albedo: f32, width: f32) -> Lobe {
+        Lobe::new(Vec3::splat(specular_albedo), Vec3::ONE, width).unwrap()
     }
 
     fn direction(height: f32, azimuth: f32) -> Vec3 {
@@ -135,21 +136,21 @@ mod tests {
 
     /// `leaf_gloss` of `shaders/common/lighting.wgsl` in f64, over pi: what it sends back of one lux where nothing else
     /// reflects.
-    fn shader(normal: Vec3, to_viewer: Vec3, to_light: Vec3, sheen: f64, width: f64) -> f64 {
+    fn shader(normal: Vec3, to_viewer: Vec3, to_light: Vec3, specular_albedo: f64, width: f64) -> f64 {
         let (normal, viewer, light) = (normal.as_dvec3(), to_viewer.as_dvec3(), to_light.as_dvec3());
         let middle = (viewer + light).normalize();
         let fresnel = 0.5 + 10.5 * (1.0 - middle.dot(light)).clamp(0.0, 1.0).powi(5);
         let nl = normal.dot(light).clamp(0.0, 1.0);
         let nv = normal.dot(viewer).abs().max(1e-3);
         let nm = normal.dot(middle).clamp(0.0, 1.0);
-        let spread = nm * nm * (width * width - 1.0) + 1.0;
-        let distribution = width * width / (spread * spread);
+        let denominator = nm * nm * (width * width - 1.0) + 1.0;
+        let distribution = width * width / (denominator * denominator);
         let masking = 0.5 / ((1.0 - width) * 2.0 * nl * nv + width * (nl + nv)).max(1e-4);
-        let strength = sheen * f64::from(lobe_gain(width as f32));
+        let strength = specular_albedo * f64::from(lobe_gain(width as f32));
         strength * fresnel * distribution * masking * nl / std::f64::consts::PI
     }
 
-    /// What [`shader`] carries in the mean over all directions, by quadrature over facets and viewers.
+    /// Albedo of [`shader`], the mean over all directions, by quadrature over facets and viewers.
     fn carried(width: f64) -> f64 {
         let (viewers, around, slopes) = (48, 96, 192);
         let mut sum = 0.0;
@@ -157,9 +158,10 @@ mod tests {
             let at = |index: i32, count: i32| (f64::from(index) + 0.5) / f64::from(count);
             let height = at(i, viewers);
             let viewer = glam::DVec3::new((1.0 - height * height).sqrt(), height, 0.0);
-            // Facets as they are spread, D · cosine; light mirrored by them has a quarter of their density over the cosine.
-            let (spread, azimuth) = (at(k, slopes), at(j, around) * std::f64::consts::TAU);
-            let slope = width * (spread / (1.0 - spread)).sqrt();
+            // Facets distributed by D · cosine; the light that they mirror has a quarter of their density over the
+            // cosine.
+            let (fraction, azimuth) = (at(k, slopes), at(j, around) * std::f64::consts::TAU);
+            let slope = width * (fraction / (1.0 - fraction)).sqrt();
             let facet = glam::DVec3::new(slope * azimuth.cos(), 1.0, slope * azimuth.sin()).normalize();
             let cosine = facet.dot(viewer);
             let light = facet * (2.0 * cosine) - viewer;

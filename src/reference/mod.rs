@@ -1,26 +1,26 @@
-//! The ground truth: a path tracer on the processor, over the same scene as the renderer.
+//! The ground truth: a path tracer on the CPU, for the same scenes as the renderer.
 //!
 //! ```text
 //! plants, instances, ground --> ReferenceScene --.
-//!                                                 +-> PathTracer --> Film: OpenEXR, picture, checkpoint
+//!                                                 +-> PathTracer --> Film: OpenEXR, image, checkpoint
 //! LightState --> Light --------------------------'       |
 //!                                                        '-> radiance of single points
 //! ```
 //!
-//! What the renderer approximates is followed here ray by ray: the shadows of every leaf, of the relief and of the sun's
-//! disc, the light of the sky between the leaves, the light that leaves pass on to each other, without an ambient term
-//! and without levels of detail. What the renderer *states* is the same: meshes, alpha tests, base colours, transmission
-//! and tints, the heights of the ground, the picture of the sky, the key light, exposure, and, on demand, the fog.
+//! It traces ray by ray what the renderer approximates: the shadows of every leaf and of the relief, the penumbra of
+//! the sun's disc, skylight between the leaves, and light that leaves scatter to each other, without an ambient term
+//! and without levels of detail. The inputs are the same: meshes, alpha tests, base colours, transmission and tints,
+//! the heights of the ground, the sky texture, the key light, exposure, and, on request, the fog.
 //!
-//! # How true it is
-//! - Unbiased for what it models, up to rounding, as long as `limit` and `bounces` are left alone; noise falls with the
-//!   root of the samples or faster.
-//! - Surfaces are diffuse, and leaves glossy on both sides: for all light, about each leaf's own normal. No gloss of bark, no
-//!   normal maps. Light passes a leaf where it hits it.
+//! # Accuracy
+//! - Unbiased for what it models, up to rounding, unless `limit` or `bounces` are set. Noise falls with the square root
+//!   of the number of samples or faster.
+//! - Surfaces are diffuse; leaves are also glossy on both sides, for all light, about each leaf's own normal. Bark has
+//!   no gloss, and there are no normal maps. Light leaves a leaf at the point where it enters it.
 //! - Interpolated normals of wood lose a little light (see [`Normals`]).
-//! - The ground is met as the smooth surface, where the renderer draws triangles of it; detail in its normal is left
-//!   out. Rays look for it to a set distance and see the sky's picture beyond.
-//! - Light is not scattered by the air between surfaces. Stars are left out.
+//! - The ground is the smooth surface of which the renderer draws triangles, without the detail of its normal. Rays
+//!   find it up to a set distance and see the sky texture beyond.
+//! - The air between surfaces does not scatter light. There are no stars.
 
 mod boxes;
 mod bsdf;

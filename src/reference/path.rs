@@ -1,4 +1,4 @@
-//! Light along paths: what arrives at the camera, and what a point of a leaf sends out.
+//! Path tracing: the radiance that arrives at the camera, and that which leaves a point of a leaf.
 //!
 //! Unidirectional path tracing (Kajiya 1986; Pharr, Jakob & Humphreys 2023, 13) with next-event estimation. At each
 //! surface one ray goes to the key light's disc, one to the sky by its brightness, and the path goes on by the
@@ -15,22 +15,22 @@ use super::scene::{Normals, ReferenceScene, Surface};
 
 /// Surfaces of a path before Russian roulette.
 const SURE: u32 = 3;
-/// The most that roulette lets a path survive by: no path is endless.
+/// The greatest probability of survival in Russian roulette, so that no path is endless.
 const MOST_SURVIVAL: f32 = 0.95;
 
-/// How light is traced.
+/// Settings of the path tracer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TraceSettings {
-    /// How often light may be scattered between surfaces before the last one sends it to the viewer. 0: light that
-    /// comes straight from sun and sky only. `u32::MAX`: as often as it will (default). A stand of grown
+    /// Maximum number of bounces between surfaces before the last one scatters the light to the viewer. 0: only light
+    /// directly from sun and sky. `u32::MAX`: no limit (default). A stand of grown
     /// broadleaves seen from above loses 7 % of its light at 0 bounces, 0.7 % at one, 0.07 % at two.
     pub bounces: u32,
-    /// Seed of the random numbers. Pictures of different seeds have independent noise.
+    /// Seed of the random numbers. Renders with different seeds have independent noise.
     pub seed: u64,
-    /// Which normals cosines are counted from.
+    /// The normals that shading uses.
     pub normals: Normals,
-    /// The most radiance in nits that one sample may have; above 0. Lower takes fireflies away and light with them: any
-    /// limit is a bias. Default: none.
+    /// Maximum radiance of one sample in nits, above 0. A lower limit removes fireflies and light with them: any limit
+    /// is a bias. Default: no limit.
     pub limit: f32,
 }
 
@@ -40,7 +40,7 @@ impl Default for TraceSettings {
     }
 }
 
-/// A scene and its light: what paths are traced through.
+/// A scene and its light, ready for path tracing.
 pub struct PathTracer<'a> {
     scene: &'a ReferenceScene,
     light: PreparedLight,

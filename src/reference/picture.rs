@@ -1,8 +1,8 @@
-//! From radiance to files and to what a screen shows.
+//! From radiance to files and to images for a screen.
 //!
-//! A screen shows a reference as the renderer would show the same radiance: exposure, night sight, tone curve, sRGB and
-//! the noise against banding, in the renderer's order. The renderer applies night sight to each sample before they are
-//! averaged; here it acts on the pixel's mean, which differs by night and at edges only.
+//! A reference is displayed as the renderer would display the same radiance: exposure, night vision, tone curve, sRGB
+//! and dithering, in the renderer's order. The renderer applies night vision to each sample before averaging; here it
+//! acts on the pixel's mean, which differs only at night and at edges.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -42,7 +42,7 @@ impl ToneTable {
         Ok(Self { size, texels: texels.into_iter().map(finite).collect() })
     }
 
-    /// What a screen shows, linear, of exposed radiance: trilinear as a GPU samples it.
+    /// Linear display colour of exposed radiance: trilinear, as a GPU samples it.
     pub fn map(&self, exposed: Vec3) -> Vec3 {
         let last = (self.size - 1) as f32;
         let stop = |value: f32| {
@@ -56,8 +56,8 @@ impl ToneTable {
         let low = at.map(|c| (c as usize).min(self.size - 2) as f32);
         let f = at - low;
         let texel = |r: usize, g: usize, b: usize| {
-            let place = |axis: usize, step: usize| low[axis] as usize + step;
-            self.texels[(place(2, b) * self.size + place(1, g)) * self.size + place(0, r)]
+            let position = |axis: usize, step: usize| low[axis] as usize + step;
+            self.texels[(position(2, b) * self.size + position(1, g)) * self.size + position(0, r)]
         };
         let row = |g: usize, b: usize| texel(0, g, b).lerp(texel(1, g, b), f.x);
         let layer = |b: usize| row(0, b).lerp(row(1, b), f.y);
@@ -65,21 +65,21 @@ impl ToneTable {
     }
 }
 
-/// How radiance becomes a picture for a screen.
+/// How radiance is converted to an image for a screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Development<'a> {
     /// From nits to display values.
     pub exposure: f32,
-    /// Night sight.
+    /// Night vision.
     pub night: ScotopicTint,
-    /// The tone curve; without one, what is brighter than white is clipped.
+    /// The tone curve; without one, values brighter than white are clipped.
     pub tone: Option<&'a ToneTable>,
-    /// Whether the noise is added by which Bevy breaks up bands, half a code of 255 at most.
+    /// Whether Bevy's dithering against banding is applied, at most half a code of 255.
     pub dither: bool,
 }
 
 impl<'a> Development<'a> {
-    /// As the renderer develops the light `state`.
+    /// The renderer's conversion for the light `state`.
     pub fn of(state: &LightState, tone: Option<&'a ToneTable>) -> Self {
         Self { exposure: state.exposure, night: state.scotopic, tone, dither: true }
     }
@@ -90,8 +90,8 @@ impl<'a> Development<'a> {
         let mut shown = self.tone.map_or(exposed, |table| table.map(exposed));
         if self.dither {
             // `screen_space_dither` of Bevy's tonemapping_shared.wgsl (Vlachos 2015), at the pixel's middle.
-            let place = 171.0 * (column as f32 + 0.5) + 231.0 * (row as f32 + 0.5);
-            let noise = Vec3::new(103.0, 71.0, 97.0).map(|period| (place / period).fract());
+            let position = 171.0 * (column as f32 + 0.5) + 231.0 * (row as f32 + 0.5);
+            let noise = Vec3::new(103.0, 71.0, 97.0).map(|period| (position / period).fract());
             let encoded = shown.max(Vec3::ZERO).map(|c| c.powf(1.0 / 2.2)) + (noise - 0.5) / 255.0;
             shown = encoded.max(Vec3::ZERO).map(|c| c.powf(2.2));
         }
@@ -100,7 +100,7 @@ impl<'a> Development<'a> {
 }
 
 impl Film {
-    /// The picture as a screen shows it: sRGB, three bytes a pixel, row by row from the top.
+    /// The image as a screen shows it: sRGB, three bytes a pixel, row by row from the top.
     pub fn develop(&self, development: &Development) -> Vec<u8> {
         let width = self.size().0 as usize;
         let code = |(at, radiance): (usize, Vec3)| development.code(radiance, (at % width) as u32, (at / width) as u32);
@@ -126,7 +126,7 @@ impl Film {
 mod tests {
     use super::*;
 
-    /// A table that shows each channel's place between the darkest and the brightest stop.
+    /// A table that shows each channel's position between the darkest and the brightest stop.
     fn table() -> ToneTable {
         let at = |i: usize| i as f32 / 3.0;
         let texels = (0..64).map(|i| Vec3::new(at(i % 4), at(i / 4 % 4), at(i / 16))).collect();

@@ -1,7 +1,7 @@
-//! Exitant radiance of single points: what a bake of radiance transfer is measured against.
+//! Exitant radiance of single points: the reference for bakes of radiance transfer.
 //!
-//! A point has no viewer, so it sends all that it reflects evenly to its side, its gloss too, as a bake has it; the surfaces
-//! that its light comes from have their lobes.
+//! A point has no viewer, so it reflects diffusely, gloss included, as in a bake. The surfaces that light it have their
+//! specular lobes.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -17,20 +17,20 @@ use crate::trace::Hit;
 /// A point of an instance's surface, in its plant's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceSample {
-    /// Where, metres.
+    /// Position, metres.
     pub position: Vec3,
     /// Unit normal, from which cosines are counted and which tells the front from the back.
     pub normal: Vec3,
-    /// Share of the light that is reflected. May be white, for the light alone.
+    /// Fraction of the light that is reflected. May be white, to get the light alone.
     pub reflected: Vec3,
-    /// Share of the light that is transmitted; 0 for wood.
+    /// Fraction of the light that is transmitted; 0 for wood.
     pub transmitted: Vec3,
 }
 
 impl PathTracer<'_> {
-    /// The vertices of a part of an instance as points, in the order of the mesh: colours from texture and material, not
-    /// tinted; normals as the settings' [`Normals`] ask, the flat one of a vertex being the mean of its triangles' by
-    /// their area. `None` for a vertex that no triangle with an area uses: there is no surface.
+    /// The vertices of a part of an instance as points, in the order of the mesh: colours from texture and material,
+    /// not tinted; normals as the settings' [`Normals`] ask, the flat one of a vertex being the mean of its triangles'
+    /// by their area. `None` for a vertex that no triangle with an area uses: there is no surface.
     ///
     /// # Errors
     /// [`ReferenceError::UnknownVertex`] where there is no such part.
@@ -76,7 +76,7 @@ impl PathTracer<'_> {
     }
 
     /// Exitant radiance in nits of points of an instance, on the front (0) and the back (1), each the mean of `samples`
-    /// paths. Points are independent of each other; a point's result depends on its place in the list.
+    /// paths. Points are independent of each other; a point's result depends on its index in the list.
     ///
     /// # Errors
     /// [`ReferenceError::UnknownVertex`] where there is no such instance.

@@ -1,12 +1,12 @@
 //! Random numbers of a path: Owen-scrambled Sobol points, padded pair by pair.
 //!
-//! After B. Burley 2020, "Practical Hash-based Owen Scrambling", JCGT 9(4): each pair of dimensions of a pixel takes the
-//! first two Sobol dimensions, a (0, 2)-sequence in base 2, with its index shuffled and its digits scrambled by nested
-//! uniform permutations of their own. Any prefix of a power of two samples is stratified in every pair, and a picture
-//! can go on from any sample.
+//! After B. Burley 2020, "Practical Hash-based Owen Scrambling", JCGT 9(4): each pair of dimensions of a pixel takes
+//! the first two Sobol dimensions, a (0, 2)-sequence in base 2, with its index shuffled and its digits scrambled by
+//! nested uniform permutations of their own. Any prefix of a power of two samples is stratified in every pair, and an
+//! image can go on from any sample.
 //!
 //! A number depends on the seed, the pixel, the sample and the dimension alone: neither threads nor tiles, nor where a
-//! picture was interrupted, change it.
+//! render was interrupted, change it.
 
 use glam::Vec2;
 
@@ -42,8 +42,8 @@ fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / (1u32 << 24) as f32)
 }
 
-/// The second Sobol dimension of `index`, as digits after the point. Its generator matrix is Pascal's triangle modulo 2:
-/// the product of five factors, one for each bit of a digit's place.
+/// The second Sobol dimension of `index`, as digits after the point. Its generator matrix is Pascal's triangle modulo
+/// 2: the product of five factors, one for each bit of a digit's place.
 fn sobol_second(index: u32) -> u32 {
     let mut x = index;
     x ^= (x & 0xAAAA_AAAA) >> 1;

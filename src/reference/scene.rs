@@ -1,4 +1,4 @@
-//! What a reference picture shows: instances of plants on a ground.
+//! The scene of a reference render: instances of plants on a ground.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use crate::plant::{Gloss, PartKind, Plant};
 use crate::scatter::PackedStand;
 use crate::trace::{Hit, PlantTracer, Ray, SurfacePoint, leave, offset_origin};
 
-/// Share of a plant's size by which its rays start before its box.
+/// Distance in front of a plant's box at which its rays start, as a fraction of the plant's size.
 const MARGIN: f64 = 0.01;
 /// Largest coordinate of a foot, metres.
 const FARTHEST: f64 = 1e8;
@@ -23,11 +23,11 @@ const FARTHEST: f64 = 1e8;
 /// One plant of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instance {
-    /// Which plant.
+    /// Index of the plant.
     pub plant: usize,
     /// Its foot, scene metres, each within ±1e8.
     pub position: DVec3,
-    /// Turn about the vertical in radians, counter-clockwise seen from above.
+    /// Rotation about the vertical in radians, counter-clockwise seen from above.
     pub yaw: f32,
     /// Factor on the plant's size, 1e-6 to 1e6.
     pub scale: f32,
@@ -36,8 +36,8 @@ pub struct Instance {
 }
 
 impl Instance {
-    /// The trees of a stand as the renderer draws them, rounded to their 16 bytes. `origin` is the scene position of the
-    /// stand's own origin.
+    /// The trees of a stand as the renderer draws them, rounded to their 16 bytes. `origin` is the scene position of
+    /// the stand's own origin.
     pub fn of_stand(stand: &PackedStand, origin: DVec3) -> Vec<Self> {
         let tree = |tree: &crate::scatter::PackedTree| Self {
             plant: tree.variant().into(),
@@ -70,12 +70,12 @@ impl Instance {
     }
 }
 
-/// What the ground looks like.
+/// Colour of the ground.
 #[derive(Clone, Debug)]
 pub enum GroundColor {
-    /// One albedo, 0..1 a channel.
+    /// One albedo, 0..1 per channel.
     Even(Vec3),
-    /// As the renderer colours its terrain.
+    /// The same colours as the renderer's terrain.
     Soil(Arc<Soil>),
 }
 
@@ -86,18 +86,19 @@ pub struct Ground {
     pub shape: GroundShape,
     /// Its colour.
     pub color: GroundColor,
-    /// Metres to which rays look for it: more sees farther, and costs rays that run along the ground. The renderer
-    /// draws the ground to its view distance.
-    pub reach: f64,
+    /// Maximum distance at which rays find it, metres. More shows more, and costs time for rays that run along the
+    /// ground. The renderer draws the ground to its view distance.
+    pub max_distance: f64,
 }
 
-/// Which normals cosines are counted from. Where they are interpolated, light from behind the flat triangle is left
-/// out: some energy is lost there, none is made, and reflection is no longer exactly reciprocal.
+/// The normals that shading uses. Where they are interpolated, light from behind the flat triangle is ignored: some
+/// energy is lost there, none is created, and reflection is no longer exactly reciprocal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Normals {
-    /// The triangles' own: exact for what is modelled, facets included.
+    /// Those of the triangles: exact for the mesh as it is, facets included.
     Flat,
-    /// Interpolated on wood, so that a trunk of few sides is round; leaves, which are flat, have their triangles' own.
+    /// Interpolated on wood, so that a trunk with few sides looks round; leaves, which are flat, use those of their
+    /// triangles.
     #[default]
     RoundWood,
     /// Interpolated everywhere, as the renderer's `local` lighting has them.
@@ -109,7 +110,7 @@ pub enum Normals {
 struct Placed {
     position: DVec3,
     /// Sine and cosine of the yaw.
-    turn: (f64, f64),
+    yaw_sin_cos: (f64, f64),
     scale: f64,
     plant: u32,
     tint: f32,
@@ -117,12 +118,12 @@ struct Placed {
 
 impl Placed {
     fn into_plant(self, v: DVec3) -> DVec3 {
-        let (s, c) = self.turn;
+        let (s, c) = self.yaw_sin_cos;
         DVec3::new(c * v.x - s * v.z, v.y, s * v.x + c * v.z)
     }
 
     fn into_scene(self, v: DVec3) -> DVec3 {
-        let (s, c) = self.turn;
+        let (s, c) = self.yaw_sin_cos;
         DVec3::new(c * v.x + s * v.z, v.y, c * v.z - s * v.x)
     }
 
@@ -196,8 +197,12 @@ impl ReferenceScene {
             instance.check(index, plants.len())?;
         }
         if let Some(ground) = &ground {
-            if !(0.0..=1e7).contains(&ground.reach) {
-                return Err(ReferenceError::value("the reach of the ground", ground.reach, "metres from 0 to 1e7"));
+            if !(0.0..=1e7).contains(&ground.max_distance) {
+                return Err(ReferenceError::value(
+                    "the max distance of the ground",
+                    ground.max_distance,
+                    "metres from 0 to 1e7",
+                ));
             }
             if let GroundShape::Plane(height) = ground.shape
                 && !(-FARTHEST..=FARTHEST).contains(&height)
@@ -210,7 +215,7 @@ impl ReferenceScene {
             .iter()
             .map(|instance| Placed {
                 position: instance.position,
-                turn: f64::from(instance.yaw).sin_cos(),
+                yaw_sin_cos: f64::from(instance.yaw).sin_cos(),
                 scale: instance.scale.into(),
                 plant: instance.plant as u32,
                 tint: instance.tint,
@@ -245,12 +250,12 @@ impl ReferenceScene {
 
     /// The ray in the frame of an instance whose box it enters at `near`, with where it starts there.
     ///
-    /// It is moved up to the plant, and in f64: in f32 the ray of a camera a kilometre away would be off by a tenth of a
-    /// millimetre. It starts a little before the box, on whose very side there may be a leaf.
-    fn at_instance(&self, ray: &WorldRay, index: usize, near: f64, reach: f64) -> (&Placed, Ray, f64) {
+    /// It is moved up to the plant, and in f64: in f32 the ray of a camera a kilometre away would be off by a tenth of
+    /// a millimetre. It starts a little before the box, on whose very side there may be a leaf.
+    fn at_instance(&self, ray: &WorldRay, index: usize, near: f64, max_distance: f64) -> (&Placed, Ray, f64) {
         let placed = &self.instances[index];
         let start = (near - self.margins[placed.plant as usize] * placed.scale).max(0.0);
-        (placed, placed.ray(ray, start, reach), start)
+        (placed, placed.ray(ray, start, max_distance), start)
     }
 
     /// Metres to what the ray meets first; 0 under the ground, `None` where it meets nothing.
@@ -264,15 +269,15 @@ impl ReferenceScene {
     pub(crate) fn closest(&self, ray: &WorldRay) -> Option<Found> {
         let mut found = None;
         let mut end = ray.t_max;
-        self.tree.walk(ray, |index, near, reach| {
-            let (placed, local, start) = self.at_instance(ray, index, near, reach);
-            let Some(hit) = self.tracers[placed.plant as usize].closest(&local) else { return reach };
+        self.tree.walk(ray, |index, near, max_distance| {
+            let (placed, local, start) = self.at_instance(ray, index, near, max_distance);
+            let Some(hit) = self.tracers[placed.plant as usize].closest(&local) else { return max_distance };
             found = Some(Found::Plant { instance: index, hit });
             end = start + f64::from(hit.t) * placed.scale;
             end
         });
         let Some(ground) = &self.ground else { return found };
-        match ground.shape.crossing(&WorldRay { t_max: end, ..*ray }, ground.reach) {
+        match ground.shape.crossing(&WorldRay { t_max: end, ..*ray }, ground.max_distance) {
             Some(Crossing::At(t)) => Some(Found::Ground { position: ray.at(t) }),
             Some(Crossing::Buried) => Some(Found::Buried),
             None => found,
@@ -282,12 +287,12 @@ impl ReferenceScene {
     /// Whether the ray meets anything.
     pub fn occluded(&self, ray: &WorldRay) -> bool {
         let mut met = false;
-        self.tree.walk(ray, |index, near, reach| {
-            let (placed, local, _) = self.at_instance(ray, index, near, reach);
+        self.tree.walk(ray, |index, near, max_distance| {
+            let (placed, local, _) = self.at_instance(ray, index, near, max_distance);
             met = self.tracers[placed.plant as usize].occluded(&local);
-            if met { -1.0 } else { reach }
+            if met { -1.0 } else { max_distance }
         });
-        met || self.ground.as_ref().is_some_and(|ground| ground.shape.crossing(ray, ground.reach).is_some())
+        met || self.ground.as_ref().is_some_and(|ground| ground.shape.crossing(ray, ground.max_distance).is_some())
     }
 
     /// The surface that was found, seen along the unit vector `direction`; `None` under the ground.
@@ -325,14 +330,14 @@ impl ReferenceScene {
         bsdf: impl FnOnce(&Placed, Vec3, Vec3) -> Bsdf,
     ) -> Surface {
         let placed = &self.instances[instance];
-        let turned = |normal: Vec3| placed.into_scene(normal.as_dvec3()).as_vec3();
-        let geometric = turned(point.geometric_normal);
+        let rotated = |normal: Vec3| placed.into_scene(normal.as_dvec3()).as_vec3();
+        let geometric = rotated(point.geometric_normal);
         let round = match normals {
             Normals::Flat => false,
             Normals::RoundWood => point.kind == PartKind::Wood,
             Normals::Interpolated => true,
         };
-        let shading = if round { turned(point.shading_normal) } else { geometric };
+        let shading = if round { rotated(point.shading_normal) } else { geometric };
         Surface {
             position: placed.position + placed.into_scene(point.position.as_dvec3()) * placed.scale,
             bsdf: bsdf(placed, geometric, shading),
@@ -348,10 +353,10 @@ impl ReferenceScene {
     /// A point of an instance whose light is asked for, seen from the side of `normal` (plant frame).
     pub(crate) fn receiver(&self, instance: usize, position: Vec3, normal: Vec3, shares: Shares) -> Option<Surface> {
         let placed = self.instances.get(instance)?;
-        let turned = placed.into_scene(normal.as_dvec3()).as_vec3();
+        let rotated = placed.into_scene(normal.as_dvec3()).as_vec3();
         Some(Surface {
             position: placed.position + placed.into_scene(position.as_dvec3()) * placed.scale,
-            bsdf: Bsdf::new(turned, turned, shares, turned),
+            bsdf: Bsdf::new(rotated, rotated, shares, rotated),
             anchor: Anchor::Plant { instance, position, normal, error: None },
         })
     }
@@ -384,7 +389,8 @@ impl ReferenceScene {
             }
         }
         for placed in &self.instances {
-            let numbers = [placed.position.x, placed.position.y, placed.position.z, placed.turn.0, placed.turn.1];
+            let numbers =
+                [placed.position.x, placed.position.y, placed.position.z, placed.yaw_sin_cos.0, placed.yaw_sin_cos.1];
             hasher.update(bytemuck::cast_slice(&numbers));
             hasher.update(&placed.scale.to_le_bytes());
             hasher.update(&placed.plant.to_le_bytes());
@@ -399,7 +405,7 @@ impl ReferenceScene {
                 hasher.update(format!("{:?} {:?}", terrain.surroundings(), field).as_bytes())
             }
         };
-        hasher.update(&ground.reach.to_le_bytes());
+        hasher.update(&ground.max_distance.to_le_bytes());
         match &ground.color {
             GroundColor::Even(albedo) => {
                 hasher.update(bytemuck::bytes_of(albedo));
@@ -420,7 +426,7 @@ impl Placed {
     }
 }
 
-/// The box of an instance: its plant's, turned. A plant without a surface has its foot.
+/// The box of an instance: its plant's, rotated. A plant without a surface has its foot.
 fn placed_box(placed: &Placed, tracers: &[PlantTracer]) -> WorldBox {
     let Some(bounds) = tracers[placed.plant as usize].bounds() else {
         return WorldBox { min: placed.position, max: placed.position };

@@ -1,8 +1,8 @@
-//! Radiance from all around, and directions drawn by it.
+//! Radiance of the surroundings, and sampling of directions by it.
 //!
-//! The picture of the sky is the renderer's own ([`SkyView`], bilinear as in `shaders/common/sky.wgsl`). Around a low
-//! sun it is far brighter than elsewhere, which directions drawn by the surface's cosine seldom find; so directions
-//! are also drawn by the sky's brightness, cell by cell of the picture, and both kinds are weighted by the balance
+//! The sky texture is the renderer's own ([`SkyView`], bilinear as in `shaders/common/sky.wgsl`). Around a low
+//! sun it is far brighter than elsewhere, and directions sampled by the surface's cosine seldom hit it; so directions
+//! are also sampled by the sky's brightness, cell by cell of the texture, and both kinds are weighted by the balance
 //! heuristic (Veach & Guibas 1995, "Optimally Combining Sampling Techniques for Monte Carlo Rendering").
 
 use std::f32::consts::PI;
@@ -13,17 +13,17 @@ use super::error::ReferenceError;
 use crate::light::SkyView;
 use crate::math::luminance;
 
-/// Least share of the mean brightness that a cell is drawn with: what is dark between bright texels is still found.
+/// Least sampling weight of a cell relative to the mean: dark cells between bright ones are still sampled.
 const LEAST: f64 = 0.05;
 
-/// The light from all around a scene, without discs.
+/// The light of a scene's surroundings, without discs.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Environment {
-    /// The same radiance from everywhere, nits per channel.
+    /// The same radiance from all directions, nits per channel.
     Even(Vec3),
-    /// The sky's picture, in nits.
+    /// The sky texture, in nits.
     Sky {
-        /// The picture. Below the horizon it shows the ground as seen through the haze.
+        /// The texture. Below the horizon it shows the ground as seen through the haze.
         view: SkyView,
         /// Radiance of the whole lower hemisphere in its stead, nits: for plants alone, lit as
         /// [`crate::light::LightState::sky_sh`] has it.
@@ -31,7 +31,7 @@ pub enum Environment {
     },
 }
 
-/// An environment, ready to be drawn from.
+/// An environment, ready for sampling.
 #[derive(Clone, Debug)]
 pub(crate) struct Sky {
     environment: Environment,
@@ -40,8 +40,8 @@ pub(crate) struct Sky {
 }
 
 impl Sky {
-    /// Prepares `environment`. With `ground`, directions below the horizon are not drawn by brightness: the ground is
-    /// there.
+    /// Prepares `environment`. With `ground`, directions below the horizon are not sampled by brightness, because the
+    /// ground is there.
     pub fn new(environment: Environment, ground: bool) -> Result<Self, ReferenceError> {
         let values = match &environment {
             Environment::Even(radiance) => vec![*radiance],
@@ -96,7 +96,7 @@ impl Sky {
     }
 }
 
-/// The picture's cells between texel centres, each even over its solid angle.
+/// The texture's cells between texel centres, each uniform over its solid angle.
 #[derive(Clone, Debug)]
 struct Cells {
     /// Running sum of the cells' probabilities, row by row; the last is 1.
@@ -191,7 +191,7 @@ mod tests {
     use crate::reference::sampler::PathSampler;
 
     /// A sky with a bright spot around the sun's azimuth, low.
-    fn picture() -> SkyView {
+    fn texture() -> SkyView {
         let mut view =
             SkyView { axis: Vec2::new(0.6, -0.8), texels: vec![[10.0; 3]; SkyView::WIDTH * SkyView::HEIGHT] };
         let sun = view.direction(64.0, 60.0);
@@ -203,7 +203,7 @@ mod tests {
     fn drawn_directions_integrate_the_sky_as_even_ones_do() {
         let below = Some(Vec3::splat(100.0));
         for (below, ground) in [(None, false), (below, false), (None, true)] {
-            let sky = Sky::new(Environment::Sky { view: picture(), below }, ground).unwrap();
+            let sky = Sky::new(Environment::Sky { view: texture(), below }, ground).unwrap();
             let count = 1 << 16;
             let (mut drawn, mut even, mut densities) = (0.0, 0.0, 0.0);
             for index in 0..count {
@@ -225,7 +225,7 @@ mod tests {
 
     #[test]
     fn densities_are_those_of_the_samples() {
-        let sky = Sky::new(Environment::Sky { view: picture(), below: None }, false).unwrap();
+        let sky = Sky::new(Environment::Sky { view: texture(), below: None }, false).unwrap();
         let mut wrong = 0;
         for index in 0..4096 {
             let (direction, density) = sky.sample(PathSampler::new(1, 9, index).pair()).unwrap();

@@ -1,8 +1,8 @@
 //! The colour of the renderer's ground: the twin of the albedo in `shaders/terrain/terrain.wgsl`.
 //!
-//! The renderer reads its noise through mips, a reference at full resolution, as its samples average it; what depends
-//! on the noise by a soft step is therefore not quite the same where a pixel covers several texels. The detail of the
-//! normal, which the renderer adds near the camera, is left out.
+//! The renderer samples its noise through mips. A reference samples it at full resolution, because its samples average
+//! it. Where a pixel covers several texels, terms that depend on the noise by a smooth step therefore differ slightly.
+//! The detail of the normal, which the renderer adds near the camera, is left out.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::terrain::ground_noise::{NOISE_SIDE, noise_image};
 /// Points along an axis of the terrain from which its mean cover is taken.
 const MEAN_POINTS: u32 = 64;
 
-/// What the colour of the ground depends on.
+/// Everything that the colour of the ground depends on.
 #[derive(Clone, Debug)]
 pub struct Soil {
     noise: RgbaImage,
@@ -27,7 +27,7 @@ pub struct Soil {
 }
 
 impl Soil {
-    /// The soil of `terrain`, of whose ground `cover` lies under crowns.
+    /// The soil of `terrain`, with the canopy cover `cover`.
     pub fn new(terrain: &Terrain, cover: Option<Arc<CoverMap>>) -> Self {
         let extent = terrain.extent();
         let mut soil = Self { noise: noise_image(), cover, extent, mean_cover: 0.0 };
@@ -37,10 +37,10 @@ impl Soil {
         soil
     }
 
-    /// Share of ground under crowns around a place, bilinear.
-    fn cover_at(&self, place: DVec2) -> f32 {
+    /// Canopy cover around a position, bilinear.
+    fn cover_at(&self, position: DVec2) -> f32 {
         let Some(cover) = &self.cover else { return 0.0 };
-        let at = (place - cover.origin) / cover.texel - 0.5;
+        let at = (position - cover.origin) / cover.texel - 0.5;
         let low = at.floor();
         let f = (at - low).as_vec2();
         let texel = |x: f64, z: f64| cover.at(cover.origin + (low + DVec2::new(x + 0.5, z + 0.5)) * cover.texel);
@@ -55,24 +55,24 @@ impl Soil {
         let low = at.floor();
         let f: Vec2 = (at - low).as_vec2();
         let texel = |x: f64, y: f64| {
-            let place = (low + DVec2::new(x, y)).map(|c| c.rem_euclid(side));
+            let position = (low + DVec2::new(x, y)).map(|c| c.rem_euclid(side));
             let pixel =
-                self.noise.get_pixel((place.x as u32).min(NOISE_SIDE - 1), (place.y as u32).min(NOISE_SIDE - 1));
+                self.noise.get_pixel((position.x as u32).min(NOISE_SIDE - 1), (position.y as u32).min(NOISE_SIDE - 1));
             Vec4::from(pixel.0.map(f32::from)) / 255.0
         };
         let row = |y: f64| texel(0.0, y).lerp(texel(1.0, y), f.x);
         row(0.0).lerp(row(1.0), f.y)
     }
 
-    /// Albedo at a place (scene metres) where the smooth ground has this unit normal.
-    pub fn albedo(&self, place: DVec3, normal: Vec3) -> Vec3 {
-        let xz = DVec2::new(place.x, place.z);
+    /// Albedo at a position (scene metres) where the smooth ground has this unit normal.
+    pub fn albedo(&self, position: DVec3, normal: Vec3) -> Vec3 {
+        let xz = DVec2::new(position.x, position.z);
         if !xz.is_finite() {
             return Vec3::ZERO;
         }
-        let both = |period: f64, turned: f64| {
-            let turned = self.noise(turn(xz), turned);
-            Vec4::splat(0.5) + 0.72 * (self.noise(xz, period) + turned - Vec4::ONE)
+        let both = |period: f64, rotated: f64| {
+            let rotated = self.noise(rotate(xz), rotated);
+            Vec4::splat(0.5) + 0.72 * (self.noise(xz, period) + rotated - Vec4::ONE)
         };
         let wide = self.noise(xz, 512.0);
         let middle = both(64.0, 51.2);
@@ -114,8 +114,8 @@ impl Soil {
     }
 }
 
-/// The place by which the second noise of a pair is read: turned by the angle of a 3-4-5 triangle.
-fn turn(xz: DVec2) -> DVec2 {
+/// The position at which the second noise of a pair is read: rotated by the angle of a 3-4-5 triangle.
+fn rotate(xz: DVec2) -> DVec2 {
     DVec2::new(0.6 * xz.x - 0.8 * xz.y, 0.8 * xz.x + 0.6 * xz.y)
 }
 
@@ -133,8 +133,8 @@ mod tests {
         let (bare, wooded) = (Soil::new(&terrain, None), Soil::new(&terrain, Some(Arc::new(cover))));
         let mean = |soil: &Soil, normal: Vec3| {
             let albedo = |i: u32| {
-                let place = DVec3::new(f64::from(i % 32) * 1.7 - 27.0, 0.0, f64::from(i / 32) * 1.9 - 30.0);
-                let albedo = soil.albedo(place, normal);
+                let position = DVec3::new(f64::from(i % 32) * 1.7 - 27.0, 0.0, f64::from(i / 32) * 1.9 - 30.0);
+                let albedo = soil.albedo(position, normal);
                 assert!(albedo.min_element() >= 0.0 && albedo.max_element() <= 1.0);
                 albedo
             };

@@ -36,9 +36,9 @@ pub struct CoverMap {
 impl CoverMap {
     /// Share of the ground under crowns at a point (X, Z), 0 to 1, of the texel it is in; 0 outside of the map.
     pub fn at(&self, point: DVec2) -> f32 {
-        let place = ((point - self.origin) / self.texel).floor();
+        let location = ((point - self.origin) / self.texel).floor();
         let inside = |value: f64, count: u32| (0.0..f64::from(count)).contains(&value).then_some(value as usize);
-        match (inside(place.x, self.columns), inside(place.y, self.rows)) {
+        match (inside(location.x, self.columns), inside(location.y, self.rows)) {
             (Some(column), Some(row)) => f32::from(self.cover[row * self.columns as usize + column]) / 255.0,
             _ => 0.0,
         }
@@ -47,7 +47,7 @@ impl CoverMap {
 
 impl CoverMap {
     /// The map with the mean of each texel's neighbourhood, weighted 1, 2, 1 along both axes, and a border of one texel
-    /// for what spreads beyond it: the light of a place does not end at a texel's edge.
+    /// for what spreads beyond it: the light of a point does not end at a texel's edge.
     pub fn smoothed(&self) -> Self {
         let (columns, rows) = (self.columns as usize, self.rows as usize);
         if self.cover.len() != columns * rows || self.cover.is_empty() {
@@ -79,12 +79,12 @@ impl CoverMap {
 }
 
 impl CoverMap {
-    /// The map with the mean of each place's surroundings, weighted by a pyramid that falls to nothing `reach` metres away
-    /// along either axis, on texels of the same size; nothing grows beyond the map, which is enlarged to hold what spreads.
-    /// A few milliseconds for a million texels.
-    pub fn widened(&self, reach: f64) -> Self {
+    /// The map blurred by a pyramid-shaped kernel that falls to 0 at `radius` metres along either axis, with texels of
+    /// the same size. The cover outside the map counts as 0, and the result is larger than the map by the kernel. It
+    /// takes a few milliseconds for a million texels.
+    pub fn widened(&self, radius: f64) -> Self {
         let (columns, rows) = (self.columns as usize, self.rows as usize);
-        let half = (0.5 * reach / self.texel).round();
+        let half = (0.5 * radius / self.texel).round();
         // Two means over boxes of `2 half + 1` texels are a pyramid.
         if self.cover.len() != columns * rows || self.cover.is_empty() || !(1.0..1024.0).contains(&half) {
             return self.clone();
@@ -100,12 +100,12 @@ impl CoverMap {
             box_mean(line, half);
             box_mean(line, half);
         });
-        let mut turned = transposed(&out, width);
-        turned.par_chunks_mut(height).for_each(|line| {
+        let mut columns_first = transposed(&out, width);
+        columns_first.par_chunks_mut(height).for_each(|line| {
             box_mean(line, half);
             box_mean(line, half);
         });
-        let cover = transposed(&turned, height).iter().map(|value| value.round() as u8).collect();
+        let cover = transposed(&columns_first, height).iter().map(|value| value.round() as u8).collect();
         Self {
             origin: self.origin - border as f64 * self.texel,
             texel: self.texel,
@@ -175,8 +175,8 @@ struct Crown {
 ///
 /// # Errors
 /// [`ScatterError::PlantSize`], [`ScatterError::TooManyVariants`], [`ScatterError::UnknownVariant`] for the bounds,
-/// [`ScatterError::Unpackable`] for a scale outside of its range, [`ScatterError::Size`] for a texel below 1 cm or so small
-/// that the map has more than 2²⁶.
+/// [`ScatterError::Unpackable`] for a scale outside of its range, [`ScatterError::Size`] for a texel below 1 cm or so
+/// small that the map has more than 2²⁶.
 pub fn cover_map<S: Crowns>(
     stand: &S,
     bounds: &[PlantSize],
@@ -271,7 +271,7 @@ impl UnitDisc {
         (0..=Self::rung(largest)).map(|rung| Self::new(1 << (MIN_CHORDS_LOG2 as usize + rung))).collect()
     }
 
-    /// The place in the ladder of the disc for a radius in texels: at least four chords a texel.
+    /// The index in the ladder of the disc for a radius in texels: at least four chords a texel.
     fn rung(radius: f64) -> usize {
         let chords = (8.0 * radius).ceil().max(1.0) as u64;
         chords.next_power_of_two().ilog2().saturating_sub(MIN_CHORDS_LOG2) as usize
@@ -318,13 +318,14 @@ impl BandGrid<'_> {
             let (first, end) = (left as usize, (right as usize + 1).min(self.columns));
             let border = bottom as i64;
             let above = ((border as f64 - top) * per_slab).clamp(0.0, 1.0);
-            for (place, part) in [(border - 1, above), (border, 1.0 - above)] {
-                let Some(place) = usize::try_from(place).ok().filter(|&place| part > 0.0 && place < rows) else {
+            for (location, part) in [(border - 1, above), (border, 1.0 - above)] {
+                let Some(location) = usize::try_from(location).ok().filter(|&location| part > 0.0 && location < rows)
+                else {
                     continue;
                 };
-                if row != Some(place) {
+                if row != Some(location) {
                     self.flush(row, touched.clone(), texels, shares);
-                    row = Some(place);
+                    row = Some(location);
                     touched = self.columns..0;
                 }
                 for (column, share) in (first..end).zip(&mut shares[first..end]) {

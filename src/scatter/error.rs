@@ -86,7 +86,7 @@ pub enum ScatterError {
         /// The other.
         second: String,
     },
-    /// Cells of number columns that are no (possible) numbers.
+    /// Cells of number columns that are not (possible) numbers.
     #[error("inventory {name}: {total} cell(s) cannot be used; the first: {}", listed(first))]
     BadValues {
         /// Name of the file or source.
@@ -118,7 +118,7 @@ pub enum ScatterError {
     /// A tree names a variant that does not exist.
     #[error("tree {tree} is of variant {variant}, but only {count} variants are known: give the size of each variant")]
     UnknownVariant {
-        /// Place of the tree in its stand.
+        /// Index of the tree in its stand.
         tree: usize,
         /// The variant it names.
         variant: u16,
@@ -138,7 +138,7 @@ pub enum ScatterError {
     /// A tree has a value that its 16 bytes cannot hold.
     #[error("tree {tree} has {what} {value}, which cannot be packed: {remedy}")]
     Unpackable {
-        /// Place of the tree in its stand.
+        /// Index of the tree in its stand.
         tree: usize,
         /// Which of its values.
         what: &'static str,

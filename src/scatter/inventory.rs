@@ -111,9 +111,9 @@ pub fn read_inventory(path: &Path, options: InventoryOptions) -> Result<Inventor
 /// Reads an inventory from the bytes of a CSV file; `name` is the file's name in messages.
 ///
 /// # Errors
-/// [`ScatterError::NoPosition`], [`ScatterError::AmbiguousColumn`] for the header, [`ScatterError::Record`] for lines of
-/// the wrong number of cells, [`ScatterError::BadValues`] for text, infinities, negative sizes and impossible values in
-/// number columns.
+/// [`ScatterError::NoPosition`], [`ScatterError::AmbiguousColumn`] for the header, [`ScatterError::Record`] for lines
+/// of the wrong number of cells, [`ScatterError::BadValues`] for text, infinities, negative sizes and impossible values
+/// in number columns.
 pub fn parse_inventory(bytes: &[u8], name: &str, options: InventoryOptions) -> Result<Inventory, ScatterError> {
     let text = decode(bytes, name)?;
     let separator = separator(&text);

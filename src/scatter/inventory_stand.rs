@@ -17,12 +17,12 @@ const SAME_PLACE_M: f64 = 0.01;
 /// Lines that a message of the warnings lists.
 const LISTED: usize = 5;
 
-/// How a species of an inventory is drawn.
+/// The plants and sizes of a species of an inventory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InventorySpecies {
     /// Its name in the file; letter case and surrounding blanks do not count.
     pub name: String,
-    /// Which plants are of this species; one is drawn by lot for each tree.
+    /// Indices of the species' plants; each tree picks one at random.
     pub variants: Range<u16>,
     /// Height of each variant's plant at scale 1, metres, as many as there are variants.
     pub plant_heights_m: Vec<f32>,
@@ -58,7 +58,7 @@ impl InventorySpecies {
     }
 }
 
-/// What of an inventory could not be taken as it is written. Lines are those of the file.
+/// Rows of an inventory that could not be used as written. Lines are those of the file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct InventoryWarnings {
     /// Lines of trees outside the ground; they are left out.
@@ -72,7 +72,7 @@ pub struct InventoryWarnings {
 }
 
 impl InventoryWarnings {
-    /// Whether the inventory was taken as it is.
+    /// Whether the whole inventory was used as written.
     pub fn is_empty(&self) -> bool {
         self.outside.is_empty()
             && self.duplicates.is_empty()
@@ -93,7 +93,10 @@ impl fmt::Display for InventoryWarnings {
         }
         if !self.duplicates.is_empty() {
             let (count, first) = (self.duplicates.len(), lines(&mut self.duplicates.iter().map(|pair| pair.0)));
-            writeln!(f, "{count} tree(s) at the place of an earlier one are left out; the first in line(s) {first}")?;
+            writeln!(
+                f,
+                "{count} tree(s) at the position of an earlier one are left out; the first in line(s) {first}"
+            )?;
         }
         if !self.unknown_species.is_empty() {
             let names: Vec<String> =
@@ -115,7 +118,7 @@ impl fmt::Display for InventoryWarnings {
 /// A stand from an inventory, and what to tell the user.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct InventoryStand {
-    /// The trees in the order of the rows; [`Tree::index`] is the row's place, from 0.
+    /// The trees in the order of the rows; [`Tree::index`] is the row's index, from 0.
     pub stand: Stand,
     /// What was left out or changed.
     pub warnings: InventoryWarnings,
@@ -126,11 +129,11 @@ pub struct InventoryStand {
 /// `to_local` maps x and y of the file to scene-local metres (X and Z of the result count). `species` is the table of
 /// what is drawn; its first entry serves trees without a species or of one that is not in the table. The height is the
 /// row's, else from its dbh by the species' [`Allometry`], else the species' default; the tree's scale is that height
-/// over its plant's. Yaw, tint and the variant come from `seed` and the row's place.
+/// over its plant's. Yaw, tint and the variant come from `seed` and the row's index.
 ///
 /// # Errors
-/// [`ScatterError::NoSpecies`] for an empty table, [`ScatterError::Species`] for an entry that nothing can be drawn from,
-/// [`ScatterError::TooManyTrees`] beyond 2³² - 1 rows.
+/// [`ScatterError::NoSpecies`] for an empty table, [`ScatterError::Species`] for an entry that nothing can be drawn
+/// from, [`ScatterError::TooManyTrees`] beyond 2³² - 1 rows.
 pub fn stand_from_inventory<G: Ground + ?Sized>(
     rows: &[InventoryTree],
     to_local: impl Fn(f64, f64) -> DVec3,
@@ -148,14 +151,14 @@ pub fn stand_from_inventory<G: Ground + ?Sized>(
     let mut result = InventoryStand::default();
     let mut taken = Places::default();
     for (row, index) in rows.iter().zip(0u32..) {
-        let place = to_local(row.x, row.y);
-        let known = place.x.is_finite() && place.z.is_finite() && ground.contains(place.x, place.z);
-        let height = if known { ground.height(place.x, place.z) } else { f64::NAN };
+        let point = to_local(row.x, row.y);
+        let known = point.x.is_finite() && point.z.is_finite() && ground.contains(point.x, point.z);
+        let height = if known { ground.height(point.x, point.z) } else { f64::NAN };
         if !height.is_finite() {
             result.warnings.outside.push(row.line);
             continue;
         }
-        if let Some(first) = taken.earlier(place.x, place.z, row.line) {
+        if let Some(first) = taken.earlier(point.x, point.z, row.line) {
             result.warnings.duplicates.push((row.line, first));
             continue;
         }
@@ -178,10 +181,10 @@ pub fn stand_from_inventory<G: Ground + ?Sized>(
         if scale != wanted {
             result.warnings.rescaled.push(row.line);
         }
-        let slope = ground.slope(place.x, place.z);
+        let slope = ground.slope(point.x, point.z);
         let sunk = if slope.is_finite() { sink(entry.trunk_radius_m * scale, slope) } else { 0.0 };
         result.stand.trees.push(Tree {
-            position: DVec3::new(place.x, height - sunk, place.z),
+            position: DVec3::new(point.x, height - sunk, point.z),
             yaw: hash::angle_f32(seed, n, Stream::Yaw),
             scale,
             variant: entry.variants.start + variant,
@@ -196,14 +199,14 @@ fn key(name: &str) -> String {
     name.trim().to_lowercase()
 }
 
-/// Places of earlier trees, in squares of the distance below which two are the same.
+/// Positions of earlier trees, in squares of the distance below which two are the same.
 #[derive(Default)]
 struct Places {
     squares: HashMap<(i64, i64), Vec<(f64, f64, u64)>>,
 }
 
 impl Places {
-    /// The line of an earlier tree at this place; if there is none, this one is remembered.
+    /// The line of an earlier tree at this position; if there is none, this one is remembered.
     fn earlier(&mut self, x: f64, z: f64, line: u64) -> Option<u64> {
         let (column, row) = ((x / SAME_PLACE_M).floor() as i64, (z / SAME_PLACE_M).floor() as i64);
         let around = (-1..=1).flat_map(|dz| (-1..=1).map(move |dx| (dx, dz)));

@@ -1,4 +1,4 @@
-//! Where trees stand: from rules or from an inventory to a [`Stand`], and from there to 16 bytes a tree.
+//! Positions of trees: from rules or an inventory to a [`Stand`], and from there to 16 bytes per tree.
 //!
 //! ```text
 //! sequence (Halton, Hammersley, random) ─┐
@@ -10,8 +10,8 @@
 //! Franzke 2005 (section 4.4, figure 4.17) scatters its plants by the Halton and Hammersley points of
 //! [Halton 1964] and [Hammersley & Handscomb 1964], because they fill the ground evenly without the rows of a grid.
 //! Here the points carry density, slope, height and clearing rules, a least distance, and several species.
-//! A point's *index* decides nothing but its place: species, size, yaw and tint come from a hash of it ([`crate::math::hash`]),
-//! as index bits are the very digits of the coordinates.
+//! A point's *index* determines only its position: species, size, yaw and tint come from a hash of it
+//! ([`crate::math::hash`]), because the bits of the index are the digits of the coordinates.
 //!
 //! Positions are scene-local: metres, f64, X east, Z south, Y up from the datum of the heights.
 //! Every result is the same for any number of threads.

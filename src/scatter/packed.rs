@@ -1,24 +1,25 @@
-//! A stand as the GPU reads it: 16 bytes a tree, trees sorted by square cells of ground.
+//! A stand for the GPU: 16 bytes per tree, trees sorted by square cells of ground.
 //!
 //! ```text
-//! word 0  xz    u16 x | u16 z << 16         place inside the cell, 0..=65535 for 0..=cell size (WGSL unpack2x16unorm)
+//! word 0  xz    u16 x | u16 z << 16         position in the cell, 0..=65535 for 0..=cell size (WGSL unpack2x16unorm)
 //! word 1  y     f32                         metres above the datum
 //! word 2  cell  i14 ix | i14 iz << 14 | upper 4 bits of the variant << 28
 //! word 3  look  yaw 8 | scale 12 | lower 6 bits of the variant | tint 6    from the lowest bit up
 //! ```
 //!
 //! Cells are counted from the base cell of the stand's [`CellGrid`]: cell (ix, iz) of the grid covers
-//! [(base + ix) s, (base + ix + 1) s) along X and the same along Z. A stand may so lie anywhere, and is at most
+//! [(base + ix) s, (base + ix + 1) s) along X and the same along Z. So a stand can lie anywhere; it is at most
 //! 2¹⁴ cells wide (1,048 km at 64 m).
 //!
 //! An f32 position would have steps of 0.125 m at 2,000 km and needs 12 bytes; cells give the same step everywhere, and
-//! the camera-relative position is `(cell - camera_cell) * s + place`, in which the large numbers cancel as integers.
+//! the camera-relative position is `(cell - camera_cell) * s + position`, in which the large numbers cancel as
+//! integers.
 //!
 //! | value | coding | largest error |
 //! |---|---|---|
 //! | x, z | unorm 16 of the cell | s / 131070 (0.49 mm at 64 m) |
 //! | y | f32 | 2⁻²⁴ of itself (0.24 mm at 4,096 m) |
-//! | yaw | 256 steps a turn | π/256 rad (0.7°) |
+//! | yaw | 256 steps per rotation | π/256 rad (0.7°) |
 //! | scale | 4096 steps from 1/16 to 16, even in the logarithm | 0.068 % |
 //! | variant | 0..=1023 | 0 |
 //! | tint | -31..=31 | 1/62 |
@@ -32,7 +33,7 @@ use rayon::prelude::*;
 use super::ScatterError;
 use super::stand::{MAX_SCALE, MIN_SCALE, Stand, Tree};
 
-/// Side of a cell unless something else is wanted, metres; reaches to ±2,097,152 m.
+/// Default side of a cell, metres; positions up to ±2,097,152 m are possible.
 pub const DEFAULT_CELL_SIZE: f64 = 64.0;
 
 /// The most plant variants a packed stand can name.
@@ -98,14 +99,15 @@ impl CellGrid {
         Self { size, base: IVec2::ZERO }
     }
 
-    /// Column (or row) of the cell that holds the coordinate `value` in metres, counted from the origin, and where in it,
-    /// 0..=1. `None` beyond ±2¹⁵ cells.
+    /// Column (or row) of the cell that holds the coordinate `value` in metres, counted from the origin, and where in
+    /// it, 0..=1. `None` beyond ±2¹⁵ cells.
     fn locate(&self, value: f64) -> Option<(i32, f64)> {
         let cell = (value / self.size).floor();
         (f64::from(i16::MIN)..=f64::from(i16::MAX)).contains(&cell).then(|| (cell as i32, value / self.size - cell))
     }
 
-    /// The grid whose base is the middle of the cells of `stand`. Trees without a cell do not count: packing refuses them.
+    /// The grid whose base is the middle of the cells of `stand`. Trees without a cell do not count: packing refuses
+    /// them.
     ///
     /// # Errors
     /// [`ScatterError::TooWide`] for a stand of more than [`MAX_CELLS`] cells along an axis.
@@ -137,7 +139,7 @@ impl CellGrid {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct PackedTree {
-    /// Place inside the cell: x in the lower 16 bits, z in the upper.
+    /// Position in the cell: x in the lower 16 bits, z in the upper.
     pub xz: u32,
     /// Height of the foot above the datum, metres.
     pub y: f32,
@@ -148,13 +150,13 @@ pub struct PackedTree {
 }
 
 impl PackedTree {
-    /// Packs `tree`, the `place`-th of its stand, for the cells of `grid`.
+    /// Packs `tree`, whose position in its stand's list is `index`, for the cells of `grid`.
     ///
     /// # Errors
     /// [`ScatterError::Unpackable`] for a value outside of what the module's table can hold, or not a number.
-    pub fn pack(tree: &Tree, place: usize, grid: &CellGrid) -> Result<Self, ScatterError> {
+    pub fn pack(tree: &Tree, index: usize, grid: &CellGrid) -> Result<Self, ScatterError> {
         let fail =
-            |what, value: f64, remedy: String| Err(ScatterError::Unpackable { tree: place, what, value, remedy });
+            |what, value: f64, remedy: String| Err(ScatterError::Unpackable { tree: index, what, value, remedy });
         let DVec3 { x, y, z } = tree.position;
         let axis = |value: f64, base: i32| {
             let (cell, share) = grid.locate(value)?;
@@ -167,8 +169,8 @@ impl PackedTree {
             let (least, most) = (f64::from(i16::MIN) * grid.size, f64::from(i16::MAX) * grid.size);
             format!("stay within {} to {} m or take larger cells", least.max(middle - half), most.min(middle + half))
         };
-        let Some((ix, place_x)) = axis(x, grid.base.x) else { return fail("x", x, reach(grid.base.x)) };
-        let Some((iz, place_z)) = axis(z, grid.base.y) else { return fail("z", z, reach(grid.base.y)) };
+        let Some((ix, step_x)) = axis(x, grid.base.x) else { return fail("x", x, reach(grid.base.x)) };
+        let Some((iz, step_z)) = axis(z, grid.base.y) else { return fail("z", z, reach(grid.base.y)) };
         if !(-MAX_HEIGHT_M..=MAX_HEIGHT_M).contains(&y) {
             return fail("y", y, format!("heights are within ±{MAX_HEIGHT_M} m of the datum"));
         }
@@ -189,7 +191,7 @@ impl PackedTree {
         let tint = (tree.tint * TINT_STEPS).round() as i32 as u32;
         let variant = u32::from(tree.variant);
         Ok(Self {
-            xz: place_x | place_z << 16,
+            xz: step_x | step_z << 16,
             y: y as f32,
             cell: ix | iz << CELL_BITS | variant >> VARIANT_LOW_BITS << VARIANT_HIGH_SHIFT,
             look: yaw & mask(YAW_BITS)
@@ -209,11 +211,11 @@ impl PackedTree {
     /// Scene-local position of the foot, metres.
     pub fn position(&self, grid: &CellGrid) -> DVec3 {
         let (ix, iz) = self.cell_index(grid);
-        let axis = |cell: i32, place: u32| (f64::from(cell) + f64::from(place) / f64::from(PLACE_STEPS)) * grid.size;
+        let axis = |cell: i32, step: u32| (f64::from(cell) + f64::from(step) / f64::from(PLACE_STEPS)) * grid.size;
         DVec3::new(axis(ix, self.xz & 0xFFFF), self.y.into(), axis(iz, self.xz >> 16))
     }
 
-    /// Turn about the trunk, radians, 0 to 2π.
+    /// Yaw about the trunk, radians, 0 to 2π.
     pub fn yaw(&self) -> f32 {
         (self.look & mask(YAW_BITS)) as f32 * (TAU / (1 << YAW_BITS) as f32)
     }
@@ -223,7 +225,7 @@ impl PackedTree {
         ((self.look >> SCALE_SHIFT & mask(SCALE_BITS)) as f32 * (SCALE_OCTAVES / SCALE_STEPS) + LEAST_SCALE_LOG2).exp2()
     }
 
-    /// Which plant stands here.
+    /// Index of its plant.
     pub fn variant(&self) -> u16 {
         let high = self.cell >> VARIANT_HIGH_SHIFT;
         (self.look >> VARIANT_LOW_SHIFT & mask(VARIANT_LOW_BITS) | high << VARIANT_LOW_BITS) as u16
@@ -305,13 +307,13 @@ impl PackedStand {
             return Err(ScatterError::TooManyTrees { count: stand.trees.len() as f64, limit: u32::MAX });
         }
         let grid = CellGrid::around(stand, cell_size)?;
-        let pack = |(place, tree): (usize, &Tree)| {
+        let pack = |(index, tree): (usize, &Tree)| {
             if usize::from(tree.variant) >= bounds.len() {
-                return Err(ScatterError::UnknownVariant { tree: place, variant: tree.variant, count: bounds.len() });
+                return Err(ScatterError::UnknownVariant { tree: index, variant: tree.variant, count: bounds.len() });
             }
-            let packed = PackedTree::pack(tree, place, &grid)?;
+            let packed = PackedTree::pack(tree, index, &grid)?;
             let (ix, iz) = packed.cell_index(&grid);
-            Ok((u64::from(morton(ix, iz)) << 32 | place as u64, packed))
+            Ok((u64::from(morton(ix, iz)) << 32 | index as u64, packed))
         };
         let packed: Result<Vec<(u64, PackedTree)>, _> = stand.trees.par_iter().enumerate().map(pack).collect();
         let mut packed = match packed {
@@ -367,7 +369,7 @@ fn cell(first: u32, group: &[PackedTree], grid: &CellGrid, bounds: &[PlantSize])
     Cell { ix, iz, first, count: group.len() as u32, min, max, max_scale }
 }
 
-/// The bits of both coordinates, counted from -32768, in turn.
+/// The bits of both coordinates, counted from -32768, interleaved.
 fn morton(ix: i32, iz: i32) -> u32 {
     let spread = |value: i32| {
         let mut bits = u32::from(value as u16 ^ 0x8000);

@@ -30,8 +30,8 @@ use crate::math::{
 /// Points that one task evaluates: two rounds of the ternary table.
 const CHUNK: u64 = 4374;
 
-/// Candidates for each tree of the full area before a least distance is given up. 64 times 32 million trees still have indices
-/// of 32 bits.
+/// Candidates for each tree of the full area before a least distance is given up. 64 times 32 million trees still have
+/// indices of 32 bits.
 const MAX_EFFORT: u64 = 64;
 
 /// A stand and how its rules were met.
@@ -48,7 +48,7 @@ pub struct Placement {
 pub struct PlacementReport {
     /// Trees that the density asks for on the allowed ground.
     pub wanted: u32,
-    /// Trees placed; fewer than wanted only where the least distance left no place.
+    /// Trees placed; fewer than wanted only where the minimum distance left no room.
     pub placed: u32,
     /// Candidates tried.
     pub candidates: u64,
@@ -158,14 +158,14 @@ impl<G: Ground + ?Sized> Placer<'_, G> {
             return None;
         }
         let species = self.species(index, height, slope)?;
-        let place = hash::below(seed, index, Stream::Variant, species.variants.len() as u32) as u16;
-        let scale = species.size.scale(seed, index, place.into());
+        let variant = hash::below(seed, index, Stream::Variant, species.variants.len() as u32) as u16;
+        let scale = species.size.scale(seed, index, variant.into());
         let foot = height - sink(species.trunk_radius_m * scale, slope);
         Some(Tree {
             position: DVec3::new(point.x, foot, point.y),
             yaw: hash::angle_f32(seed, index, Stream::Yaw),
             scale,
-            variant: species.variants.start + place,
+            variant: species.variants.start + variant,
             tint: unit_f32(seed, index, Stream::Tint) * 2.0 - 1.0,
             index: index as u32,
         })

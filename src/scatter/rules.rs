@@ -1,4 +1,4 @@
-//! What the user says about where trees stand, and the check that it can be met.
+//! The user's rules for the positions of trees, and the check that they can be met.
 
 use std::ops::Range;
 
@@ -13,19 +13,19 @@ use crate::math::hash;
 /// A device may hold fewer, by its largest storage buffer.
 pub const MAX_TREES: u32 = 32_000_000;
 
-/// The largest share of the ground that discs of the least distance as diameter may cover.
+/// The largest fraction of the ground that discs with the minimum distance as diameter may cover.
 ///
-/// Discs placed one after another at random jam at a share of 0.547 ([Feder 1980]); the number of tries rises steeply
-/// on the way there, and at 0.45 it is some ten for each tree.
+/// Discs placed one after another at random jam at a fraction of 0.547 ([Feder 1980]). The number of tries rises
+/// steeply towards it; at 0.45 it is about ten per tree.
 pub const MAX_DISC_COVER: f64 = 0.45;
 
-/// Which points trees are tried at.
+/// The point sequence of candidate positions for trees.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize)]
 pub enum Sequence {
-    /// Halton points in bases 2 and 3: even, and natural to look at. The default.
+    /// Halton points in bases 2 and 3: even, with a natural look. The default.
     #[default]
     Halton,
-    /// Hammersley points: the most even, but with visible lines where the stand is looked at along a side of its area.
+    /// Hammersley points: the most even, but with visible rows in views along a side of the area.
     Hammersley,
     /// Independent random points: clumps and gaps, as in a stand that nobody planted.
     Random,
@@ -38,8 +38,8 @@ pub struct ClearingNoise {
     /// Typical distance from one clearing to the next, metres, 1 to 100000. In a scene file: `wavelength`. Default 400.
     #[serde(rename = "wavelength")]
     pub wavelength_m: f64,
-    /// Share of the area that the clearings cover, 0 (none) to 1 (no forest at all). Met over the area, as the noise is
-    /// cut at its own quantile there. In a scene file: `share`. Default 0.1.
+    /// Fraction of the area that clearings cover, 0 (none) to 1 (no forest at all). It is met exactly, because the
+    /// noise is cut at its quantile over the area. In a scene file: `share`. Default 0.1.
     #[serde(rename = "share")]
     pub cover: f64,
     /// Width of a clearing's margin, where trees thin out, as a fraction of the wavelength, 0 (a sharp edge) to 1.
@@ -77,17 +77,18 @@ pub enum SizeRule {
 /// One species of a stand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpeciesRule {
-    /// Share of the trees, relative to the other species that may stand at the same place; > 0.
+    /// Weight of the species relative to the others that can grow at the same position; > 0.
     pub weight: f64,
-    /// Heights above the datum where it grows, metres; `None` is anywhere.
+    /// Heights above the datum where it grows, metres; `None`: anywhere.
     pub height_range_m: Option<(f64, f64)>,
-    /// Steepest ground it grows on, radians; `None` is the stand's limit.
+    /// Steepest ground it grows on, radians; `None`: the limit of the stand.
     pub slope_limit: Option<f32>,
     /// How large the trees are.
     pub size: SizeRule,
-    /// Which plants are of this species; one is drawn for each tree.
+    /// Indices of the species' plants; each tree picks one at random.
     pub variants: Range<u16>,
-    /// Radius of the trunk at the ground at scale 1, root flare included, metres; sinks the foot on slopes.
+    /// Radius of the trunk at the ground at scale 1, root flare included, metres. It determines how far the foot
+    /// sinks into a slope.
     pub trunk_radius_m: f32,
 }
 
@@ -114,7 +115,7 @@ pub struct PlacementRules {
     pub sequence: Sequence,
     /// Changes everything that is drawn by lot, the shift of the sequence included.
     pub seed: u64,
-    /// No two trees are nearer to each other on the map, metres; 0 is no limit.
+    /// No two trees are nearer to each other on the map, metres; 0: no limit.
     pub min_distance_m: f64,
     /// Steepest ground with trees, radians, 0 to π/2.
     pub slope_limit: f32,
@@ -122,7 +123,7 @@ pub struct PlacementRules {
     pub height_range_m: Option<(f64, f64)>,
     /// The rectangle to fill, within ±2,000 km.
     pub area: Area,
-    /// Meadows; `None` is none.
+    /// Meadows; `None`: there are none.
     pub clearings: Option<ClearingNoise>,
     /// The species, at least one.
     pub species: Vec<SpeciesRule>,
@@ -288,13 +289,13 @@ impl SizeRule {
         }
     }
 
-    /// The scale of the tree `index`, whose plant is the `place`-th of its species' variants.
-    pub(super) fn scale(&self, seed: u64, index: u64, place: usize) -> f32 {
+    /// The scale of the tree `index`, whose plant is number `variant` of its species' variants.
+    pub(super) fn scale(&self, seed: u64, index: u64, variant: usize) -> f32 {
         let scale = match self {
             Self::Scale { min, max } => min + (max - min) * hash::unit_f32(seed, index, Stream::Scale),
             Self::Height { mean_m, deviation_m, plant_heights_m } => {
                 let height = mean_m + deviation_m * hash::bell_f32(seed, index, Stream::Scale);
-                height / plant_heights_m.get(place).copied().unwrap_or(*mean_m)
+                height / plant_heights_m.get(variant).copied().unwrap_or(*mean_m)
             }
         };
         scale.clamp(MIN_SCALE, MAX_SCALE)

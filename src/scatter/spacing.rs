@@ -1,4 +1,4 @@
-//! A least distance between trees: who comes first stands, who comes too near later does not.
+//! Minimum distance between trees: a tree is rejected if an earlier one is too near.
 
 use glam::DVec2;
 
@@ -37,13 +37,13 @@ impl SpacingGrid {
         }
     }
 
-    /// Takes `point` in unless one that was taken in before is nearer than the distance.
+    /// Adds `point` unless an earlier point is nearer than the distance. Returns whether it was added.
     pub fn insert(&mut self, point: DVec2) -> bool {
-        let place = |p: DVec2| {
+        let cell_of = |p: DVec2| {
             let cell = ((p - self.origin) * self.per_cell).max(DVec2::ZERO);
             ((cell.x as usize).min(self.columns - 1), (cell.y as usize).min(self.rows - 1))
         };
-        let (first, last) = (place(point - self.distance), place(point + self.distance));
+        let (first, last) = (cell_of(point - self.distance), cell_of(point + self.distance));
         let limit = self.distance * self.distance;
         for row in first.1..=last.1 {
             for column in first.0..=last.0 {
@@ -56,7 +56,7 @@ impl SpacingGrid {
                 }
             }
         }
-        let (column, row) = place(point);
+        let (column, row) = cell_of(point);
         let head = &mut self.heads[row * self.columns + column];
         self.points.push((point, *head));
         *head = (self.points.len() - 1) as u32;

@@ -45,7 +45,8 @@ impl<G: Ground + ?Sized> Ground for &G {
 
 /// A rectangle on the ground, scene-local metres; `x` of the vectors is X (east), `y` is Z (south).
 ///
-/// A scene file writes its sides, `(west: -100, south: -90, east: 80, north: 70)`: see [`from_sides`](Self::from_sides).
+/// A scene file writes its sides, `(west: -100, south: -90, east: 80, north: 70)`: see
+/// [`from_sides`](Self::from_sides).
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(from = "Sides")]
 pub struct Area {

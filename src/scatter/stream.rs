@@ -1,10 +1,10 @@
-//! What the random numbers of a stand are drawn for.
+//! The independent streams of random numbers of a stand.
 
 use glam::DVec2;
 
 use crate::math::hash::unit_f64;
 
-/// What a number is drawn for. Streams of one seed are independent of each other.
+/// The purpose of a random number. Streams of one seed are independent of each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u32)]
 pub enum Stream {
@@ -12,7 +12,7 @@ pub enum Stream {
     Species = 1,
     /// Choice among a species' individuals.
     Variant = 2,
-    /// Turn about the trunk.
+    /// Yaw about the trunk.
     Yaw = 3,
     /// Size.
     Scale = 4,

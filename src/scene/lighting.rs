@@ -6,7 +6,7 @@ use super::check::Check;
 use crate::bake::lighting::{
     LightingSettings, SunLight,
     implicit::ImplicitSettings,
-    transfer::{Channels, Interior, TransferSettings},
+    transfer::{Channels, Scattering, TransferSettings},
 };
 
 /// The lighting of a species' foliage. Each choice has its own fields, all of them optional: `Transfer()`.
@@ -50,11 +50,11 @@ impl Transfer {
         let byte = |value: u32| value.min(u8::MAX.into()) as u8;
         TransferSettings {
             bands: byte(self.bands),
-            channels: if self.color { Channels::Rgb } else { Channels::One },
+            channels: if self.color { Channels::Rgb } else { Channels::Luminance },
             rays: self.rays,
-            interior: match byte(self.bounces) {
-                0 => Interior::Straight(1),
-                bounces => Interior::Diffuse(bounces),
+            scattering: match byte(self.bounces) {
+                0 => Scattering::TransmitOnly(1),
+                bounces => Scattering::Diffuse(bounces),
             },
             ..TransferSettings::default()
         }

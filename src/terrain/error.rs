@@ -14,7 +14,7 @@ pub enum TerrainError {
         /// What the operating system says.
         source: std::io::Error,
     },
-    /// The file's content is none of the known formats.
+    /// The file's content has no known format.
     #[error(
         "{path}: not a known height format; readable are GeoTIFF, ESRI ASCII grid, SRTM .hgt (1201x1201 or 3601x3601) \
          and 16-bit greyscale PNG; convert with `gdal_translate -of GTiff IN OUT.tif`", path = .path.display()
@@ -24,12 +24,12 @@ pub enum TerrainError {
         path: PathBuf,
     },
     /// The file breaks the rules of its format, ends too early, or promises more than it holds.
-    #[error("{path}: {place}: {problem}; {remedy}", path = .path.display())]
+    #[error("{path}: {location}: {problem}; {remedy}", path = .path.display())]
     Malformed {
         /// The file.
         path: PathBuf,
         /// Line and column, row, tag or chunk.
-        place: String,
+        location: String,
         /// What is wrong there.
         problem: String,
         /// What the user can do.
@@ -156,7 +156,7 @@ pub enum Warning {
         /// Samples of the terrain.
         total: usize,
     },
-    /// Samples that no place on earth has were taken as holes although the file does not mark them so.
+    /// Samples with impossible heights were taken as holes although the file does not mark them.
     ImplausibleHeights {
         /// Samples concerned.
         count: usize,
@@ -166,7 +166,7 @@ pub enum Warning {
         /// True: degrees of longitude and latitude. False: local metres.
         degrees: bool,
     },
-    /// A projected system was read whose place on earth is not known here: distances are right, but latitude and
+    /// A projected system was read whose location on earth is not known here: distances are right, but latitude and
     /// longitude are not available.
     PlaceUnknown {
         /// The EPSG code found, if any.

@@ -9,9 +9,10 @@
 //!   H[-k] = H[k]  | H[-k] = H[k] + 2S c_k | H[0] .. H[n - 1]   |
 //! ```
 //!
-//! with the rise `S` per sample across the border, averaged along it, and `c_k = k ((1 - k/8) / (1 - 1/8))^2`. At `k = 1` this continues a
-//! plane, which makes the border cells exact for planes; further out the correction ends, so that the surroundings neither crease at the
-//! border nor drift away from the mirror image. The rule is linear and applied along columns first, then along rows.
+//! with the rise `S` per sample across the border, averaged along it, and `c_k = k ((1 - k/8) / (1 - 1/8))^2`. At `k =
+//! 1` this continues a plane, which makes the border cells exact for planes; further out the correction ends, so that
+//! the surroundings neither crease at the border nor drift away from the mirror image. The rule is linear and applied
+//! along columns first, then along rows.
 
 use super::HeightField;
 
@@ -31,8 +32,8 @@ pub(super) const PAD: usize = 10;
 /// The correction at the border has run out at this many samples outside.
 const BLEND: f64 = 8.0;
 
-/// The rise at the border is taken over this many samples inwards and averaged over this many to each side along the border:
-/// the roughness of single samples would be drawn out into streaks.
+/// The rise at the border is taken over this many samples inwards and averaged over this many to each side along the
+/// border: the roughness of single samples would be drawn out into streaks.
 const RISE_DEPTH: i64 = 3;
 const RISE_REACH: usize = 6;
 
@@ -49,7 +50,7 @@ pub(super) struct ExtendedGrid {
     surroundings: Surroundings,
 }
 
-/// A 4x4 neighbourhood (rows from the north) and the place inside its middle cell, each in 0..=1.
+/// A 4x4 neighbourhood (rows from the north) and the position inside its middle cell, each in 0..=1.
 pub(super) struct Patch {
     samples: [[f32; 4]; 4],
     column_fraction: f64,
@@ -71,8 +72,8 @@ impl ExtendedGrid {
         Self { columns, rows, stride, samples, surroundings }
     }
 
-    /// The neighbourhood of a place given in samples (0 is the first column or row). Places that are not finite are
-    /// taken as the first sample.
+    /// The neighbourhood of a position given in samples (0 is the first column or row). Positions that are not finite
+    /// are taken as the first sample.
     #[inline]
     pub(super) fn patch(&self, column: f64, row: f64) -> Patch {
         let (first_column, column_fraction) = split(column);
@@ -109,23 +110,24 @@ impl ExtendedGrid {
         self.surroundings
     }
 
-    /// Storage indices of four samples from `first` on. Those that are not all stored lie so far out (8 samples at least)
-    /// that they are pure images.
+    /// Storage indices of four samples from `first` on. Those that are not all stored lie so far out (8 samples at
+    /// least) that they are pure images.
     fn neighbours(&self, first: i64, count: usize) -> [usize; 4] {
         if let Some(start) = stored(first, count) {
             return [start, start + 1, start + 2, start + 3];
         }
         let last = count as i64 - 1;
-        let place = match self.surroundings {
+        let position = match self.surroundings {
             Surroundings::Border => first,
             Surroundings::Mirror => first.rem_euclid(2 * last),
         };
         [0, 1, 2, 3].map(|offset| {
             let index = match self.surroundings {
-                Surroundings::Border => (place + offset).clamp(0, last),
-                // Within four steps of a place in 0..period: at most a few turns, even of the shortest period, 2.
+                Surroundings::Border => (position + offset).clamp(0, last),
+                // Within four steps of a position in 0..period: at most a few reflections, even of the shortest period,
+                // 2.
                 Surroundings::Mirror => {
-                    let mut turned = place + offset;
+                    let mut turned = position + offset;
                     while turned >= 2 * last {
                         turned -= 2 * last;
                     }
@@ -137,21 +139,21 @@ impl ExtendedGrid {
     }
 }
 
-/// The first of the four samples around a place, and the place's fraction between the second and the third.
+/// The first of the four samples around a position, and the position's fraction between the second and the third.
 #[inline]
-fn split(place: f64) -> (i64, f64) {
+fn split(position: f64) -> (i64, f64) {
     // Comparisons with NaN are false.
-    let place = if place.abs() <= FAR {
-        place
-    } else if place.is_nan() {
+    let position = if position.abs() <= FAR {
+        position
+    } else if position.is_nan() {
         0.0
     } else {
-        FAR.copysign(place)
+        FAR.copysign(position)
     };
     // Without SSE 4.1 `floor` is a call; this is not.
-    let truncated = place as i64;
-    let floor = truncated - i64::from(place < truncated as f64);
-    (floor - 1, place - floor as f64)
+    let truncated = position as i64;
+    let floor = truncated - i64::from(position < truncated as f64);
+    (floor - 1, position - floor as f64)
 }
 
 /// Storage index of a sample, if it and the three after it are stored.
@@ -188,10 +190,10 @@ impl Patch {
     /// The second derivatives (column-column, column-row, row-row) in metres per sample squared at one of the cell's
     /// corners, as the limit from inside the cell.
     pub(super) fn second_derivatives_at_corner(&self, east: bool, south: bool) -> [f64; 3] {
-        let place = |far: bool| if far { 1.0 } else { 0.0 };
-        let (u, v) = (weights(place(east)), weights(place(south)));
-        let (du, dv) = (weight_slopes(place(east)), weight_slopes(place(south)));
-        let (ddu, ddv) = (weight_bends(place(east)), weight_bends(place(south)));
+        let position = |far: bool| if far { 1.0 } else { 0.0 };
+        let (u, v) = (weights(position(east)), weights(position(south)));
+        let (du, dv) = (weight_slopes(position(east)), weight_slopes(position(south)));
+        let (ddu, ddv) = (weight_bends(position(east)), weight_bends(position(south)));
         [self.weighted(&ddu, &v), self.weighted(&du, &dv), self.weighted(&u, &ddv)]
     }
 
@@ -243,8 +245,8 @@ pub(super) fn fold(index: i64, count: usize, surroundings: Surroundings) -> usiz
     match surroundings {
         Surroundings::Border => index.clamp(0, last) as usize,
         Surroundings::Mirror => {
-            let place = index.rem_euclid(2 * last);
-            (if place > last { 2 * last - place } else { place }) as usize
+            let position = index.rem_euclid(2 * last);
+            (if position > last { 2 * last - position } else { position }) as usize
         }
     }
 }
@@ -272,7 +274,8 @@ impl Lines {
         for (edge, outward) in [(0, -1), (last, 1)] {
             let rises = smoothed(&self.border_rises(samples, edge, outward));
             for line in 0..self.lines {
-                // A pad takes the rise of the line that it is the image of: pure images must be alike, to the last sample.
+                // A pad takes the rise of the line that it is the image of: pure images must be alike, to the last
+                // sample.
                 let rise = rises[fold(line as i64 - self.pads as i64, rises.len(), surroundings)];
                 for k in 1..=PAD as i64 {
                     let image = samples[self.at(line, fold(edge + outward * k, self.count, surroundings) as i64)];
@@ -325,7 +328,7 @@ fn dot(samples: &[f32; 4], weights: &[f64; 4]) -> f64 {
         + f64::from(samples[3]) * weights[3]
 }
 
-/// Catmull-Rom weights of the four samples around a place `t` in 0..=1 between the second and the third.
+/// Catmull-Rom weights of the four samples around a position `t` in 0..=1 between the second and the third.
 #[inline]
 fn weights(t: f64) -> [f64; 4] {
     let (t2, t3) = (t * t, t * t * t);

@@ -35,14 +35,14 @@ pub enum CoordinateSystem {
     /// The web maps' Mercator projection (EPSG:3857). Its metres are stretched by `1 / cos(latitude)`, which is undone
     /// here for the terrain's centre.
     WebMercator,
-    /// Another projection, of which only the unit is used: its place on earth is unknown here.
+    /// Another projection, of which only the unit is used: its location on earth is unknown here.
     Projected {
         /// The EPSG code, if the file names one.
         epsg: Option<u32>,
         /// Metres per unit of the coordinates (0.3048 for feet).
         metres_per_unit: f64,
     },
-    /// Metres from a corner or any other point, x east and y north, without a place on earth.
+    /// Metres from a corner or any other point, x east and y north, without a location on earth.
     Local,
 }
 
@@ -118,8 +118,8 @@ impl CoordinateSystem {
 /// Ties the local frame of a terrain (metres, x east, z south, origin at the centre) to the coordinates of its file.
 ///
 /// The map is affine: scales are those at the centre. For geographic data this is the equirectangular projection;
-/// `b` metres north of the centre a length along a parallel is wrong by the fraction `b * tan(latitude) / 6.4e6` (0.2 % at
-/// 15 km and 40 degrees), the same for the heights and for everything placed with this reference.
+/// `b` metres north of the centre a length along a parallel is wrong by the fraction `b * tan(latitude) / 6.4e6` (0.2 %
+/// at 15 km and 40 degrees), the same for the heights and for everything placed with this reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GeoReference {
     system: CoordinateSystem,
@@ -193,7 +193,7 @@ impl GeoReference {
     }
 
     /// File coordinates (easting and northing, or longitude and latitude in degrees) to local metres (x: east,
-    /// y: **south**, the local z). Longitudes may be given in either turn (-84 or 276). Not finite in, zero out.
+    /// y: **south**, the local z). Longitudes may be given in either convention (-84 or 276). Not finite in, zero out.
     pub fn to_local(&self, x_file: f64, y_file: f64) -> DVec2 {
         let mut offset = DVec2::new(x_file, y_file) - self.centre;
         if self.system == CoordinateSystem::Geographic {
@@ -221,8 +221,8 @@ impl GeoReference {
             CoordinateSystem::Utm { zone, south } => utm_to_geographic(self.centre, zone, south)?,
             CoordinateSystem::Projected { .. } | CoordinateSystem::Local => return None,
         };
-        let turned = longitude - 360.0 * ((longitude + 180.0) / 360.0).floor();
-        (latitude.abs() <= 90.0 && turned.is_finite()).then_some((latitude, turned))
+        let wrapped = longitude - 360.0 * ((longitude + 180.0) / 360.0).floor();
+        (latitude.abs() <= 90.0 && wrapped.is_finite()).then_some((latitude, wrapped))
     }
 }
 
@@ -243,8 +243,8 @@ fn web_mercator_latitude(northing: f64) -> f64 {
 }
 
 /// Latitude and longitude in degrees of a point in a UTM zone: Krueger's series to the fourth order of the third
-/// flattening, exact to less than a millimetre inside a zone [Karney 2011, "Transverse Mercator with an accuracy of a few
-/// nanometers", eq. 11, 14, 36]. `None` for points that no zone contains.
+/// flattening, exact to less than a millimetre inside a zone [Karney 2011, "Transverse Mercator with an accuracy of a
+/// few nanometers", eq. 11, 14, 36]. `None` for points that no zone contains.
 fn utm_to_geographic(point: DVec2, zone: u8, south: bool) -> Option<(f64, f64)> {
     let easting = point.x - 500_000.0;
     let northing = point.y - if south { 10_000_000.0 } else { 0.0 };

@@ -29,9 +29,9 @@ pub fn noise_image() -> RgbaImage {
 
 fn texel(field: &Fbm<Perlin>, channel: usize, x: u32, y: u32) -> u8 {
     // Both coordinates run around a circle: the tile closes on itself.
-    let turn = |value: u32| std::f64::consts::TAU * f64::from(value) / f64::from(NOISE_SIDE);
+    let angle = |value: u32| std::f64::consts::TAU * f64::from(value) / f64::from(NOISE_SIDE);
     let radius = CHANNELS[channel].1 / std::f64::consts::TAU;
-    let (u, v) = (turn(x), turn(y));
+    let (u, v) = (angle(x), angle(y));
     let value = field.get([radius * u.cos(), radius * u.sin(), radius * v.cos(), radius * v.sin()]);
     let shaped = match channel {
         // Patches: a soft step.

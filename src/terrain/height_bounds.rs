@@ -122,9 +122,9 @@ impl HeightBounds {
     fn cell_ranges(&self, (low, high): (f64, f64), count: usize) -> [Option<(usize, usize)>; 3] {
         let first = 1.0 - PAD as f64;
         let end = (count + PAD - 2) as f64;
-        // A place on a cell's edge may be evaluated from either side.
+        // A position on a cell's edge may be evaluated from either side.
         let (low, high) = (low - 1e-9, high + 1e-9);
-        let stored = |place: f64| (place - first) as usize;
+        let stored = |position: f64| (position - first) as usize;
         let cells = count + 2 * PAD - 3;
         let middle =
             (high >= first && low < end).then(|| (stored(low.max(first)), stored(high.min(end)).min(cells - 1)));
@@ -137,16 +137,16 @@ impl HeightBounds {
     /// The field's cells that an interval outside falls on.
     fn folded(&self, low: f64, high: f64, count: usize) -> (usize, usize) {
         let last = (count - 1) as f64;
-        let cell = |place: f64| (place.max(0.0) as usize).min(count - 2);
+        let cell = |position: f64| (position.max(0.0) as usize).min(count - 2);
         match self.surroundings {
             Surroundings::Border => (cell(low.min(last)), cell(high.min(last))),
             Surroundings::Mirror => {
-                // Written so that a place that is not a number falls here too.
+                // Written so that NaN takes this branch too.
                 if !(high - low < last && low.abs().max(high.abs()) < 1.0e15) {
                     return (0, count - 2);
                 }
-                let image = |place: f64| {
-                    let turned = place - 2.0 * last * (place / (2.0 * last)).floor();
+                let image = |position: f64| {
+                    let turned = position - 2.0 * last * (position / (2.0 * last)).floor();
                     if turned > last { 2.0 * last - turned } else { turned }
                 };
                 let (a, b) = (image(low), image(high));

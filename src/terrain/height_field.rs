@@ -91,7 +91,7 @@ impl HeightField {
         DVec2::new((self.columns - 1) as f64, (self.rows - 1) as f64) * self.spacing
     }
 
-    /// Local position (x east, z south, metres) of a sample. Indices outside the grid give the place where that
+    /// Local position (x east, z south, metres) of a sample. Indices outside the grid give the position where that
     /// sample would be.
     pub fn position(&self, column: usize, row: usize) -> DVec2 {
         let centre = DVec2::new((self.columns - 1) as f64, (self.rows - 1) as f64) * 0.5;

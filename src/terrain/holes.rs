@@ -75,9 +75,9 @@ fn averaged(columns: usize, rows: usize, heights: &[f32]) -> Vec<f32> {
 /// Bilinear interpolation of the coarser level at a fine sample (a coarse sample lies in the middle of its block).
 fn interpolated(coarse: &[f32], columns: usize, rows: usize, column: usize, row: usize) -> f32 {
     let axis = |index: usize, count: usize| {
-        let place = (index as f32 * 0.5 - 0.25).clamp(0.0, (count - 1) as f32);
-        let low = place as usize;
-        (low, (low + 1).min(count - 1), place - low as f32)
+        let position = (index as f32 * 0.5 - 0.25).clamp(0.0, (count - 1) as f32);
+        let low = position as usize;
+        (low, (low + 1).min(count - 1), position - low as f32)
     };
     let (c0, c1, u) = axis(column, columns);
     let (r0, r1, v) = axis(row, rows);

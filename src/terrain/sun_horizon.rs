@@ -6,13 +6,15 @@
 //! H(p) = max over s > 0 of  h(p + s u) - s t
 //! ```
 //!
-//! upwards. Along one line towards the sun this is a running maximum, `H <- max(H, h) - step * t`, so all heights of a line cost one pass.
-//! The grid is swept along lines that run exactly in the sun's azimuth (a sheared grid; each line is stepped from row to row, or from column to
-//! column where the azimuth is nearer to those), and the cells take the linear interpolation between the two lines beside them.
-//! Nothing is interpolated twice, so shadows do not blur with their length.
+//! upwards. Along one line towards the sun this is a running maximum, `H <- max(H, h) - step * t`, so all heights of a
+//! line cost one pass. The grid is swept along lines that run exactly in the sun's azimuth (a sheared grid; each line
+//! is stepped from row to row, or from column to column where the azimuth is nearer to those), and the cells take the
+//! linear interpolation between the two lines beside them. Nothing is interpolated twice, so shadows do not blur with
+//! their length.
 //!
 //! Cost: one [`Terrain::height`] per line and row, 5 to 15 ms for 384² cells on two cores.
-//! Limits: relief between two steps of a line (outside the field: within a sample of the field) is not seen; the earth's curvature (8 m over 10 km) and refraction are left out.
+//! Limits: relief between two steps of a line (outside the field: within a sample of the field) is not seen; the
+//! earth's curvature (8 m over 10 km) and refraction are left out.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -24,9 +26,9 @@ const TANGENTS: (f64, f64) = (-1.0, 1000.0);
 /// Steps towards the sun beyond the field at most.
 const MAX_STEPS: f64 = 65_536.0;
 
-/// The grid that horizons are computed on: it covers the field (`Terrain::extent`) with equal cells. Cell `(c, r)` has its
-/// centre at `x = ((c + 0.5) / columns - 0.5) * extent.x`, `z = ((r + 0.5) / rows - 0.5) * extent.y`, like the texels of a texture
-/// spread over the field.
+/// The grid that horizons are computed on: it covers the field (`Terrain::extent`) with equal cells. Cell `(c, r)` has
+/// its centre at `x = ((c + 0.5) / columns - 0.5) * extent.x`, `z = ((r + 0.5) / rows - 0.5) * extent.y`, like the
+/// texels of a texture spread over the field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HorizonGrid {
     /// Cells from west to east, 1 or more.
@@ -37,14 +39,14 @@ pub struct HorizonGrid {
     pub max_distance: u32,
 }
 
-/// For each cell of the grid (row by row from the north) the height in metres above the datum from which on a point sees the
-/// centre of the sun over the terrain. `sun` points to the sun (x east, y up, z south; any length).
+/// For each cell of the grid (row by row from the north) the height in metres above the datum from which on a point
+/// sees the centre of the sun over the terrain. `sun` points to the sun (x east, y up, z south; any length).
 ///
-/// In the shader, visibility is a smooth step of `y - horizon` over the sun's penumbra: its width is about `0.0093 * distance` to the
-/// obstacle. The ground before the first step does not shade itself here; that is left to the normal.
+/// In the shader, visibility is a smooth step of `y - horizon` over the sun's penumbra: its width is about `0.0093 *
+/// distance` to the obstacle. The ground before the first step does not shade itself here; that is left to the normal.
 ///
-/// At and below the horizon the result is what the flat continuation gives: finite, and higher the lower the sun stands. A `sun`
-/// that is zero or not finite counts as the zenith.
+/// At and below the horizon the result is what the flat continuation gives: finite, and higher the lower the sun
+/// stands. A `sun` that is zero or not finite counts as the zenith.
 ///
 /// # Errors
 /// A grid without cells or of more than [`MAX_SAMPLES`].
@@ -80,8 +82,8 @@ struct Sweep {
     shear: f64,
     /// Ground distance of a step in metres, and the fall of a sun ray over it.
     fall: f64,
-    /// Steps towards the sun beyond a line's first cell, and how many of them are taken at once: out there a sample of the field
-    /// is fine enough.
+    /// Steps towards the sun beyond a line's first cell, and how many of them are taken at once: out there a sample of
+    /// the field is fine enough.
     run_up: usize,
     stride: usize,
     /// "Across" coordinate of line 0 at the cell farthest from the sun, and the number of lines.
@@ -145,8 +147,8 @@ impl Sweep {
         if self.towards_end { along } else { self.along - 1 - along }
     }
 
-    /// The horizon on one line: one value per step, index 0 is the cell farthest from the sun. Steps at which the line lies beside
-    /// the field keep 0: no cell reads them.
+    /// The horizon on one line: one value per step, index 0 is the cell farthest from the sun. Steps at which the line
+    /// lies beside the field keep 0: no cell reads them.
     fn line(&self, terrain: &Terrain, line: usize) -> Vec<f32> {
         let mut horizon = vec![0.0; self.along];
         let start = self.first_line + line as f64;
@@ -179,16 +181,16 @@ impl Sweep {
         let steps = steps as f64;
         let along = if self.towards_end { steps } else { (self.along - 1) as f64 - steps };
         let across = start + self.shear * steps;
-        let place = if self.along_x { DVec2::new(along, across) } else { DVec2::new(across, along) };
-        let metres = (place + 0.5) * self.cell - 0.5 * self.extent;
+        let position = if self.along_x { DVec2::new(along, across) } else { DVec2::new(across, along) };
+        let metres = (position + 0.5) * self.cell - 0.5 * self.extent;
         terrain.height(metres.x, metres.y)
     }
 
     fn between_lines(&self, lines: &[Vec<f32>], along: usize, across: usize) -> f32 {
         let steps = self.steps_sunward(along);
-        let place = (across as f64 - self.shear * steps as f64 - self.first_line).max(0.0);
-        let line = (place as usize).min(self.lines - 2);
-        let share = (place - line as f64) as f32;
+        let position = (across as f64 - self.shear * steps as f64 - self.first_line).max(0.0);
+        let line = (position as usize).min(self.lines - 2);
+        let share = (position - line as f64) as f32;
         lines[line][steps] * (1.0 - share) + lines[line + 1][steps] * share
     }
 }

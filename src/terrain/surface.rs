@@ -10,7 +10,7 @@ use super::extended_grid::{ExtendedGrid, PAD, Patch};
 use super::height_bounds::{BoundsInMetres, HeightBounds};
 use super::{GeoReference, HeightField, Surroundings};
 
-/// A height field with its smooth surface, its surroundings and, where known, its place on earth.
+/// A height field with its smooth surface, its surroundings and, where known, its location on earth.
 ///
 /// Local frame: metres, origin at the centre of the field, x east, z south, heights above the datum of the data. The
 /// surface is bicubic (Catmull-Rom), C1 over the whole plane, exact at the samples, exact for planes inside the
@@ -59,7 +59,7 @@ impl Terrain {
         self.field.extent()
     }
 
-    /// Whether a place lies on the field (its border included) and not in the surroundings.
+    /// Whether a position lies on the field (its border included) and not in the surroundings.
     pub fn contains(&self, x: f64, z: f64) -> bool {
         let half = self.extent() * 0.5;
         x.abs() <= half.x && z.abs() <= half.y
@@ -107,8 +107,8 @@ impl Terrain {
         self.bounds.clone()
     }
 
-    /// The bend of each stored cell in 1/m, in no meaningful order: the largest of `bend_of_triangles` at its corners (as limits
-    /// from inside the cell, where the sides differ).
+    /// The bend of each stored cell in 1/m, in no meaningful order: the largest of `bend_of_triangles` at its corners
+    /// (as limits from inside the cell, where the sides differ).
     pub(super) fn bends(&self) -> Vec<f32> {
         let (columns, rows) = (self.field.columns() + 2 * PAD - 3, self.field.rows() + 2 * PAD - 3);
         let scale =
@@ -150,10 +150,10 @@ pub(super) fn gradient_normal(gradient: DVec2) -> Vec3 {
     Vec3::new((-gradient.x * inverse_length) as f32, inverse_length as f32, (-gradient.y * inverse_length) as f32)
 }
 
-/// How far a surface with the second derivatives `[xx, xz, zz]` lies from a mesh of right triangles with legs of length 1 along x and
-/// z and the hypotenuse along (1, 1) or (1, -1), whichever is worse: the largest of
-/// `d(u, v) = (a u (1 - u) + 2 b v (1 - u) + c v (1 - v)) / 2` over `0 <= v <= u <= 1`, exact for quadratic surfaces. The images of
-/// the field run backwards, which swaps the two diagonals.
+/// How far a surface with the second derivatives `[xx, xz, zz]` lies from a mesh of right triangles with legs of length
+/// 1 along x and z and the hypotenuse along (1, 1) or (1, -1), whichever is worse: the largest of `d(u, v) = (a u (1 -
+/// u) + 2 b v (1 - u) + c v (1 - v)) / 2` over `0 <= v <= u <= 1`, exact for quadratic surfaces. The images of the
+/// field run backwards, which swaps the two diagonals.
 fn bend_of_triangles([a, b, c]: [f64; 3]) -> f64 {
     let mut largest = 0.125 * a.abs().max(c.abs());
     for b in [b, -b] {

@@ -32,8 +32,8 @@ pub fn offset_origin(position: Vec3, geometric_normal: Vec3, direction: Vec3) ->
     Vec3::new(moved(position.x, normal.x), moved(position.y, normal.y), moved(position.z, normal.z))
 }
 
-/// The starting point of a ray in `direction` from `position`, which lies at most `error` metres off its surface with the unit
-/// normal `geometric_normal` (either side's).
+/// The starting point of a ray in `direction` from `position`, which lies at most `error` metres off its surface with
+/// the unit normal `geometric_normal` (either side's).
 pub(crate) fn leave(position: Vec3, geometric_normal: Vec3, error: f32, direction: Vec3) -> Vec3 {
     let away = if geometric_normal.dot(direction) < 0.0 { -error } else { error };
     position + geometric_normal * away

@@ -9,7 +9,7 @@
 //! Edges hold as those of the rays do: each edge has a sign that both triangles at it compute from the same two
 //! products; a line that runs exactly through an edge or corner crosses every triangle there. Positions are taken
 //! around the middle of the plant in double precision and scaled by a power of two, so neither a plant's size nor its
-//! place matters; they are rounded to some 5e-8 of its extent, which is the error of `t` too.
+//! position matters; they are rounded to some 5e-8 of its extent, which is the error of `t` too.
 
 use std::ops::ControlFlow;
 
@@ -96,9 +96,9 @@ impl Grid {
         }
         let mut next = grid.starts.clone();
         for (of, (p, &cell)) in projected.iter().zip(&cells).enumerate().filter(|(_, (_, cell))| **cell != u32::MAX) {
-            let place = next[cell as usize] as usize;
+            let slot = next[cell as usize] as usize;
             next[cell as usize] += 1;
-            (grid.x[place], grid.y[place], grid.depth[place], grid.of[place]) = (p.x, p.y, p.z, of as u32);
+            (grid.x[slot], grid.y[slot], grid.depth[slot], grid.of[slot]) = (p.x, p.y, p.z, of as u32);
         }
         grid
     }
@@ -139,8 +139,8 @@ impl PlantTracer {
 impl ParallelTracer<'_> {
     /// Tells `visit` the crossings of the lines through the points in the unit vector `direction`, in both senses,
     /// before the alpha test ([`ParallelTracer::covers`]): of each point all, or as many until `visit` answers that it
-    /// needs no more of that point. In the same order whatever the thread; no order of depth. A triangle of a point's own
-    /// is crossed at `t` near 0.
+    /// needs no more of that point. In the same order whatever the thread; no order of depth. A triangle of a point's
+    /// own is crossed at `t` near 0.
     pub fn crossings(&self, direction: Vec3, mut visit: impl FnMut(LineCrossing) -> ControlFlow<()>) {
         let Some(along) = direction.try_normalize() else { return };
         let right = along.any_orthonormal_vector();
@@ -162,9 +162,9 @@ impl ParallelTracer<'_> {
                 for start in (first..end).step_by(LANES) {
                     let mut inside = grid.inside(start, a, b, c) & lanes_below(end - start);
                     while inside != 0 {
-                        let place = start + inside.trailing_zeros() as usize;
+                        let slot = start + inside.trailing_zeros() as usize;
                         inside &= inside - 1;
-                        let [wa, wb, wc] = weights(a, b, c, grid.x[place], grid.y[place]);
+                        let [wa, wb, wc] = weights(a, b, c, grid.x[slot], grid.y[slot]);
                         let sum = wa + wb + wc;
                         if sum == 0.0 {
                             continue;
@@ -172,8 +172,8 @@ impl ParallelTracer<'_> {
                         let inverse = 1.0 / sum;
                         let depth = (wa * a.z + wb * b.z + wc * c.z) * inverse;
                         let crossing = LineCrossing {
-                            point: grid.of[place],
-                            t: (depth - grid.depth[place]) * metres,
+                            point: grid.of[slot],
+                            t: (depth - grid.depth[slot]) * metres,
                             u: wb * inverse,
                             v: wc * inverse,
                             triangle: triangle as u32,
@@ -181,7 +181,7 @@ impl ParallelTracer<'_> {
                         };
                         if visit(crossing).is_break() {
                             // Inside no triangle any more.
-                            grid.x[place] = f32::NAN;
+                            grid.x[slot] = f32::NAN;
                         }
                     }
                 }

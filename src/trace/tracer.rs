@@ -188,7 +188,7 @@ impl PlantTracer {
         self.bounds
     }
 
-    /// Whether a part's surface is there at a texture coordinate: its alpha test. False for a part that is none.
+    /// Whether a part's surface is there at a texture coordinate: its alpha test. False for a part that does not exist.
     pub fn covers(&self, part: u32, uv: Vec2) -> bool {
         self.surfaces.get(part as usize).is_some_and(|surface| surface.passes(uv))
     }

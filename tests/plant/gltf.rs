@@ -334,7 +334,7 @@ fn missing_and_broken_textures_leave_the_plant_untextured() {
         let primitive = format!(r#""attributes":{{"POSITION":{positions}}},"material":0"#);
         let (plant, warnings) = one(&mut glb, &primitive, "").expect("a plant");
         assert!(plant.parts[0].material.base_color_texture.is_none());
-        assert!(warnings.iter().any(|w| w.kind == WarningKind::Missing && w.place == "/images/0"), "{warnings:?}");
+        assert!(warnings.iter().any(|w| w.kind == WarningKind::Missing && w.location == "/images/0"), "{warnings:?}");
     }
 }
 
@@ -389,7 +389,7 @@ fn sparse_accessors_substitute_and_are_checked() {
         let result = one(&mut glb, &format!(r#""attributes":{{"POSITION":{positions}}},"indices":{triangle}"#), "");
         match result {
             Ok((plant, _)) if sound => assert!((plant.bounds().expect("vertices").size().x - 4.0).abs() < 1e-5),
-            Err(PlantError::Data { place, .. }) if !sound => assert_eq!(place, "/accessors/0/sparse"),
+            Err(PlantError::Data { location, .. }) if !sound => assert_eq!(location, "/accessors/0/sparse"),
             other => panic!("{index}: {other:?}"),
         }
     }
@@ -442,7 +442,7 @@ fn damaged_geometry_is_refused_with_its_place() {
     ];
     for (what, result, wanted) in broken {
         match result {
-            Err(PlantError::Data { place, .. }) => assert_eq!(place, wanted, "{what}"),
+            Err(PlantError::Data { location, .. }) => assert_eq!(location, wanted, "{what}"),
             // A node that is its own child is no root, so nothing is left to draw.
             Err(PlantError::Empty { .. }) => assert_eq!(wanted, "", "{what}"),
             other => panic!("{what}: {other:?}"),
@@ -466,8 +466,11 @@ fn what_a_plant_does_not_use_is_named() {
     let mut glb = tree();
     glb.with(r#""cameras":[{"type":"perspective","perspective":{"yfov":1,"znear":1}}],"extensionsUsed":["EXT_wind"]"#);
     let (_, warnings) = glb.load().expect("a plant");
-    for place in ["/cameras", "/extensionsUsed"] {
-        assert!(warnings.iter().any(|w| w.kind == WarningKind::Ignored && w.place == place), "{place}: {warnings:?}");
+    for location in ["/cameras", "/extensionsUsed"] {
+        assert!(
+            warnings.iter().any(|w| w.kind == WarningKind::Ignored && w.location == location),
+            "{location}: {warnings:?}"
+        );
     }
     let mut glb = tree();
     glb.with(r#""extensionsRequired":["KHR_draco_mesh_compression"]"#);

@@ -1,5 +1,5 @@
-//! The file format of a baked plant: a head of fixed size, and the plant's lighting and levels as `serde` and `postcard`
-//! write them. All numbers of the head are little-endian.
+//! The file format of a baked plant: a head of fixed size, and the plant's lighting and levels as `serde` and
+//! `postcard` write them. All numbers of the head are little-endian.
 //!
 //! ```text
 //!   offset  size  content
@@ -57,7 +57,7 @@ fn sealed(payload: &[u8], key: &[u8; 32]) -> Vec<u8> {
     file
 }
 
-/// Reads a file that should hold `plant` baked under `key`. `None` where anything at all is not as it must be.
+/// Reads a file that should hold `plant` baked under `key`. `None` if anything is wrong with it.
 pub(super) fn decode(file: &[u8], key: &CacheKey, plant: &Arc<Plant>) -> Option<BakedPlant> {
     let (head, rest) = file.split_at_checked(HEAD)?;
     let (sum, payload) = rest.split_at_checked(PAYLOAD - HEAD)?;
@@ -128,7 +128,7 @@ mod tests {
                     planes: vec![plane],
                     textures: CrossTextures { color: vec![chain.clone()], properties: vec![chain], light: Vec::new() },
                     transmission: Vec3::new(0.1, 0.2, 0.3),
-                    spread: [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 1.0],
+                    isotropic_fraction: [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 1.0],
                 })),
             ],
         }
@@ -141,7 +141,7 @@ mod tests {
         let mut baked = small();
         let settings = TransferSettings::default();
         let side: Vec<f32> = (0..3 * settings.coefficients()).map(|i| 0.2 - 0.001 * i as f32).collect();
-        let part = TransferPart { front: side.clone(), back: side, scattered: vec![0.1; 12] };
+        let part = TransferPart { front: side.clone(), back: side, indirect_sun: vec![0.1; 12] };
         let packed = TransferBake { settings, parts: vec![part] }.pack(TransferFormat::Snorm8);
         let mut cross = (**baked.cross().unwrap()).clone();
         cross.textures.light = cross.textures.color.clone();

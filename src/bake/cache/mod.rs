@@ -1,10 +1,10 @@
-//! Baked plants on disk, found by the content they were made from.
+//! Baked plants on disk, keyed by the content that they were made from.
 //!
 //! The name of a file is the BLAKE3 hash of everything that the bake reads (meshes, materials, textures, settings)
-//! and of the version of the bakes: a changed input is another file, so nothing ever has to be invalidated. A file
-//! is believed only after its magic, version, key, length and checksum agree (`codec.rs`); anything else counts as
-//! absent and is computed and written again. Files appear whole or not at all (written beside, then renamed), so
-//! any number of processes may share a folder.
+//! and of the version of the bakes: a changed input has another file, so nothing ever has to be invalidated. A file
+//! is used only if its magic, version, key, length and checksum agree (`codec.rs`); otherwise it counts as absent, and
+//! is computed and written again. Files appear whole or not at all (written to a temporary name, then renamed), so any
+//! number of processes may share a folder.
 //!
 //! Files of plants that are no longer used stay; the folder may be deleted at any time.
 
@@ -21,7 +21,7 @@ use crate::files;
 use crate::lod::Representation;
 use crate::plant::Plant;
 
-/// What identifies a baked plant: a hash of all inputs of the bake.
+/// Identifier of a baked plant: a hash of all inputs of the bake.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct CacheKey {
     hash: [u8; 32],
@@ -30,8 +30,8 @@ pub struct CacheKey {
 }
 
 impl CacheKey {
-    /// Hashes everything that a bake of `plant` with `settings` reads. Neither the plant's name nor its normal
-    /// textures are among it.
+    /// Hashes everything that a bake of `plant` with `settings` reads. The plant's name and its normal
+    /// textures are not included.
     pub fn new(plant: &Plant, settings: &BakeSettings) -> Self {
         let mut hasher = blake3::Hasher::new();
         hasher.update(&codec::VERSION.to_le_bytes());
@@ -58,14 +58,14 @@ pub struct Cache {
 }
 
 impl Cache {
-    /// A cache in `folder`, which is made when the first plant is stored.
+    /// A cache in `folder`, which is created when the first plant is stored.
     pub fn new(folder: impl Into<PathBuf>) -> Self {
         Self { folder: folder.into() }
     }
 
-    /// The user's cache: the folder `$CANOPY_CACHE` where that is set and not empty, else the folder `canopy` where the system
-    /// keeps caches: `$XDG_CACHE_HOME` or `~/.cache` on Linux, `~/Library/Caches` on macOS, `%LOCALAPPDATA%` on Windows.
-    /// `None` where there is neither.
+    /// The user's cache: the folder `$CANOPY_CACHE` where that is set and not empty, else the folder `canopy` where the
+    /// system keeps caches: `$XDG_CACHE_HOME` or `~/.cache` on Linux, `~/Library/Caches` on macOS, `%LOCALAPPDATA%` on
+    /// Windows. `None` if there is neither.
     pub fn of_user() -> Option<Self> {
         user_folder(std::env::var_os("CANOPY_CACHE"), dirs::cache_dir()).map(Self::new)
     }
@@ -80,8 +80,7 @@ impl Cache {
         self.folder.join(key.to_hex()).with_extension("bake")
     }
 
-    /// The baked plant with `key`, which is that of `plant`. `None` where there is none, or none that is whole and of
-    /// this version.
+    /// Loads the baked plant with `key`, the key of `plant`. `None` if there is none that is whole and of this version.
     pub fn load(&self, key: &CacheKey, plant: &Arc<Plant>) -> Option<BakedPlant> {
         let bytes = std::fs::read(self.file(key)).ok()?;
         codec::decode(&bytes, key, plant)

@@ -1,13 +1,13 @@
-//! What a plant is drawn as, apart from its full model: one module a representation, and the list of them.
+//! Baked representations of a plant besides its full model: one module per representation, and the list of them.
 //!
 //! | module | makes | after |
 //! |---|---|---|
-//! | [`cross`] | crossed billboards with colour, normal, k_a | [Franzke 2005, 4.3] |
+//! | [`cross`] | crossed billboards with colour, normal, ambient term | [Franzke 2005, 4.3] |
 //! | [`shadow_proxy`] | a lighter model with the same projected area | [Cook et al. 2007] |
-//! | [`rasterize`] | which triangle each sample of a picture sees: what both need | |
+//! | [`rasterize`] | which triangle each sample of an image shows; used by both | |
 //!
-//! A bake for another representation is a module here, a variant of [`BakedLevel`] (at the end: the cache counts them), and
-//! a line in the list of bakers.
+//! A bake for another representation is a module here, a variant of [`BakedLevel`] (at the end: the cache counts them),
+//! and a line in the list of bakers.
 
 pub mod cross;
 pub mod rasterize;
@@ -22,13 +22,13 @@ use super::{BakeSettings, lighting::BakedLighting};
 use crate::lod::Representation;
 use crate::plant::{Plant, PlantMesh};
 
-/// What is baked of a plant for one representation. Who draws plants sees by the pointers what of one has changed.
+/// The baked data of a plant for one representation. The renderer finds changes by pointer equality.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum BakedLevel {
-    /// For [`Representation::MODEL`], a lighter model (parts in the plant's order) with the same projected area, which casts
-    /// the near shadow.
+    /// For [`Representation::MODEL`]: the shadow proxy, a lighter model (parts in the plant's order) with the same
+    /// projected area, which casts the near shadow.
     ShadowProxy(#[serde(with = "shared")] Arc<Vec<PlantMesh>>),
-    /// For [`Representation::CROSS`], crossed billboards.
+    /// For [`Representation::CROSS`]: crossed billboards.
     Cross(#[serde(with = "shared")] Arc<Cross>),
 }
 
@@ -41,7 +41,7 @@ impl BakedLevel {
         }
     }
 
-    /// Whether it can be one of `plant` under `lighting`, and all of its values are in their ranges.
+    /// Whether it fits `plant` under `lighting`, and all of its values are in their ranges.
     pub fn fits(&self, plant: &Plant, lighting: &BakedLighting) -> bool {
         match self {
             Self::ShadowProxy(meshes) => meshes.len() == plant.parts.len() && meshes.iter().all(PlantMesh::is_whole),
@@ -50,7 +50,7 @@ impl BakedLevel {
     }
 }
 
-/// Shared content is written as what is shared.
+/// Serialises the content of an [`Arc`].
 mod shared {
     use std::sync::Arc;
 
@@ -67,7 +67,7 @@ mod shared {
 
 type Bake = fn(&Plant, &BakedLighting, &BakeSettings) -> BakedLevel;
 
-/// The representations that need a bake, and what bakes them.
+/// The representations that need a bake, and the functions that bake them.
 const BAKERS: [(Representation, Bake); 2] =
     [(Representation::MODEL, bake_proxy), (Representation::CROSS, bake_crosses)];
 

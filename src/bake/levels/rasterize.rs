@@ -2,7 +2,7 @@
 //!
 //! Point samples, a depth buffer, the alpha test of the plant's own textures at full resolution (so that the mean
 //! over many samples is the true coverage, which a filtered alpha would bias), both sides of every triangle. The
-//! picture is cut into bands of rows that are independent of one another: rayon works on them in any order, and
+//! image is cut into bands of rows that are independent of one another: rayon works on them in any order, and
 //! within a band triangles are drawn in a fixed order, so the result is the same whatever the threads.
 //!
 //! Triangles are drawn from front to back: in a crown of many layers the depth buffer then rejects most samples
@@ -18,9 +18,9 @@ use crate::plant::{Bounds, Plant, PlantPart, geometry, surface::Surface};
 pub struct View {
     /// Middle of the rectangle, metres.
     pub center: Vec3,
-    /// From the middle to the right border, metres. A zero vector makes an empty picture.
+    /// From the middle to the right border, metres. A zero vector makes an empty image.
     pub right: Vec3,
-    /// From the middle to the upper border, metres. A zero vector makes an empty picture.
+    /// From the middle to the upper border, metres. A zero vector makes an empty image.
     pub up: Vec3,
     /// Unit vector from the rectangle to the viewer.
     pub toward: Vec3,
@@ -75,7 +75,7 @@ pub(crate) struct Raster {
 }
 
 impl Raster {
-    /// Projects `plant` for a picture of `width` x `height` samples, in bands of `band_rows` rows.
+    /// Projects `plant` for an image of `width` x `height` samples, in bands of `band_rows` rows.
     pub fn new(plant: &Plant, view: &View, width: u32, height: u32, band_rows: u32) -> Self {
         let inverse = |axis: Vec3| if axis.length_squared() > 0.0 { axis / axis.length_squared() } else { Vec3::ZERO };
         let (right, up) = (inverse(view.right), inverse(view.up));

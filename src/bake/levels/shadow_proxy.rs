@@ -1,13 +1,14 @@
-//! A lighter model with the same look from afar: fewer and larger leaf cards, thick wood only.
+//! The shadow proxy: a lighter model that looks the same from afar, with fewer and larger leaf cards and only thick
+//! wood.
 //!
-//! Stochastic simplification [Cook, Halstead, Planck & Ryu 2007, "Stochastic Simplification of Aggregate Detail"]: of
-//! an aggregate of many alike elements an evenly chosen subset is kept (their section 3.1) and enlarged so that the
-//! area stays (3.2). An element is a connected piece of foliage, a card. The order in which elements are dropped does
-//! not depend on the target, so a smaller model's elements are a subset of a larger one's.
+//! Stochastic simplification [Cook, Halstead, Planck & Ryu 2007, "Stochastic Simplification of Aggregate Detail"]: it
+//! keeps an evenly chosen subset of many similar elements (their section 3.1) and enlarges them so that the total area
+//! stays the same (3.2). An element is a connected piece of foliage, a card. The order in which elements are dropped
+//! does not depend on the target, so the elements of a smaller model are a subset of those of a larger one.
 //!
-//! Area alone does not keep the *projected* area: cards grow in clumps along twigs, larger ones reach out of their
-//! clump and overlap less. So the scale is corrected until the outline's area, rasterised from several directions,
-//! is the full model's.
+//! Equal area does not mean equal *projected* area: cards grow in clumps along twigs; enlarged ones extend beyond their
+//! clump and overlap less. So the scale is corrected until the area of the outline, rasterised from several directions,
+//! equals that of the full model.
 //!
 //! Limits: an element is kept or dropped as a whole, so foliage of one single connected surface, or a trunk that is
 //! welded to all its branches, is not simplified; the result may then have more triangles than the target.
@@ -19,15 +20,15 @@ use crate::math::hash::mix32;
 use crate::plant::geometry::{self, Element};
 use crate::plant::{PartKind, Plant, PlantMesh, PlantPart};
 
-/// A lighter model that casts the near sun shadow: the meshes of [`simplify_foliage`], one a part in the plant's
-/// order (a part that lost everything has an empty mesh).
+/// A lighter model that casts the near sun shadow: the meshes of [`simplify_foliage`], one per part in the plant's
+/// order (a part that lost all its triangles has an empty mesh).
 pub fn shadow_proxy(plant: &Plant, triangle_target: usize) -> Vec<PlantMesh> {
     simplify_foliage(plant, triangle_target).parts.into_iter().map(|part| part.mesh).collect()
 }
 
 /// A model of about `triangle_target` triangles (wood and foliage together, shared out as in the original) with the
 /// projected area of the full one. Parts, materials and their order stay. A target at or above the plant's own count
-/// gives the plant itself; a part with foliage keeps at least one element, a part with wood its stoutest branch.
+/// returns the plant itself. A part with foliage keeps at least one element, a part with wood its thickest branch.
 pub fn simplify_foliage(plant: &Plant, triangle_target: usize) -> Plant {
     let total: usize = plant.parts.iter().map(|part| part.mesh.triangles.len()).sum();
     if triangle_target >= total {
@@ -36,7 +37,7 @@ pub fn simplify_foliage(plant: &Plant, triangle_target: usize) -> Plant {
     let Some(bounds) = plant.bounds() else { return plant.clone() };
     let elements: Vec<Vec<Element>> = plant.parts.iter().map(|part| geometry::elements(&part.mesh)).collect();
 
-    // Wood first: what it cannot give up is taken from the foliage's share, so that the total comes out.
+    // Wood first: triangles that it has to keep are taken from the foliage's share, so that the total is right.
     let share = |part: &PlantPart| (triangle_target as f64 * part.mesh.triangles.len() as f64 / total as f64) as usize;
     let mut kept: Vec<Vec<u32>> = vec![Vec::new(); plant.parts.len()];
     for (index, part) in plant.parts.iter().enumerate().filter(|(_, part)| part.kind == PartKind::Wood) {
@@ -172,22 +173,22 @@ fn area_keeping_scale(elements: &[Element], kept: &[u32]) -> f32 {
 /// The mesh of the kept elements, each scaled about its centre.
 fn extract(mesh: &PlantMesh, elements: &[Element], kept: &[u32], scale: f32) -> PlantMesh {
     let mut out = PlantMesh::default();
-    let mut places = vec![u32::MAX; mesh.positions.len()];
+    let mut slots = vec![u32::MAX; mesh.positions.len()];
     for &index in kept {
         let element = &elements[index as usize];
         // A vertex that two elements share is moved with each: so places are forgotten from element to element.
         let corners = || element.triangles.iter().flat_map(|&t| mesh.triangles[t as usize]);
-        corners().for_each(|corner| places[corner as usize] = u32::MAX);
+        corners().for_each(|corner| slots[corner as usize] = u32::MAX);
         for &triangle in &element.triangles {
             let moved = mesh.triangles[triangle as usize].map(|corner| {
                 let from = corner as usize;
-                if places[from] == u32::MAX {
-                    places[from] = out.positions.len() as u32;
+                if slots[from] == u32::MAX {
+                    slots[from] = out.positions.len() as u32;
                     out.positions.push(element.center + scale * (mesh.positions[from] - element.center));
                     out.normals.push(mesh.normals[from]);
                     out.uvs.push(mesh.uvs[from]);
                 }
-                places[from]
+                slots[from]
             });
             out.triangles.push(moved);
         }
@@ -195,7 +196,7 @@ fn extract(mesh: &PlantMesh, elements: &[Element], kept: &[u32], scale: f32) -> 
     out
 }
 
-/// Spreads the lowest ten bits of `bits` to every third place.
+/// Spreads the lowest ten bits of `bits` to every third bit.
 fn interleave(bits: u32) -> u32 {
     let mut x = bits & 0x3ff;
     x = (x | x << 16) & 0x0300_00ff;
@@ -216,11 +217,11 @@ mod tests {
 
     #[test]
     fn the_choice_is_even_and_a_smaller_one_is_part_of_a_larger() {
-        // Cards on a lattice of 16 x 16 x 4, two a place.
+        // Cards on a lattice of 16 x 16 x 4, two per lattice point.
         let elements: Vec<Element> = (0..2048u32)
             .map(|i| {
-                let place = i / 2;
-                let center = Vec3::new((place % 16) as f32, (place / 16 % 16) as f32, (place / 256) as f32);
+                let slot = i / 2;
+                let center = Vec3::new((slot % 16) as f32, (slot / 16 % 16) as f32, (slot / 256) as f32);
                 Element { triangles: vec![2 * i, 2 * i + 1], area: 1.0, center }
             })
             .collect();

@@ -1,12 +1,12 @@
-//! How a plant is lit: what is baked for it, vertex by vertex, and what its billboards take over.
+//! How a plant is lit: the data that is baked per vertex, and the part of it that billboards use.
 //!
 //! | model | baked | vertex bytes beyond position, normal, texture coordinates |
 //! |---|---|--:|
 //! | [`LightingSettings::Local`] | nothing | 0 |
-//! | [`LightingSettings::Expressive`] | realigned normals, k_a ([`implicit`]) | 0: k_a is the normal's length |
-//! | [`LightingSettings::Transfer`] | how the sky reaches each side of each vertex ([`transfer`]) | see there; 40 for foliage with 4 bands |
+//! | [`LightingSettings::Expressive`] | realigned normals, ambient term ([`implicit`]) | 0: see [`implicit::packing`] |
+//! | [`LightingSettings::Transfer`] | radiance transfer of each side ([`transfer`]) | see there; foliage, 4 bands: 40 |
 //!
-//! The models are alternatives: what a plant does not use is neither baked, nor kept, nor uploaded.
+//! The models are alternatives: data that a plant does not use is not baked, stored or uploaded.
 
 pub mod implicit;
 pub mod transfer;
@@ -18,26 +18,30 @@ use serde::{Deserialize, Serialize};
 
 use crate::plant::Plant;
 use implicit::{AmbientField, ImplicitSettings, NoSurface, bake_implicit};
-use transfer::{PackedPart, PackedTransfer, SCATTERED, TransferFormat, TransferSettings, bake_transfer};
+use transfer::{
+    INDIRECT_SUN_COEFFICIENTS, PackedPart, PackedTransfer, TransferFormat, TransferSettings, bake_transfer,
+};
 
-/// How the sun (or the moon, where it is the brighter) lights a plant's full models. Nothing is baked for it.
+/// How the key light (sun or moon) lights a plant's full models. It needs no bake of its own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Serialize)]
 pub enum SunLight {
-    /// Each leaf by the angle of its own normal to the sun, front and back [Franzke 2005, 4.2.2]: sharp, and true.
+    /// Each leaf by the angle between its own normal and the sun, front and back [Franzke 2005, 4.2.2]: sharp and
+    /// accurate.
     #[default]
     LeafShader,
-    /// The sun projected onto spherical harmonics, through the plant's transfer, dimmed by the shadow map, as published for
-    /// landscapes [Franzke 2005, 4.3.3]. A few bands hold no disc, and the plant's own shadow counts twice: soft and dark,
-    /// to compare with. Only for plants that are lit by transfer; others, and crosses, take the leaf shader.
+    /// The sun projected onto spherical harmonics, through the plant's transfer, times the shadow map, as published for
+    /// landscapes [Franzke 2005, 4.3.3]. A few bands cannot represent a disc, and the plant's own shadow counts twice:
+    /// the result is soft and dark, for comparison. Only for plants that are lit by transfer; others, and crosses, use
+    /// the leaf shader.
     Harmonics,
 }
 
-/// Which light a plant gets.
+/// The lighting model of a plant.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum LightingSettings {
-    /// The leaves' own normals, all light from everywhere: [Luft 2007, fig. 1a], to compare with.
+    /// The leaves' own normals, without ambient occlusion [Luft 2007, fig. 1a], for comparison.
     Local,
-    /// Normals and ambient term of the crown's implicit surface [Luft 2007].
+    /// Normals and ambient term from the crown's implicit surface [Luft 2007].
     Expressive(ImplicitSettings),
     /// The sky by radiance transfer, the sun by the leaves' own normals and the shadow map [Franzke 2005, 4.2].
     Transfer(TransferSettings),
@@ -50,37 +54,37 @@ impl Default for LightingSettings {
 }
 
 impl LightingSettings {
-    /// The settings with every value moved into its range.
-    pub fn in_range(self) -> Self {
+    /// The settings with every value clamped to its range.
+    pub fn sanitized(self) -> Self {
         match self {
             Self::Local => Self::Local,
-            Self::Expressive(settings) => Self::Expressive(settings.in_range()),
-            Self::Transfer(settings) => Self::Transfer(settings.in_range()),
+            Self::Expressive(settings) => Self::Expressive(settings.sanitized()),
+            Self::Transfer(settings) => Self::Transfer(settings.sanitized()),
         }
     }
 }
 
-/// What was baked. Lists have one entry a part in the plant's order, each with one value a vertex.
+/// Baked lighting data. Lists have one entry per part in the plant's order, each with one value per vertex.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum BakedLighting {
     /// Nothing.
     #[default]
     Local,
-    /// Of the implicit surface.
+    /// From the implicit surface.
     Expressive(ExpressiveLighting),
-    /// Of radiance transfer.
+    /// Radiance transfer.
     Transfer(TransferLighting),
 }
 
-/// What is kept of an implicit surface's bake.
+/// The data of an implicit-surface bake that rendering needs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ExpressiveLighting {
-    /// Unit normals. Those of foliage point out of the crown, whichever side of a leaf is seen, unless `no_surface`. Empty
-    /// where the foliage keeps its own.
+    /// Unit normals. Those of foliage point out of the crown, whichever side of a leaf is visible, unless `no_surface`
+    /// is set. Empty if the foliage keeps its own normals.
     pub normals: Vec<Vec<Vec3>>,
-    /// k_a, 0..=1.
+    /// Ambient term (the paper's k_a), 0..=1.
     pub ambient: Vec<Vec<f32>>,
-    /// Why the foliage has its own normals after all.
+    /// Why there is no surface, so that the foliage keeps its own normals.
     pub no_surface: Option<NoSurface>,
     /// What k_a is a function of, which decides what the shaders make of it.
     pub ambient_field: AmbientField,
@@ -98,7 +102,7 @@ impl ExpressiveLighting {
         no_surface: Option<NoSurface>,
         settings: &ImplicitSettings,
     ) -> Self {
-        let own_normal = settings.in_range().own_normal;
+        let own_normal = settings.sanitized().own_normal;
         let normals = if own_normal < 1.0 { normals } else { Vec::new() };
         Self { normals, ambient, no_surface, ambient_field: settings.ambient, together: false }
     }
@@ -123,12 +127,12 @@ pub enum AmbientTerm {
 pub struct TransferLighting {
     /// The coefficients, as the vertex shader reads them.
     pub packed: PackedTransfer,
-    /// k_a, 0..=1: the light under an even sky of both sides, as a share of what they would get in the open.
+    /// Ambient term, 0..=1: light on both sides under a uniform sky, as a fraction of the light on an unoccluded leaf.
     pub ambient: Vec<Vec<f32>>,
 }
 
 impl TransferLighting {
-    /// With k_a from the coefficients.
+    /// Derives the ambient term from the coefficients.
     pub fn new(packed: PackedTransfer) -> Self {
         /// The first coefficient of a side in the open.
         const OPEN: f32 = 0.282_094_79;
@@ -192,7 +196,7 @@ impl BakedLighting {
         }
     }
 
-    /// k_a of the vertices of part `part`, 0..=1; empty where all of them are 1.
+    /// Ambient term of the vertices of part `part`, 0..=1; empty if all of them are 1.
     pub fn ambient(&self, part: usize) -> &[f32] {
         match self {
             Self::Local => &[],
@@ -209,20 +213,20 @@ impl BakedLighting {
         }
     }
 
-    /// Light of a sun that leaves send each other, in the mean over the foliage's vertices: the first coefficient and the rise
-    /// of the second band towards the zenith ([`transfer::TransferPart::scattered`]); zeros where it was not baked.
-    pub fn scattered(&self) -> (f32, f32) {
+    /// Mean indirect sunlight (scattered between leaves) over the foliage's vertices, in SH: the first coefficient, and
+    /// the zenith component of the second band ([`transfer::TransferPart::indirect_sun`]). Zeros if it was not baked.
+    pub fn indirect_sun(&self) -> (f32, f32) {
         let Self::Transfer(TransferLighting { packed, .. }) = self else { return (0.0, 0.0) };
-        let (mut mean, mut rise, mut count) = (0.0, 0.0, 0.0);
+        let (mut mean, mut zenith, mut count) = (0.0, 0.0, 0.0);
         for part in packed.parts.iter().filter(|part| part.sides == 2) {
-            for vertex in part.scattered.chunks_exact(SCATTERED) {
-                let value = |index: usize| f64::from(vertex[index] as i8) / 127.0 * f64::from(part.scattered_scale);
+            for vertex in part.indirect_sun.chunks_exact(INDIRECT_SUN_COEFFICIENTS) {
+                let value = |index: usize| f64::from(vertex[index] as i8) / 127.0 * f64::from(part.indirect_sun_scale);
                 mean += value(0);
-                rise += value(2);
+                zenith += value(2);
                 count += 1.0;
             }
         }
-        if count > 0.0 { ((mean / count) as f32, (rise / count) as f32) } else { (0.0, 0.0) }
+        if count > 0.0 { ((mean / count) as f32, (zenith / count) as f32) } else { (0.0, 0.0) }
     }
 
     /// Whether the lists have as many entries as `plant` has parts and vertices, and all values are in their ranges.

@@ -15,7 +15,7 @@
 //! The isotropic, local assumption is weak where illumination changes over a mean free path, in twilight. Against
 //! published horizontal illuminances of clear skies (this room's tests) the model is right within 6 % for a sun above
 //! 30 degrees, 20 % high at 10, 30 % high at 0, 50 % high at -6 and 15 % high at -12; below -15 nearly all light is
-//! that of the night sky. Refraction bends no ray in the air; the sun's own place includes it. The polarisation of
+//! that of the night sky. Refraction bends no ray in the air; the sun's own position includes it. The polarisation of
 //! light is ignored (up to 10 % of Rayleigh radiance).
 
 mod ground;

@@ -1,4 +1,4 @@
-//! The sky as a picture: radiance over azimuth and elevation, for the sky pass, the fog and the light.
+//! The sky as a texture: radiance over azimuth and elevation, for the sky pass, the fog and the light.
 //!
 //! # Parametrisation (the shader repeats it)
 //! `W = 129` columns, `H = 97` rows, row-major, texel CENTRES on the grid: the first and last columns and rows lie on
@@ -32,7 +32,7 @@ use super::{Atmosphere, VIEW_STEPS, haze_weight, unit};
 /// Steps along the short rays that end on the ground.
 const GROUND_STEPS: usize = 12;
 
-/// A picture of the sky. See the module's page for its parametrisation.
+/// A texture of the sky. See the module's page for its parametrisation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SkyView {
     /// Horizontal unit vector `(x, z)` towards the sun: the middle column.

@@ -80,7 +80,7 @@ pub(super) fn read_attribute(
         && layout.shape == Type::Vec2;
     if layout.shape != expected.shape || !(float || (small && expected.integers) || normalized_uv) {
         let what = format!("{:?} of {:?} cannot serve as {}", layout.shape, layout.component, expected.name);
-        return Err(Fault::new(place(index), what, EXPORT_AGAIN));
+        return Err(Fault::new(location(index), what, EXPORT_AGAIN));
     }
     let values = read_values(document, index, &layout)?;
     Ok(Elements { values, width: layout.shape.multiplicity() })
@@ -92,16 +92,16 @@ pub(super) fn read_indices(document: &mut Document, index: usize, warnings: &mut
     let unsigned = matches!(layout.component, ComponentType::U8 | ComponentType::U16 | ComponentType::U32);
     if layout.shape != Type::Scalar || !unsigned {
         let what = format!("{:?} of {:?} cannot serve as indices", layout.shape, layout.component);
-        return Err(Fault::new(place(index), what, EXPORT_AGAIN));
+        return Err(Fault::new(location(index), what, EXPORT_AGAIN));
     }
     if layout.stride != layout.element_size() {
-        warnings.push(WarningKind::Repaired, place(index), "indices with a byteStride; read nevertheless");
+        warnings.push(WarningKind::Repaired, location(index), "indices with a byteStride; read nevertheless");
     }
     let raw = read_raw(document, index, &layout)?;
     Ok(raw.chunks_exact(layout.component.size().max(1)).map(unsigned_value).collect())
 }
 
-fn place(index: usize) -> String {
+fn location(index: usize) -> String {
     format!("/accessors/{index}")
 }
 
@@ -109,14 +109,14 @@ fn layout(document: &Document, index: usize, warnings: &mut Warnings) -> Result<
     let root = &document.root;
     let Some(accessor) = root.accessors.get(index) else {
         let what = format!("does not exist, there are {}", root.accessors.len());
-        return Err(Fault::new(place(index), what, EXPORT_AGAIN));
+        return Err(Fault::new(location(index), what, EXPORT_AGAIN));
     };
     let (Checked::Valid(component), Checked::Valid(shape)) = (&accessor.component_type, &accessor.type_) else {
-        return Err(Fault::new(place(index), "unknown type or componentType", EXPORT_AGAIN));
+        return Err(Fault::new(location(index), "unknown type or componentType", EXPORT_AGAIN));
     };
     if accessor.count.0 > MOST_ELEMENTS {
         let what = format!("claims {} elements, more than the {MOST_ELEMENTS} that are read", accessor.count.0);
-        return Err(Fault::new(place(index), what, "split or simplify the plant"));
+        return Err(Fault::new(location(index), what, "split or simplify the plant"));
     }
     let mut layout = Layout {
         view: accessor.buffer_view.map(|view| view.value()),
@@ -132,12 +132,12 @@ fn layout(document: &Document, index: usize, warnings: &mut Warnings) -> Result<
     layout.stride = if given == 0 { layout.element_size() } else { given };
     if layout.stride < layout.element_size() {
         let what = format!("elements of {} bytes overlap, byteStride is {given}", layout.element_size());
-        return Err(Fault::new(place(index), what, EXPORT_AGAIN));
+        return Err(Fault::new(location(index), what, EXPORT_AGAIN));
     }
     let aligned = |offset: u64| offset.is_multiple_of(layout.component.size() as u64);
     if !aligned(layout.offset) || !aligned(layout.stride) {
         let message = "not aligned to its component size; read nevertheless";
-        warnings.push(WarningKind::Repaired, place(index), message);
+        warnings.push(WarningKind::Repaired, location(index), message);
     }
     Ok(layout)
 }
@@ -156,7 +156,7 @@ fn read_raw(document: &mut Document, index: usize, layout: &Layout) -> Result<Ve
                     layout.offset,
                     bytes.len()
                 );
-                Fault::new(place(index), what, EXPORT_AGAIN)
+                Fault::new(location(index), what, EXPORT_AGAIN)
             })?;
             let mut raw = Vec::with_capacity(wide * count);
             for element in 0..count {
@@ -169,7 +169,7 @@ fn read_raw(document: &mut Document, index: usize, layout: &Layout) -> Result<Ve
     let sparse = document.root.accessors[index].sparse.clone();
     if layout.view.is_none() && sparse.is_none() && count > 0 {
         let what = "has no bufferView, so all of it would be zero";
-        return Err(Fault::new(place(index), what, EXPORT_AGAIN));
+        return Err(Fault::new(location(index), what, EXPORT_AGAIN));
     }
     if let Some(sparse) = sparse {
         substitute(document, index, &sparse, layout, &mut raw)?;

@@ -52,8 +52,8 @@ fn read_root<'a>(
     Ok((parse(text, path)?, blob))
 }
 
-/// The files beside `path` that its `bytes` name for their buffers and images, each once, as relative paths with forward
-/// slashes as written.
+/// The files beside `path` that its `bytes` name for their buffers and images, each once, as relative paths with
+/// forward slashes as written.
 pub(super) fn external_files(bytes: &[u8], path: &Path) -> Result<Vec<String>, PlantError> {
     let (root, _) = read_root(bytes, path, &mut Warnings::default())?;
     let buffers = root.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
@@ -190,10 +190,10 @@ fn integers(value: &mut json::Value) {
 impl Document<'_> {
     /// The bytes of buffer view `index`.
     pub fn view(&mut self, index: usize) -> Result<&[u8], Fault> {
-        let place = format!("/bufferViews/{index}");
+        let location = format!("/bufferViews/{index}");
         let views = self.root.buffer_views.len();
         let Some(view) = self.root.buffer_views.get(index) else {
-            return Err(Fault::new(place, format!("does not exist, there are {views}"), EXPORT_AGAIN));
+            return Err(Fault::new(location, format!("does not exist, there are {views}"), EXPORT_AGAIN));
         };
         let buffer = view.buffer.value();
         let (offset, length) = (view.byte_offset.map_or(0, |offset| offset.0), view.byte_length.0);
@@ -202,16 +202,16 @@ impl Document<'_> {
             usize::try_from(offset).ok().zip(offset.checked_add(length).and_then(|end| usize::try_from(end).ok()));
         range.and_then(|(begin, end)| bytes.get(begin..end)).ok_or_else(|| {
             let what = format!("bytes {offset} to +{length} leave buffer {buffer} of {} bytes", bytes.len());
-            Fault::new(place, what, EXPORT_AGAIN)
+            Fault::new(location, what, EXPORT_AGAIN)
         })
     }
 
     /// The bytes of buffer `index`, read on the first call.
     fn buffer(&mut self, index: usize) -> Result<&[u8], Fault> {
-        let place = format!("/buffers/{index}");
+        let location = format!("/buffers/{index}");
         let Some(slot) = self.buffers.get_mut(index) else {
             return Err(Fault::new(
-                place,
+                location,
                 format!("does not exist, there are {}", self.root.buffers.len()),
                 EXPORT_AGAIN,
             ));
@@ -220,16 +220,16 @@ impl Document<'_> {
             let buffer = &self.root.buffers[index];
             let length = buffer.byte_length.0;
             let bytes = match (&buffer.uri, &self.blob) {
-                (Some(uri), _) => read_uri(uri, &self.beside, &place, Some(length))?,
+                (Some(uri), _) => read_uri(uri, &self.beside, &location, Some(length))?,
                 (None, Some(blob)) if index == 0 => blob.clone(),
                 (None, _) => {
                     let what = "has neither a uri nor the binary chunk of a GLB file";
-                    return Err(Fault::new(place, what, "keep the .bin file and its uri, or export as .glb"));
+                    return Err(Fault::new(location, what, "keep the .bin file and its uri, or export as .glb"));
                 }
             };
             if (bytes.len() as u64) < length {
                 let what = format!("has {} bytes instead of the {length} that byteLength promises", bytes.len());
-                return Err(Fault::new(place, what, EXPORT_AGAIN));
+                return Err(Fault::new(location, what, EXPORT_AGAIN));
             }
             *slot = Some(bytes);
         }
@@ -238,34 +238,34 @@ impl Document<'_> {
 
     /// The bytes of image `index` as they are encoded.
     pub fn image(&mut self, index: usize) -> Result<Vec<u8>, Fault> {
-        let place = format!("/images/{index}");
+        let location = format!("/images/{index}");
         let Some(image) = self.root.images.get(index) else {
-            return Err(Fault::new(place, "does not exist", "save the texture as PNG or JPEG and export again"));
+            return Err(Fault::new(location, "does not exist", "save the texture as PNG or JPEG and export again"));
         };
         match (image.buffer_view.map(|view| view.value()), image.uri.clone()) {
             (Some(view), _) => self.view(view).map(<[u8]>::to_vec),
-            (None, Some(uri)) => read_uri(&uri, &self.beside, &place, None),
-            (None, None) => Err(Fault::new(place, "has neither a uri nor a bufferView", EXPORT_AGAIN)),
+            (None, Some(uri)) => read_uri(&uri, &self.beside, &location, None),
+            (None, None) => Err(Fault::new(location, "has neither a uri nor a bufferView", EXPORT_AGAIN)),
         }
     }
 }
 
 /// The bytes behind `uri`: a data URI or a path relative to the file. At most `limit` bytes are read.
-fn read_uri(uri: &str, beside: &Beside, place: &str, limit: Option<u64>) -> Result<Vec<u8>, Fault> {
+fn read_uri(uri: &str, beside: &Beside, location: &str, limit: Option<u64>) -> Result<Vec<u8>, Fault> {
     if let Some(data) = uri.strip_prefix("data:") {
         let Some((kind, payload)) = data.split_once(',') else {
-            return Err(Fault::new(place, "the data URI has no comma", EXPORT_AGAIN));
+            return Err(Fault::new(location, "the data URI has no comma", EXPORT_AGAIN));
         };
         return if kind.ends_with(";base64") {
             decode_base64(payload)
-                .ok_or_else(|| Fault::new(place, "the base64 of its data URI is damaged", EXPORT_AGAIN))
+                .ok_or_else(|| Fault::new(location, "the base64 of its data URI is damaged", EXPORT_AGAIN))
         } else {
             Ok(decode_percent(payload))
         };
     }
     let relative = relative_path(uri).map_err(|path| {
         let what = format!("the uri '{}' is not a path beside the file", shortened(&path));
-        Fault::new(place, what, "copy the data beside the .gltf file and name it by a relative path")
+        Fault::new(location, what, "copy the data beside the .gltf file and name it by a relative path")
     })?;
     let bytes = match beside {
         Beside::Folder(folder) => read_file(&folder.join(&relative), limit),
@@ -280,12 +280,12 @@ fn read_uri(uri: &str, beside: &Beside, place: &str, limit: Option<u64>) -> Resu
     };
     bytes.map_err(|reason| {
         let what = format!("the file '{}' cannot be read: {reason}", shortened(&relative));
-        Fault::new(place, what, "put the file beside the .gltf file, or export as .glb, which holds everything")
+        Fault::new(location, what, "put the file beside the .gltf file, or export as .glb, which holds everything")
     })
 }
 
-/// The path beside the file that `uri` stands for; `Err` with the text of one that is none, such as a data URI or the address
-/// of a page.
+/// The path beside the file that `uri` stands for; `Err` with the text if it is not a path, such as a data URI or the
+/// address of a page.
 fn relative_path(uri: &str) -> Result<String, String> {
     let path = String::from_utf8_lossy(&decode_percent(uri)).into_owned();
     let scheme = path.split_once(':').is_some_and(|(scheme, _)| scheme.len() > 1 && !scheme.contains(['/', '\\']));

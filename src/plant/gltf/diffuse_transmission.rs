@@ -1,16 +1,16 @@
 //! KHR_materials_diffuse_transmission (Khronos, glTF 2.0 extension): how much light passes through a leaf, by the file.
 //!
-//! The extension shares out the diffuse light of a surface: `f` of it passes and takes the colour `c`, the rest is reflected
-//! and takes the base colour. `f` is a factor times a texture's alpha, `c` a factor times a texture's colour.
+//! The extension shares out the diffuse light of a surface: `f` of it passes and takes the colour `c`, the rest is
+//! reflected and takes the base colour. `f` is a factor times a texture's alpha, `c` a factor times a texture's colour.
 //!
 //! ```text
 //!  reflected = (1 - f) base colour        transmitted = f c
 //! ```
 //!
-//! A plant's material has one number a channel for the light that passes, a factor on what the inside of the leaf reflects
-//! ([`PlantMaterial::transmission`]). So `f` and `c` are taken in the mean over the leaf, and the factor is the one with which
-//! the leaf transmits `f c` in the mean; where on the leaf more passes and where less, the base colour tells. Where the base
-//! colour leaves no room for it, less is transmitted, and a warning says how much.
+//! A plant's material has one number a channel for the light that passes, a factor on what the inside of the leaf
+//! reflects ([`PlantMaterial::transmission`]). So `f` and `c` are taken in the mean over the leaf, and the factor is
+//! the one with which the leaf transmits `f c` in the mean; where on the leaf more passes and where less, the base
+//! colour tells. Where the base colour leaves no room for it, less is transmitted, and a warning says how much.
 
 use glam::Vec3;
 use gltf::json::Value;
@@ -50,7 +50,7 @@ impl Default for DiffuseTransmission {
 
 impl DiffuseTransmission {
     /// The extension of `material`; `None` where it has none or one that cannot be read, with a warning.
-    pub fn of(material: &Material, place: &str, warnings: &mut Warnings) -> Option<Self> {
+    pub fn of(material: &Material, location: &str, warnings: &mut Warnings) -> Option<Self> {
         let value: &Value = material.extensions.as_ref()?.others.get(NAME)?;
         // A list would be taken for its members in their order.
         let read = if value.is_object() {
@@ -62,19 +62,19 @@ impl DiffuseTransmission {
             Ok(found) => Some(found),
             Err(error) => {
                 let message = format!("its {NAME} cannot be read ({error}); the usual transmission of leaves is used");
-                warnings.push(WarningKind::Missing, place, message);
+                warnings.push(WarningKind::Missing, location, message);
                 None
             }
         }
     }
 
-    /// Gives `material`, which has its base colour, mask and gloss, the transmission of the extension, whose decoded textures
-    /// are those given.
+    /// Gives `material`, which has its base colour, mask and gloss, the transmission of the extension, whose decoded
+    /// textures are those given.
     pub fn apply(
         &self,
         material: &mut PlantMaterial,
         [factor_texture, color_texture]: [Option<&image::RgbaImage>; 2],
-        place: &str,
+        location: &str,
         warnings: &mut Warnings,
     ) {
         let share = |value: f32| if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) };
@@ -92,12 +92,12 @@ impl DiffuseTransmission {
                 "its textures of transmitted light are used as their means over the leaf: \
                  {factor:.3} of the light passes, with the colour {r:.3} {g:.3} {b:.3}"
             );
-            warnings.push(WarningKind::Ignored, place, message);
+            warnings.push(WarningKind::Ignored, location, message);
         }
 
         material.base_color *= 1.0 - factor;
         let wanted = factor * color;
-        let [inside] = mean_over_leaf(material, |color| [material.gloss.inside(color)]);
+        let [inside] = mean_over_leaf(material, |color| [material.gloss.subsurface_albedo(color)]);
         let most = Vec3::splat(PlantMaterial::MOST_TRANSMISSION);
         material.transmission = (wanted / inside.max(Vec3::splat(1e-6))).clamp(Vec3::ZERO, most);
         let [transmitted] = mean_over_leaf(material, |color| [material.transmitted(color)]);
@@ -108,7 +108,7 @@ impl DiffuseTransmission {
                 "it transmits {r:.1} {g:.1} {b:.1} % of the light, of which {red:.1} {green:.1} {blue:.1} % are drawn: its base \
                  colour leaves no room for more"
             );
-            warnings.push(WarningKind::Repaired, place, message);
+            warnings.push(WarningKind::Repaired, location, message);
         }
     }
 }

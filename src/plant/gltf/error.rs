@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use std::fmt;
 use std::path::PathBuf;
 
-/// Why a plant could not be read. Every message names the file, the place in it and a remedy.
+/// Why a plant could not be read. Every message names the file, the location in it and a remedy.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlantError {
@@ -17,7 +17,7 @@ pub enum PlantError {
         /// The system's reason.
         source: std::io::Error,
     },
-    /// The binary container (GLB) is damaged or is no glTF.
+    /// The binary container (GLB) is damaged or is not glTF.
     #[error("{path}: byte {offset}: {what}; {remedy}", path = path.display())]
     Container {
         /// The file.
@@ -52,12 +52,12 @@ pub enum PlantError {
         remedy: &'static str,
     },
     /// Geometry cannot be used.
-    #[error("{path}: {place}: {what}; {remedy}", path = path.display())]
+    #[error("{path}: {location}: {what}; {remedy}", path = path.display())]
     Data {
         /// The file.
         path: PathBuf,
         /// JSON pointer to the object at fault, such as `/accessors/3`.
-        place: String,
+        location: String,
         /// What is wrong.
         what: String,
         /// What to do.
@@ -101,7 +101,7 @@ pub struct Warning {
     /// What kind of a warning this is.
     pub kind: WarningKind,
     /// JSON pointer to the object (`/materials/2`), or empty for the file as a whole.
-    pub place: String,
+    pub location: String,
     /// What, and where it helps what to do.
     pub message: String,
 }
@@ -113,9 +113,9 @@ impl fmt::Display for Warning {
             WarningKind::Repaired => "repaired",
             WarningKind::Missing => "missing",
         };
-        match self.place.as_str() {
+        match self.location.as_str() {
             "" => write!(f, "{kind}: {}", self.message),
-            place => write!(f, "{kind}: {place}: {}", self.message),
+            location => write!(f, "{kind}: {location}: {}", self.message),
         }
     }
 }
@@ -123,7 +123,7 @@ impl fmt::Display for Warning {
 /// Distinct warnings that one import keeps; what comes after them is counted.
 const MOST_WARNINGS: usize = 200;
 
-/// The warnings of one import. Those that differ in place only are kept once, with the number of places.
+/// The warnings of one import. Those that differ only in location are kept once, with the number of locations.
 #[derive(Debug, Default)]
 pub(super) struct Warnings {
     kept: Vec<(Warning, HashSet<String>)>,
@@ -132,20 +132,20 @@ pub(super) struct Warnings {
 }
 
 impl Warnings {
-    pub fn push(&mut self, kind: WarningKind, place: impl Into<String>, message: impl Into<String>) {
-        let (place, message) = (place.into(), message.into());
+    pub fn push(&mut self, kind: WarningKind, location: impl Into<String>, message: impl Into<String>) {
+        let (location, message) = (location.into(), message.into());
         let next = self.kept.len();
         match self.by_message.entry((kind, message.clone())) {
             Entry::Occupied(known) => {
-                let (warning, places) = &mut self.kept[*known.get()];
-                if warning.place != place {
-                    places.insert(place);
+                let (warning, locations) = &mut self.kept[*known.get()];
+                if warning.location != location {
+                    locations.insert(location);
                 }
             }
             Entry::Vacant(_) if next >= MOST_WARNINGS => self.surplus += 1,
             Entry::Vacant(vacant) => {
                 vacant.insert(next);
-                self.kept.push((Warning { kind, place, message }, HashSet::new()));
+                self.kept.push((Warning { kind, location, message }, HashSet::new()));
             }
         }
     }
@@ -155,16 +155,16 @@ impl Warnings {
         let mut warnings: Vec<Warning> = self
             .kept
             .into_iter()
-            .map(|(mut warning, places)| {
-                if !places.is_empty() {
-                    warning.message.push_str(&format!(" (likewise in {} other places)", places.len()));
+            .map(|(mut warning, locations)| {
+                if !locations.is_empty() {
+                    warning.message.push_str(&format!(" (likewise in {} other locations)", locations.len()));
                 }
                 warning
             })
             .collect();
         if self.surplus > 0 {
             let message = format!("{} further warnings", self.surplus);
-            warnings.push(Warning { kind: WarningKind::Ignored, place: String::new(), message });
+            warnings.push(Warning { kind: WarningKind::Ignored, location: String::new(), message });
         }
         warnings
     }
@@ -173,18 +173,18 @@ impl Warnings {
 /// Trouble with an object of the file, before it is known whether it is an error or a warning.
 #[derive(Debug)]
 pub(super) struct Fault {
-    pub place: String,
+    pub location: String,
     pub what: String,
     pub remedy: &'static str,
 }
 
 impl Fault {
-    pub fn new(place: impl Into<String>, what: impl Into<String>, remedy: &'static str) -> Self {
-        Self { place: place.into(), what: what.into(), remedy }
+    pub fn new(location: impl Into<String>, what: impl Into<String>, remedy: &'static str) -> Self {
+        Self { location: location.into(), what: what.into(), remedy }
     }
 
     pub fn into_error(self, path: &std::path::Path) -> PlantError {
-        PlantError::Data { path: path.to_path_buf(), place: self.place, what: self.what, remedy: self.remedy }
+        PlantError::Data { path: path.to_path_buf(), location: self.location, what: self.what, remedy: self.remedy }
     }
 }
 

@@ -75,7 +75,7 @@ pub(super) fn read(
         let message = "does not exist; the default material (white, opaque) is used";
         warnings.push(WarningKind::Missing, format!("/materials/{index}"), message);
     }
-    let place = index.map_or_else(String::new, |index| format!("/materials/{index}"));
+    let location = index.map_or_else(String::new, |index| format!("/materials/{index}"));
     let source = given.as_ref().unwrap_or(&default);
     let name =
         source.name.clone().unwrap_or_else(|| index.map_or("default".into(), |index| format!("material {index}")));
@@ -89,9 +89,10 @@ pub(super) fn read(
         }
     };
     let base = base.map(Reference::new);
-    let texture = base.as_ref().and_then(|base| load(document, base.texture, &place, "base colour", images, warnings));
+    let texture =
+        base.as_ref().and_then(|base| load(document, base.texture, &location, "base colour", images, warnings));
 
-    let kind = kind_of(source, &name, options, &place, warnings);
+    let kind = kind_of(source, &name, options, &location, warnings);
     let opacity = unit(factor[3]);
     let mut material = PlantMaterial {
         base_color: Vec3::new(unit(factor[0]), unit(factor[1]), unit(factor[2])),
@@ -102,19 +103,19 @@ pub(super) fn read(
         gloss: Gloss::MATT,
     };
     if kind == PartKind::Foliage {
-        material.gloss = options.gloss.unwrap_or(Gloss::LEAF).in_range();
+        material.gloss = options.gloss.unwrap_or(Gloss::LEAF).sanitized();
         let cutoff = unit(source.alpha_cutoff.as_ref().map_or(0.5, |cutoff| cutoff.0));
         // The factor's alpha scales the texture's; the threshold is scaled instead, to the same effect.
         let masked = source.alpha_mode == Checked::Valid(AlphaMode::Mask);
         if masked && opacity < cutoff {
             let message =
                 format!("its alpha of {opacity} stays below its cutoff {cutoff}: glTF hides it, here it is drawn");
-            warnings.push(WarningKind::Repaired, &place, message);
+            warnings.push(WarningKind::Repaired, &location, message);
             material.alpha_cutoff = cutoff;
         } else {
             material.alpha_cutoff = if masked && opacity > 0.0 { unit(cutoff / opacity) } else { cutoff };
         }
-        transmit(&mut material, source, document, options, &place, images, warnings);
+        transmit(&mut material, source, document, options, &location, images, warnings);
     }
 
     let mut surface = Surface {
@@ -127,10 +128,11 @@ pub(super) fn read(
     if let Some(normal) = &source.normal_texture {
         if base.is_some() && (surface.uv_set != normal.tex_coord || surface.uv_transform != Affine2::IDENTITY) {
             let message = "its normal map has texture coordinates of its own; a part has one set, the map is left out";
-            warnings.push(WarningKind::Ignored, &place, message);
+            warnings.push(WarningKind::Ignored, &location, message);
         } else {
             surface.uv_set = normal.tex_coord;
-            surface.material.normal_texture = load(document, normal.index.value(), &place, "normal", images, warnings);
+            surface.material.normal_texture =
+                load(document, normal.index.value(), &location, "normal", images, warnings);
         }
     }
     surface
@@ -142,7 +144,7 @@ fn transmit(
     source: &Material,
     document: &mut Document,
     options: &GltfOptions,
-    place: &str,
+    location: &str,
     images: &mut Images,
     warnings: &mut Warnings,
 ) {
@@ -151,18 +153,18 @@ fn transmit(
     if options.transmission.is_some() {
         return;
     }
-    if let Some(stated) = DiffuseTransmission::of(source, place, warnings) {
+    if let Some(stated) = DiffuseTransmission::of(source, location, warnings) {
         let mut image = |info: &Option<Info>, role: &str| {
-            info.as_ref().and_then(|info| load(document, info.index.value(), place, role, images, warnings))
+            info.as_ref().and_then(|info| load(document, info.index.value(), location, role, images, warnings))
         };
         let factor = image(&stated.factor_texture, "transmission");
         let color = image(&stated.color_texture, "transmission colour");
-        stated.apply(material, [factor.as_deref(), color.as_deref()], place, warnings);
+        stated.apply(material, [factor.as_deref(), color.as_deref()], location, warnings);
     }
 }
 
 /// Wood or foliage: by the caller's lists, else by the alpha mode.
-fn kind_of(source: &Material, name: &str, options: &GltfOptions, place: &str, warnings: &mut Warnings) -> PartKind {
+fn kind_of(source: &Material, name: &str, options: &GltfOptions, location: &str, warnings: &mut Warnings) -> PartKind {
     let listed = |names: &[String]| names.iter().any(|listed| listed == name);
     if listed(&options.foliage_materials) {
         return PartKind::Foliage;
@@ -174,7 +176,7 @@ fn kind_of(source: &Material, name: &str, options: &GltfOptions, place: &str, wa
         Checked::Valid(AlphaMode::Mask) => PartKind::Foliage,
         Checked::Valid(AlphaMode::Blend) => {
             let message = format!("'{name}' is alpha blended; it is drawn as foliage with an alpha test at 0.5");
-            warnings.push(WarningKind::Repaired, place, message);
+            warnings.push(WarningKind::Repaired, location, message);
             PartKind::Foliage
         }
         Checked::Valid(AlphaMode::Opaque) | Checked::Invalid => PartKind::Wood,
@@ -185,14 +187,14 @@ fn kind_of(source: &Material, name: &str, options: &GltfOptions, place: &str, wa
 fn load(
     document: &mut Document,
     index: usize,
-    place: &str,
+    location: &str,
     role: &str,
     images: &mut Images,
     warnings: &mut Warnings,
 ) -> Option<Arc<RgbaImage>> {
     let Some(texture) = document.root.textures.get(index) else {
         let message = format!("its {role} texture {index} does not exist; drawn untextured");
-        warnings.push(WarningKind::Missing, place, message);
+        warnings.push(WarningKind::Missing, location, message);
         return None;
     };
     let image = texture.source.value();
@@ -201,7 +203,7 @@ fn load(
             "its {role} texture {index} has no PNG or JPEG image{}; drawn untextured: save the image as PNG",
             texture_extensions(document)
         );
-        warnings.push(WarningKind::Missing, place, message);
+        warnings.push(WarningKind::Missing, location, message);
         return None;
     }
     if images.0.len() <= image {

@@ -3,8 +3,8 @@
 //! Reads glTF 2.0 [Khronos 2021] as JSON or GLB, with buffers and images in the file, in data URIs or in files beside
 //! it. What is used of it: the default scene's triangles with position, normal and one set of texture coordinates;
 //! base colour (factor, texture), normal texture, alpha mode and cutoff; KHR_texture_transform,
-//! KHR_materials_pbrSpecularGlossiness (its diffuse part), KHR_materials_diffuse_transmission (its textures by their means
-//! over the leaf) and KHR_mesh_quantization. Everything else is named in a [`Warning`].
+//! KHR_materials_pbrSpecularGlossiness (its diffuse part), KHR_materials_diffuse_transmission (its textures by their
+//! means over the leaf) and KHR_mesh_quantization. Everything else is named in a [`Warning`].
 //!
 //! Files come from anywhere, so nothing in them is believed: every index, length and count is checked before it is
 //! used, and no file makes this module panic or allocate beyond its own size and fixed limits. Damage that touches
@@ -54,7 +54,8 @@ pub struct GltfOptions {
     /// Light through leaves, as [`super::PlantMaterial::transmission`] has it, 0..2 each. `None` takes what the file's
     /// materials say (KHR_materials_diffuse_transmission), else what is usual for `leaf`.
     pub transmission: Option<Vec3>,
-    /// The gloss of leaves; `None` is [`Gloss::LEAF`]. glTF's roughness and specular terms are those of exporters' defaults.
+    /// The gloss of leaves; `None` is [`Gloss::LEAF`]. glTF's roughness and specular terms are those of exporters'
+    /// defaults.
     pub gloss: Option<Gloss>,
     /// Name of the plant; `None` takes the file's name without its ending.
     pub name: Option<String>,
@@ -70,7 +71,7 @@ pub struct GltfOptions {
 /// - With [`GltfOptions::height`] it is then scaled to that height.
 ///
 /// # Errors
-/// [`PlantError`] if the file cannot be read, is no glTF 2.0, demands an unknown extension, has geometry that cannot
+/// [`PlantError`] if the file cannot be read, is not glTF 2.0, demands an unknown extension, has geometry that cannot
 /// be used or has no triangles, or if an option is out of range.
 pub fn load_plant(path: &Path, options: &GltfOptions) -> Result<(Plant, Vec<Warning>), PlantError> {
     let bytes = std::fs::read(path).map_err(|source| PlantError::Io { path: path.to_path_buf(), source })?;
@@ -78,11 +79,12 @@ pub fn load_plant(path: &Path, options: &GltfOptions) -> Result<(Plant, Vec<Warn
     read_plant(&bytes, path, Beside::Folder(folder), options)
 }
 
-/// Files beside a .gltf file, by the relative paths that [`external_files`] lists: their bytes, or why they cannot be read.
+/// Files beside a .gltf file, by the relative paths that [`external_files`] lists: their bytes, or why they cannot be
+/// read.
 pub type ExternalFiles = BTreeMap<String, Result<Vec<u8>, String>>;
 
-/// The files that the bytes of a glTF file name for its buffers and images: relative paths, sorted, each once. A GLB mostly
-/// names none. `name` is the file's name, for messages.
+/// The files that the bytes of a glTF file name for its buffers and images: relative paths, sorted, each once. A GLB
+/// mostly names none. `name` is the file's name, for messages.
 ///
 /// # Errors
 /// [`PlantError`] where the bytes are not glTF 2.0.
@@ -90,8 +92,8 @@ pub fn external_files(bytes: &[u8], name: &Path) -> Result<Vec<String>, PlantErr
     container::external_files(bytes, name)
 }
 
-/// Reads the plant in the `bytes` of a glTF file, as [`load_plant`] does from the file itself: `name` is the file's name, for
-/// messages and for the plant's own name, `files` what stands beside it.
+/// Reads the plant in the `bytes` of a glTF file, as [`load_plant`] does from the file itself: `name` is the file's
+/// name, for messages and for the plant's own name, `files` what stands beside it.
 ///
 /// # Errors
 /// Those of [`load_plant`]. A file that is missing is an error for a buffer and a warning for an image.
@@ -182,19 +184,19 @@ fn gather(
     let mut parts: BTreeMap<Option<usize>, (Surface, PlantMesh)> = BTreeMap::new();
     let mut total = 0u64;
     for placement in placements {
-        let place = format!("/meshes/{}", placement.mesh);
+        let location = format!("/meshes/{}", placement.mesh);
         let Some(mesh) = document.root.meshes.get(placement.mesh).cloned() else {
-            return Err(Fault::new(place, format!("does not exist, node {} uses it", placement.node), EXPORT_AGAIN));
+            return Err(Fault::new(location, format!("does not exist, node {} uses it", placement.node), EXPORT_AGAIN));
         };
         for (index, primitive) in mesh.primitives.iter().enumerate() {
-            let place = format!("{place}/primitives/{index}");
+            let location = format!("{location}/primitives/{index}");
             total = total.saturating_add(primitive::claimed_size(document, primitive));
-            primitive::check_budget(total, &place)?;
+            primitive::check_budget(total, &location)?;
             let material = primitive.material.map(|material| material.value());
             let (surface, merged) = parts.entry(material).or_insert_with(|| {
                 (material::read(document, material, options, &mut images, warnings), PlantMesh::default())
             });
-            let Some(mut mesh) = primitive::read(document, primitive, &place, surface, warnings)? else {
+            let Some(mut mesh) = primitive::read(document, primitive, &location, surface, warnings)? else {
                 continue;
             };
             let flattened = nodes::apply(&mut mesh, &placement.transform, &format!("/nodes/{}", placement.node))?;

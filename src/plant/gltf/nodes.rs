@@ -27,17 +27,17 @@ pub(super) fn placements(root: &Root, warnings: &mut Warnings) -> Result<Vec<Pla
     let mut stack: Vec<(usize, DMat4)> =
         roots(root, warnings)?.into_iter().rev().map(|node| (node, DMat4::IDENTITY)).collect();
     while let Some((index, parent)) = stack.pop() {
-        let place = format!("/nodes/{index}");
+        let location = format!("/nodes/{index}");
         let Some(node) = root.nodes.get(index) else {
-            return Err(Fault::new(place, format!("does not exist, there are {}", root.nodes.len()), EXPORT_AGAIN));
+            return Err(Fault::new(location, format!("does not exist, there are {}", root.nodes.len()), EXPORT_AGAIN));
         };
         if std::mem::replace(&mut visited[index], true) {
             let what = "has several parents or is its own ancestor; glTF demands a tree";
-            return Err(Fault::new(place, what, EXPORT_AGAIN));
+            return Err(Fault::new(location, what, EXPORT_AGAIN));
         }
-        let transform = parent * local_transform(node, &place, warnings)?;
+        let transform = parent * local_transform(node, &location, warnings)?;
         if !transform.is_finite() {
-            return Err(Fault::new(place, "its transform is not finite", EXPORT_AGAIN));
+            return Err(Fault::new(location, "its transform is not finite", EXPORT_AGAIN));
         }
         if let Some(mesh) = node.mesh {
             found.push(Placement { node: index, mesh: mesh.value(), transform });
@@ -81,7 +81,7 @@ fn roots(root: &Root, warnings: &mut Warnings) -> Result<Vec<usize>, Fault> {
 }
 
 /// The node's own transform: its matrix, or translation * rotation * scale.
-fn local_transform(node: &Node, place: &str, warnings: &mut Warnings) -> Result<DMat4, Fault> {
+fn local_transform(node: &Node, location: &str, warnings: &mut Warnings) -> Result<DMat4, Fault> {
     if let Some(matrix) = node.matrix {
         return Ok(DMat4::from_cols_array(&matrix.map(f64::from)));
     }
@@ -91,10 +91,10 @@ fn local_transform(node: &Node, place: &str, warnings: &mut Warnings) -> Result<
             let q = DQuat::from_array(rotation.0.map(f64::from));
             let length = q.length();
             if !length.is_finite() {
-                return Err(Fault::new(place, "its rotation is not finite", EXPORT_AGAIN));
+                return Err(Fault::new(location, "its rotation is not finite", EXPORT_AGAIN));
             }
             if length < 1e-6 {
-                warnings.push(WarningKind::Repaired, place, "its rotation has no length; done without");
+                warnings.push(WarningKind::Repaired, location, "its rotation has no length; done without");
                 DQuat::IDENTITY
             } else {
                 q / length
@@ -106,10 +106,10 @@ fn local_transform(node: &Node, place: &str, warnings: &mut Warnings) -> Result<
     Ok(DMat4::from_scale_rotation_translation(scale, rotation, vector(node.translation, DVec3::ZERO)))
 }
 
-/// Moves `mesh` by `transform`: normals by the inverse transpose, triangles turned round where it mirrors.
+/// Moves `mesh` by `transform`: normals by the inverse transpose, triangles reversed where it mirrors.
 ///
 /// Where a transform flattens, triangles on edge lose their area; they are removed and counted in the result.
-pub(super) fn apply(mesh: &mut PlantMesh, transform: &DMat4, place: &str) -> Result<usize, Fault> {
+pub(super) fn apply(mesh: &mut PlantMesh, transform: &DMat4, location: &str) -> Result<usize, Fault> {
     let linear = DMat3::from_mat4(*transform);
     // The cofactor matrix is the inverse transpose times the determinant, and exists for flattening ones too.
     let cofactor = DMat3::from_cols(
@@ -122,7 +122,11 @@ pub(super) fn apply(mesh: &mut PlantMesh, transform: &DMat4, place: &str) -> Res
     for position in &mut mesh.positions {
         *position = transform.transform_point3(position.as_dvec3()).as_vec3();
         if !position.is_finite() || position.abs().max_element() > FARTHEST {
-            return Err(Fault::new(place, format!("moves its mesh to {position}, beyond {FARTHEST} m"), EXPORT_AGAIN));
+            return Err(Fault::new(
+                location,
+                format!("moves its mesh to {position}, beyond {FARTHEST} m"),
+                EXPORT_AGAIN,
+            ));
         }
     }
     for normal in &mut mesh.normals {

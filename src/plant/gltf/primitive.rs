@@ -27,23 +27,23 @@ pub(super) fn claimed_size(document: &Document, primitive: &Primitive) -> u64 {
 pub(super) fn read(
     document: &mut Document,
     primitive: &Primitive,
-    place: &str,
+    location: &str,
     surface: &Surface,
     warnings: &mut Warnings,
 ) -> Result<Option<PlantMesh>, Fault> {
     let Some(positions) = primitive.attributes.get(&Checked::Valid(Semantic::Positions)).copied() else {
-        warnings.push(WarningKind::Ignored, place, "has no POSITION, so there is nothing to draw");
+        warnings.push(WarningKind::Ignored, location, "has no POSITION, so there is nothing to draw");
         return Ok(None);
     };
     let mode = match primitive.mode {
         Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) => mode,
         Checked::Valid(mode) => {
-            warnings.push(WarningKind::Ignored, place, format!("consists of {mode:?}, only triangles are drawn"));
+            warnings.push(WarningKind::Ignored, location, format!("consists of {mode:?}, only triangles are drawn"));
             return Ok(None);
         }
-        Checked::Invalid => return Err(Fault::new(place, "unknown mode", EXPORT_AGAIN)),
+        Checked::Invalid => return Err(Fault::new(location, "unknown mode", EXPORT_AGAIN)),
     };
-    mention_unused(primitive, place, warnings);
+    mention_unused(primitive, location, warnings);
 
     // Quantised attributes are only legal with the extension, which the caller has accepted if it is required.
     let quantized = document.root.extensions_used.iter().any(|name| name == "KHR_mesh_quantization");
@@ -55,18 +55,18 @@ pub(super) fn read(
     };
     if let Some((at, index)) = indices.iter().enumerate().find(|&(_, &index)| index as usize >= points.len()) {
         let what = format!("index {at} refers to vertex {index}, there are {}", points.len());
-        return Err(Fault::new(format!("{place}/indices"), what, EXPORT_AGAIN));
+        return Err(Fault::new(format!("{location}/indices"), what, EXPORT_AGAIN));
     }
-    let triangles = triangulate(&indices, mode, place, warnings);
+    let triangles = triangulate(&indices, mode, location, warnings);
 
     let mut lookup = |semantic: Semantic, expected: Expected, warnings: &mut Warnings| -> Option<Elements> {
         let accessor = primitive.attributes.get(&Checked::Valid(semantic)).copied()?;
         let problem = match read_attribute(document, accessor.value(), &expected, warnings) {
             Ok(elements) if elements.len() >= points.len() => return Some(elements),
             Ok(elements) => format!("{} has {} elements for {} vertices", expected.name, elements.len(), points.len()),
-            Err(fault) => format!("{}: {}: {}", expected.name, fault.place, fault.what),
+            Err(fault) => format!("{}: {}: {}", expected.name, fault.location, fault.what),
         };
-        warnings.push(WarningKind::Repaired, place, format!("{problem}; done without"));
+        warnings.push(WarningKind::Repaired, location, format!("{problem}; done without"));
         None
     };
     let normals = lookup(Semantic::Normals, vector("NORMAL"), warnings);
@@ -75,7 +75,7 @@ pub(super) fn read(
         let uvs = lookup(Semantic::TexCoords(surface.uv_set), expected, warnings);
         if uvs.is_none() {
             let message = format!("has no usable TEXCOORD_{} for the texture of '{}'", surface.uv_set, surface.name);
-            warnings.push(WarningKind::Missing, place, message);
+            warnings.push(WarningKind::Missing, location, message);
         }
         uvs
     } else {
@@ -110,13 +110,13 @@ pub(super) fn read(
     }
     if slivers > 0 {
         let message = format!("{slivers} of {} triangles have no area; left out", triangles.len());
-        warnings.push(WarningKind::Repaired, place, message);
+        warnings.push(WarningKind::Repaired, location, message);
     }
     if broken_uvs > 0 {
         let message = format!("{broken_uvs} texture coordinates are not finite; set to 0");
-        warnings.push(WarningKind::Repaired, place, message);
+        warnings.push(WarningKind::Repaired, location, message);
     }
-    Ok(Some(finish(builder.mesh, place, warnings)))
+    Ok(Some(finish(builder.mesh, location, warnings)))
 }
 
 /// A vertex; a normal of zero is missing.
@@ -162,17 +162,17 @@ fn vec3(values: &[f32]) -> Vec3 {
 }
 
 /// Says which parts of a primitive are not used.
-fn mention_unused(primitive: &Primitive, place: &str, warnings: &mut Warnings) {
+fn mention_unused(primitive: &Primitive, location: &str, warnings: &mut Warnings) {
     if primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
-        warnings.push(WarningKind::Ignored, place, "its morph targets; the plant stands in its base shape");
+        warnings.push(WarningKind::Ignored, location, "its morph targets; the plant stands in its base shape");
     }
     if primitive.attributes.keys().any(|key| matches!(key, Checked::Valid(Semantic::Colors(_)))) {
-        warnings.push(WarningKind::Ignored, place, "its vertex colours; colour comes from the material");
+        warnings.push(WarningKind::Ignored, location, "its vertex colours; colour comes from the material");
     }
 }
 
 /// Triangle corners from a list, a strip or a fan [glTF 2.0, section 3.7.2.1].
-fn triangulate(indices: &[u32], mode: Mode, place: &str, warnings: &mut Warnings) -> Vec<[u32; 3]> {
+fn triangulate(indices: &[u32], mode: Mode, location: &str, warnings: &mut Warnings) -> Vec<[u32; 3]> {
     match mode {
         Mode::TriangleStrip => indices
             .windows(3)
@@ -187,7 +187,7 @@ fn triangulate(indices: &[u32], mode: Mode, place: &str, warnings: &mut Warnings
             if !indices.len().is_multiple_of(3) {
                 let message =
                     format!("{} indices are not a whole number of triangles; the rest is left out", indices.len());
-                warnings.push(WarningKind::Repaired, place, message);
+                warnings.push(WarningKind::Repaired, location, message);
             }
             indices.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect()
         }
@@ -195,11 +195,11 @@ fn triangulate(indices: &[u32], mode: Mode, place: &str, warnings: &mut Warnings
 }
 
 /// Computes the normals that are missing.
-fn finish(mut mesh: PlantMesh, place: &str, warnings: &mut Warnings) -> PlantMesh {
+fn finish(mut mesh: PlantMesh, location: &str, warnings: &mut Warnings) -> PlantMesh {
     let missing = mesh.normals.iter().filter(|normal| **normal == Vec3::ZERO).count();
     if missing > 0 {
         let message = format!("{missing} of {} vertices have no normal; smooth ones are computed", mesh.normals.len());
-        warnings.push(WarningKind::Repaired, place, message);
+        warnings.push(WarningKind::Repaired, location, message);
         fill_normals(&mut mesh);
     }
     mesh
@@ -230,10 +230,10 @@ fn fill_normals(mesh: &mut PlantMesh) {
 }
 
 /// Guards the sum of all primitives' sizes, since nodes may use one mesh many times.
-pub(super) fn check_budget(total: u64, place: &str) -> Result<(), Fault> {
+pub(super) fn check_budget(total: u64, location: &str) -> Result<(), Fault> {
     if total > MOST_ELEMENTS {
         let what = format!("with it the plant has more than {MOST_ELEMENTS} vertices or indices");
-        return Err(Fault::new(place, what, "use a simplified plant"));
+        return Err(Fault::new(location, what, "use a simplified plant"));
     }
     Ok(())
 }

@@ -61,7 +61,7 @@ struct Card {
     normal: Vec3,
     /// Along its twig, metres.
     length: f32,
-    /// Is the picture mirrored?
+    /// Whether the texture is mirrored.
     mirrored: bool,
 }
 

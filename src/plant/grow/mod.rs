@@ -9,7 +9,7 @@
 //!
 //! The skeleton depends on the species and the seed only, so an individual keeps its shape whatever the number of
 //! triangles; with fewer triangles thin wood is left out, and fewer, larger clusters keep the area of the foliage.
-//! A tree of 60,000 triangles takes some tens of milliseconds; the pictures of bark and leaves are painted once per
+//! A tree of 60,000 triangles takes some tens of milliseconds; the textures of bark and leaves are painted once per
 //! process and shared.
 //!
 //! Departures from the paper are named at the parameters concerned. Not modelled: degradation at range (5), since

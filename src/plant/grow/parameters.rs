@@ -76,10 +76,10 @@ pub struct StemParameters {
     /// Turn of the outer half in degrees, -360 to 360; 0 lets `curve_deg` rule the whole stem (W&P `nCurveBack`).
     /// Default 0.
     pub curve_back_deg: f32,
-    /// Sum of the random turns of the segments, in degrees, 0 to 720 (W&P `nCurveV`). Default 40. Up: gnarled.
+    /// Sum of the random rotations of the segments, in degrees, 0 to 720 (W&P `nCurveV`). Default 40. Up: gnarled.
     pub curve_variation_deg: f32,
     /// Attraction towards the zenith, -3 to 3; negative hangs (W&P `AttractionUp`, 4.8, there one value for all
-    /// levels from the second). The stem turns by about this many radians if it lies level. Default 0.
+    /// levels from the second). The stem bends by about this many radians if it lies level. Default 0.
     pub attraction_up: f32,
     /// Mean number of forks in the stem, 0 to 4 (W&P `nSegSplits` times `nCurveRes`, 4.2). Default 0.
     pub splits: f32,
@@ -113,11 +113,11 @@ pub struct BranchParameters {
     /// Negative: branches alternate left and right, this many degrees from the parent's underside (W&P `nRotate`).
     /// Default 137.5.
     pub rotate_deg: f32,
-    /// Largest deviation of that turn in degrees, 0 to 180 (W&P `nRotateV`). Default 15.
+    /// Largest deviation of that rotation in degrees, 0 to 180 (W&P `nRotateV`). Default 15.
     pub rotate_variation_deg: f32,
 }
 
-/// The foliage: cards with a picture of a leaf cluster (W&P 4.9 has single leaves).
+/// The foliage: cards with a texture of a leaf cluster (W&P 4.9 has single leaves).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LeafParameters {
@@ -140,7 +140,7 @@ pub struct LeafParameters {
     pub rotate_deg: f32,
     /// Pull of clusters towards the ground, 0 (none) to 1 (most hang). Default 0.15.
     pub droop: f32,
-    /// How far the upper sides of clusters turn to the light (outwards and up), 0 (any way) to 1 (W&P `LeafBend`,
+    /// How far the upper sides of clusters face the light (outwards and up), 0 (any way) to 1 (W&P `LeafBend`,
     /// 4.9). Default 0.5.
     pub bend: f32,
     /// Fold of each half of a cluster along its twig in degrees, 0 to 60. Default 18. Only where there are triangles
@@ -154,8 +154,9 @@ pub struct LeafParameters {
     pub tint: [f32; 3],
     /// Largest deviation of an individual's tint as a fraction, 0 to 0.5. Default 0.12.
     pub tint_variation: f32,
-    /// Linear colour of the light that passes through, as a factor on the colour without the leaves' gloss, 0 to 2 each;
-    /// [`LeafKind`](crate::plant::LeafKind) has what is usual: 1.3 thin, 0.7 leathery, 0.5 needles. Default (1.3, 1.3, 1.3).
+    /// Linear colour of the light that passes through, as a factor on the colour without the leaves' gloss, 0 to 2
+    /// each; [`LeafKind`](crate::plant::LeafKind) has what is usual: 1.3 thin, 0.7 leathery, 0.5 needles. Default (1.3,
+    /// 1.3, 1.3).
     pub transmission: [f32; 3],
 }
 
@@ -165,7 +166,7 @@ pub struct LeafParameters {
 pub struct BarkParameters {
     /// What is painted. Default `Fissured`.
     pub kind: BarkKind,
-    /// Width in metres that one repeat of the picture covers on the trunk, 0.05 to 5. Default 0.7. It is twice as
+    /// Width in metres that one repeat of the texture covers on the trunk, 0.05 to 5. Default 0.7. It is twice as
     /// high. Thin branches repeat it once around, in the same proportions.
     pub tile: f32,
     /// Linear factor on the painted colour, 0 to 1 each. Default white.
@@ -182,9 +183,9 @@ pub struct Pruning {
     pub width: f32,
     /// Where the crown is widest, as a fraction of its length from below, 0.05 to 0.95 (W&P `PruneWidthPeak`).
     pub width_peak: f32,
-    /// Form below the widest place, 0.05 to 5: below 1 round, 1 straight, above 1 hollow (W&P `PrunePowerLow`).
+    /// Form below the widest point, 0.05 to 5: below 1 round, 1 straight, above 1 hollow (W&P `PrunePowerLow`).
     pub power_low: f32,
-    /// The same above the widest place (W&P `PrunePowerHigh`).
+    /// The same above the widest point (W&P `PrunePowerHigh`).
     pub power_high: f32,
 }
 

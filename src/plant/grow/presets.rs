@@ -1,7 +1,7 @@
 //! The two species that come with the crate, and the defaults of a species' parts.
 //!
-//! The conifer is read from its file. The broadleaf is the default of every field that a species' file leaves out, so it
-//! cannot be read from one: its numbers are here, and a test compares them with `assets/species/broadleaf.ron`.
+//! The conifer is read from its file. The broadleaf is the default of every field that a species' file leaves out, so
+//! it cannot be read from one: its numbers are here, and a test compares them with `assets/species/broadleaf.ron`.
 
 use std::sync::LazyLock;
 

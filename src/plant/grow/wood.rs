@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! ring ── ring ── ring ── tip     2·sides triangles between rings, sides at the tip; the first and last vertex of a
-//!  |       |       |     /        ring coincide (the seam of the picture), so there are sides + 1 of them
+//!  |       |       |     /        ring coincide (the seam of the texture), so there are sides + 1 of them
 //! ```
 
 use std::f32::consts::TAU;
@@ -102,7 +102,7 @@ impl<'a> Tube<'a> {
                 (before.normalize_or_zero() + after.normalize_or_zero()).normalize_or(Vec3::Y)
             })
             .collect();
-        // The picture repeats a whole number of times around, so that its edges meet at the seam.
+        // The texture repeats a whole number of times around, so that its edges meet at the seam.
         let base = nodes.iter().find(|node| node.distance >= 0.0).map_or(nodes[0].radius, |node| {
             node.radius / (1.0 + if self.level == 0 && node.distance == 0.0 { species.flare } else { 0.0 })
         });
@@ -114,13 +114,14 @@ impl<'a> Tube<'a> {
         let mut v = 0.0;
         let mut previous_ring = 0u32;
         for (i, node) in nodes.iter().enumerate() {
-            // The frame that turns least (parallel transport).
+            // The frame that rotates least (parallel transport).
             side = (side - tangents[i] * side.dot(tangents[i])).normalize_or(tangents[i].any_orthonormal_vector());
             let across = tangents[i].cross(side);
             let (before, after) = (nodes[i.saturating_sub(1)], nodes[(i + 1).min(count - 1)]);
             let slope = (after.radius - before.radius) / (after.distance - before.distance).max(1e-4);
             if i > 0 {
-                // As many metres up the picture as around it at this girth; near the tip no finer than a quarter.
+                // The texture has the same scale along the stem as around it at this girth; near the tip no finer than
+                // a quarter.
                 let girth = TAU * (0.5 * (before.radius + node.radius)).max(0.25 * base);
                 v += (node.distance - before.distance) * repeats / (2.0 * girth);
             }
@@ -170,18 +171,18 @@ mod tests {
                 let mut mesh = PlantMesh::default();
                 tube.build(&species, &mut mesh);
                 assert_eq!(mesh.triangles.len(), tube.triangles());
-                // Vertices in the same place are one; the tip's vertices are.
-                let mut places: HashMap<[u32; 3], u32> = HashMap::new();
-                let place: Vec<u32> = (0..mesh.positions.len())
+                // Vertices at the same position are one; the tip's vertices are.
+                let mut first_at: HashMap<[u32; 3], u32> = HashMap::new();
+                let welded: Vec<u32> = (0..mesh.positions.len())
                     .map(|i| {
                         let key = (mesh.positions[i] + 0.0).to_array().map(f32::to_bits);
-                        *places.entry(key).or_insert(i as u32)
+                        *first_at.entry(key).or_insert(i as u32)
                     })
                     .collect();
                 let mut edges: HashMap<(u32, u32), i32> = HashMap::new();
                 for t in &mesh.triangles {
                     for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
-                        let (a, b) = (place[a as usize], place[b as usize]);
+                        let (a, b) = (welded[a as usize], welded[b as usize]);
                         *edges.entry((a.min(b), a.max(b))).or_insert(0) += if a < b { 1 } else { -1 };
                     }
                 }
@@ -204,7 +205,8 @@ mod tests {
             let (first, last) = (mesh.uvs[i * ring], mesh.uvs[i * ring + tube.sides]);
             assert_eq!((last.x - first.x).fract(), 0.0);
             assert!(last.x > first.x && last.y == first.y);
-            // Halfway up the bare trunk a picture is twice as high as wide, within the taper and the bark's curve.
+            // Halfway up the bare trunk a texture repeat is twice as high as wide, within the taper and the bark's
+            // curve.
             if i > 0 && (3.0..8.0).contains(&tube.nodes[i].distance) {
                 let (below, here) = (mesh.uvs[(i - 1) * ring], first);
                 let up = (tube.nodes[i].distance - tube.nodes[i - 1].distance) / (below.y - here.y);

@@ -1,4 +1,4 @@
-//! Alpha that a rising threshold fades out: leaf by leaf, or from the outside of the picture to its centre.
+//! Alpha that a rising threshold fades out: leaf by leaf, or from the outside of the texture to its centre.
 
 use image::RgbaImage;
 use rayon::prelude::*;
@@ -14,41 +14,44 @@ const STEP: f32 = 1.5 / 255.0;
 /// A hole whose area is below this share of all leaves' area is a gap between leaves or a flaw, not an outline.
 const PINHOLE: f64 = 1e-3;
 
-/// Which texels go first as the threshold of the alpha test rises. Either way each threshold hides the same area.
+/// The order in which texels disappear as the threshold of the alpha test rises. In either order each threshold hides
+/// the same area.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum AlphaFade {
-    /// Every leaf shrinks from its own outline to its own middle, all at once. Not in the publication. Truer mips: an alpha that
-    /// is alike for all leaves leaves the crown its shape when it is averaged.
+    /// Every leaf shrinks from its outline to its middle, all at the same time. Not in the publication. Its mips are
+    /// more accurate: alpha with the same distribution in all leaves preserves the shape of the crown when it is
+    /// averaged.
     #[default]
     PerLeaf,
-    /// As published [Franzke 2005, 4.3.3, fig. 4.15]: alpha falls with the distance from the centre of the picture, so a crown
-    /// grows from the inside outwards, and its outermost leaves are the last to appear. Pops less: the largest step of a
-    /// change of level is 14 to 27 % smaller. Costs 3 to 8 % of error in the mips of whole crosses, at all distances beyond the
-    /// change (`docs/measurements/alpha-fade.md`).
+    /// As published [Franzke 2005, 4.3.3, fig. 4.15]: alpha falls with the distance from the centre of the texture, so
+    /// a crown grows from the inside outwards, and its outermost leaves are the last to appear. Pops less: the largest
+    /// step of a change of level is 14 to 27 % smaller. Costs 3 to 8 % of error in the mips of whole crosses, at all
+    /// distances beyond the change (`docs/measurements/alpha-fade.md`).
     CenterOut,
 }
 
-/// Restructures alpha so that raising the alpha threshold from 0.5 to 1 fades the picture out evenly, in the order that
+/// Restructures alpha so that raising the alpha threshold from 0.5 to 1 fades the texture out evenly, in the order that
 /// `fade` says. Colours stay as they are (see [`super::dilate_colors`]).
 ///
 /// `cutoff` (0..1) is the threshold with which the image was made to be drawn: a *leaf* is a connected region (four
 /// neighbours) of texels with `alpha >= cutoff`, its outline the line on which interpolated alpha crosses `cutoff`.
 /// In the result
 ///
-/// - inside, `alpha = 0.5 + 0.5 a`. By [`AlphaFade::PerLeaf`] `a` is the fraction of *that leaf's* area which lies nearer to
-///   its outline, by [`AlphaFade::CenterOut`] the fraction of all leaves' area which lies farther from the picture's centre.
-///   So alpha is spread evenly over the area: a threshold `t` of 0.5..1 hides `2 (t - 0.5)` of it, the outer share of every
-///   leaf, whatever its size and shape, or of the picture. Exact up to the 8 bits and to texels of equal distance, which
-///   share their middle rank (a leaf of a single texel has 0.75 by the former). Interpolated between texels the latter hides
-///   a little more: near the centre alpha is high up to a leaf's outline, which recedes by a fraction of a texel;
+/// - inside, `alpha = 0.5 + 0.5 a`. By [`AlphaFade::PerLeaf`] `a` is the fraction of *that leaf's* area which lies
+///   nearer to its outline, by [`AlphaFade::CenterOut`] the fraction of all leaves' area which lies farther from the
+///   texture's centre. So alpha is spread evenly over the area: a threshold `t` of 0.5..1 hides `2 (t - 0.5)` of it,
+///   the outer share of every leaf, whatever its size and shape, or of the texture. Exact up to the 8 bits and to
+///   texels of equal distance, which share their middle rank (a leaf of a single texel has 0.75 by the former).
+///   Interpolated between texels the latter hides a little more: near the centre alpha is high up to a leaf's outline,
+///   which recedes by a fraction of a texel;
 /// - across the outline interpolated alpha passes 0.5 where it passed `cutoff` before (to a fraction of a texel);
 /// - outside, alpha falls to 0 within 2 texels, which antialiases the outline;
 /// - holes of less than a thousandth of the leaves' area stay holes, but leaves do not shrink away from them: the
 ///   pinholes of a photographed twig would grow into bites.
 ///
-/// Distances are exact Euclidean ones in texels, those to an outline with its subtexel position taken from the given alpha.
-/// A `cutoff` of 0 or less makes the whole image one leaf without an outline: every alpha is 1. Where nothing reaches
-/// `cutoff`, every alpha is 0.
+/// Distances are exact Euclidean ones in texels, those to an outline with its subtexel position taken from the given
+/// alpha. A `cutoff` of 0 or less makes the whole image one leaf without an outline: every alpha is 1. Where nothing
+/// reaches `cutoff`, every alpha is 0.
 pub fn fade_alpha(image: &RgbaImage, cutoff: f32, fade: AlphaFade) -> RgbaImage {
     let mut out = image.clone();
     let width = image.width() as usize;
@@ -97,7 +100,8 @@ fn leaf_ranks(outline: &Outline) -> Vec<f32> {
     area_fractions(inside, &label_regions(&closed, width), &depth)
 }
 
-/// For every inside texel the fraction, 0..1, of all inside texels that lie farther from the picture's centre; 0 outside.
+/// For every inside texel the fraction, 0..1, of all inside texels that lie farther from the texture's centre; 0
+/// outside.
 fn center_ranks(inside: &[bool], width: usize) -> Vec<f32> {
     let height = inside.len() / width.max(1);
     let half = |size: usize| 0.5 * size as f32;

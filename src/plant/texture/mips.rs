@@ -46,9 +46,9 @@ pub fn alpha_tested_mips(image: &RgbaImage) -> MipChain {
     })
 }
 
-/// Mips of a leaf texture that was made to be drawn with an alpha test at `cutoff` (0..1), to be drawn with one at 0.5 or
-/// above: colours without halos, alpha that fades leaf by leaf ([`AlphaFade::PerLeaf`]: a picture of leaves is no crown),
-/// coverage that is kept.
+/// Mips of a leaf texture that was made to be drawn with an alpha test at `cutoff` (0..1), to be drawn with one at 0.5
+/// or above: colours without halos, alpha that fades leaf by leaf ([`AlphaFade::PerLeaf`]: a texture of leaves is not a
+/// crown), coverage that is kept.
 pub fn leaf_mips(image: &RgbaImage, cutoff: f32) -> MipChain {
     let mut dilated = image.clone();
     dilate_colors(&mut dilated);

@@ -95,7 +95,7 @@ impl TransferLight {
                 mapped_at_creation: false,
             })
         });
-        let words = [part.bytes.as_slice(), part.scattered.as_slice()].concat();
+        let words = [part.bytes.as_slice(), part.indirect_sun.as_slice()].concat();
         let coefficients = buffer_with(&gpu.device, "canopy_transfer", BufferUsages::STORAGE, &words);
         let uniform = [TransferUniform::new(settings, part, tint)];
         let uniform = buffer_with(&gpu.device, "canopy_transfer_layout", BufferUsages::STORAGE, &uniform);

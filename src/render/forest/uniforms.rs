@@ -7,7 +7,7 @@ use glam::Vec3;
 use crate::{
     bake::{
         BakedPlant,
-        levels::cross::SPREAD_LEVELS,
+        levels::cross::ISOTROPIC_LEVELS,
         lighting::{
             BakedLighting,
             transfer::{PackedPart, TransferSettings, code_words, mean_words},
@@ -108,7 +108,7 @@ pub struct CrossVariantUniform {
     /// First layer of its textures.
     pub first_layer: u32,
     /// Fraction of a texel's leaf area with isotropic normals, mip by mip.
-    pub isotropic_fraction: [[f32; 4]; SPREAD_LEVELS / 4],
+    pub isotropic_fraction: [[f32; 4]; ISOTROPIC_LEVELS / 4],
     /// First layer of its lighting textures, if it has any.
     pub first_light_layer: u32,
     /// WGSL rounds the size up to 16 bytes.
@@ -178,7 +178,7 @@ impl TransferUniform {
             side_words: code_words(settings) as u32,
             indirect_sun_start: (part.bytes.len() / 4) as u32,
             indirect_sun_color: tint.to_array(),
-            indirect_sun_scale: part.scattered_scale,
+            indirect_sun_scale: part.indirect_sun_scale,
         }
     }
 }
@@ -201,7 +201,7 @@ pub fn variants(plants: &[BakedPlant], sizes: &[PlantSize]) -> Vec<VariantUnifor
 
 fn variant(plant: &BakedPlant, size: &PlantSize) -> VariantUniform {
     let gloss = plant.plant.leaf_gloss();
-    let (mean, zenith) = plant.lighting.scattered();
+    let (mean, zenith) = plant.lighting.indirect_sun();
     VariantUniform {
         height: size.height,
         crown_radius: size.radius,
@@ -240,7 +240,7 @@ pub fn cross_variants(plants: &[BakedPlant]) -> Vec<CrossVariantUniform> {
                 };
             }
             variant.transmission = cross.transmission.to_array();
-            variant.isotropic_fraction = bytemuck::cast(cross.spread);
+            variant.isotropic_fraction = bytemuck::cast(cross.isotropic_fraction);
             first_light_layer += cross.textures.light.len() as u32;
         }
         variants.push(variant);
@@ -260,7 +260,7 @@ fn cover_weight(lighting: &BakedLighting) -> f32 {
 
 /// What the shaders know of a part's material.
 pub fn part_uniform(material: &PlantMaterial, lighting: &BakedLighting) -> PartUniform {
-    let gloss = material.gloss.in_range();
+    let gloss = material.gloss.sanitized();
     PartUniform {
         base_color: material.base_color.to_array(),
         realigned: realigned(lighting),

@@ -94,11 +94,13 @@ fn upload_stand_light(
 
 /// Half floats, block by block.
 fn texels(light: &LightState, stand: &StandLight, exposure: f32) -> Vec<[f16; 4]> {
-    let places = stand.places();
+    let samples = stand.samples();
     let lit = |radiance: Vec3| (radiance * exposure).extend(0.0);
-    let mut texels: Vec<Vec4> = places.iter().map(|place| place.sky.extend(place.beam)).collect();
-    texels.extend(places.iter().map(|place| lit(place.down)));
-    texels.extend(places.iter().map(|place| lit(place.up - place.sky * light.ground_radiance)));
+    let mut texels: Vec<Vec4> =
+        samples.iter().map(|sample| sample.sky_transmittance.extend(sample.sun_transmittance)).collect();
+    texels.extend(samples.iter().map(|sample| lit(sample.downwelling)));
+    texels
+        .extend(samples.iter().map(|sample| lit(sample.upwelling - sample.sky_transmittance * light.ground_radiance)));
     let half = |value: f32| f16::from_f32(value.clamp(-BRIGHTEST, BRIGHTEST));
     texels.iter().map(|texel| texel.to_array().map(half)).collect()
 }

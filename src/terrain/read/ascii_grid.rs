@@ -205,7 +205,7 @@ fn number(source: &Source, word: &Word) -> Result<f64, TerrainError> {
     })
 }
 
-/// Words of a text with the place where each begins, both counted from 1.
+/// Words of a text with the position where each begins, both counted from 1.
 #[derive(Clone)]
 struct Words<'a> {
     text: &'a [u8],

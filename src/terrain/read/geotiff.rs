@@ -1,4 +1,4 @@
-//! GeoTIFF [OGC 19-008r4] and BigTIFF: one band of heights with its place on earth.
+//! GeoTIFF [OGC 19-008r4] and BigTIFF: one band of heights with its location on earth.
 
 mod keys;
 

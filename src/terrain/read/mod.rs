@@ -22,7 +22,7 @@ use glam::DVec2;
 use super::holes::fill_holes;
 use super::{CoordinateSystem, GeoReference, HeightField, MAX_SAMPLES, Surroundings, Terrain, TerrainError, Warning};
 
-/// Heights outside this range (metres) are no heights of the earth, but a mark for missing data.
+/// Heights outside this range (metres) are not heights on earth but mark missing data.
 const PLAUSIBLE: std::ops::RangeInclusive<f32> = -12_000.0..=30_000.0;
 
 /// What to read and how to understand it; the default reads a whole file as it describes itself.
@@ -82,8 +82,8 @@ pub fn read_terrain(path: &Path, options: &ReadOptions) -> Result<(Terrain, Vec<
     Source { path, length, bytes: None, options }.read(&start)
 }
 
-/// Reads a terrain from the bytes of a file, as [`read_terrain`] does from the file itself. `name` is its name: for messages,
-/// and because an `.hgt` file says by it where on earth it lies.
+/// Reads a terrain from the bytes of a file, as [`read_terrain`] does from the file itself. `name` is its name: for
+/// messages, and because an `.hgt` file says by it where on earth it lies.
 ///
 /// # Errors
 /// Those of [`read_terrain`].
@@ -154,10 +154,15 @@ impl<'a> Source<'a> {
         }
     }
 
-    fn malformed(&self, place: impl Into<String>, problem: impl ToString, remedy: impl Into<String>) -> TerrainError {
+    fn malformed(
+        &self,
+        location: impl Into<String>,
+        problem: impl ToString,
+        remedy: impl Into<String>,
+    ) -> TerrainError {
         TerrainError::Malformed {
             path: self.path.to_owned(),
-            place: place.into(),
+            location: location.into(),
             problem: problem.to_string(),
             remedy: remedy.into(),
         }

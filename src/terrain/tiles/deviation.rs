@@ -14,10 +14,11 @@ const MEASURED_MARGIN: f64 = 1.1;
 /// The bend is taken at the corners of the cells; inside a cell it can be a little larger.
 const BEND_MARGIN: f64 = 1.15;
 
-/// The deviation of each vertex spacing (metres, rising) that the share `coverage` of the ground keeps, in metres, never falling.
+/// The deviation of each vertex spacing (metres, rising) that the share `coverage` of the ground keeps, in metres,
+/// never falling.
 ///
-/// Spacings below half a sample of the field see a surface that is nearly quadratic over a triangle, so the second derivatives give the
-/// deviation, `spacing² * bend`; coarser ones are measured over the field.
+/// Spacings below half a sample of the field see a surface that is nearly quadratic over a triangle, so the second
+/// derivatives give the deviation, `spacing² * bend`; coarser ones are measured over the field.
 pub(super) fn of_levels(terrain: &Terrain, spacings: impl Iterator<Item = f64>, coverage: f64) -> Vec<f64> {
     let bend = quantile(terrain.bends(), coverage) * BEND_MARGIN;
     let cell = terrain.field().spacing().min_element();

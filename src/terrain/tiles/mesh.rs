@@ -14,16 +14,16 @@ const SIDE: usize = TILE_QUADS + 1;
 pub struct TileVertex {
     /// Height of the ground in metres above the datum.
     pub height: f32,
-    /// Height of the next coarser level's mesh at the same place, in metres above the datum.
+    /// Height of the next coarser level's mesh at the same position, in metres above the datum.
     pub parent_height: f32,
     /// Unit normal of the ground (not of the mesh), upwards.
     pub normal: Vec3,
-    /// Unit normal that the next coarser mesh has at the same place, interpolated from its vertices.
+    /// Unit normal that the next coarser mesh has at the same position, interpolated from its vertices.
     pub parent_normal: Vec3,
 }
 
-/// The triangles of every tile as vertex indices: counter-clockwise seen from above, two per quad, cut along the diagonal
-/// from the north-western to the south-eastern corner. `6 N²` indices for the `(N + 1)²` vertices in rows.
+/// The triangles of every tile as vertex indices: counter-clockwise seen from above, two per quad, cut along the
+/// diagonal from the north-western to the south-eastern corner. `6 N²` indices for the `(N + 1)²` vertices in rows.
 pub fn tile_indices() -> Vec<u32> {
     let mut indices = Vec::with_capacity(6 * TILE_QUADS * TILE_QUADS);
     let side = SIDE as u32;
@@ -64,8 +64,8 @@ pub(super) fn vertices(terrain: &Terrain, origin: DVec2, spacing: f64) -> Vec<Ti
     vertices
 }
 
-/// Height inside a quad of the mesh at `u` (west to east) and `v` (north to south), 0 to 1 each, from its corners in the
-/// order north-west, north-east, south-west, south-east.
+/// Height inside a quad of the mesh at `u` (west to east) and `v` (north to south), 0 to 1 each, from its corners in
+/// the order north-west, north-east, south-west, south-east.
 pub(super) fn triangulated_height([nw, ne, sw, se]: [f64; 4], u: f64, v: f64) -> f64 {
     if u >= v { nw + u * (ne - nw) + v * (se - ne) } else { nw + v * (sw - nw) + u * (se - sw) }
 }
@@ -77,10 +77,10 @@ mod tests {
     #[test]
     fn triangles_face_up_and_cover_the_tile_once() {
         let indices = tile_indices();
-        let place = |i: u32| DVec2::new(f64::from(i % SIDE as u32), f64::from(i / SIDE as u32));
+        let position = |i: u32| DVec2::new(f64::from(i % SIDE as u32), f64::from(i / SIDE as u32));
         let mut area = 0.0;
         for triangle in indices.chunks_exact(3) {
-            let [a, b, c] = [place(triangle[0]), place(triangle[1]), place(triangle[2])];
+            let [a, b, c] = [position(triangle[0]), position(triangle[1]), position(triangle[2])];
             // x east and z south: the up component of (b - a) x (c - a).
             let up = (b - a).y * (c - a).x - (b - a).x * (c - a).y;
             assert_eq!(up, 1.0);

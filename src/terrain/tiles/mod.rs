@@ -1,12 +1,13 @@
-//! Levels of detail of the drawn ground: a quadtree of tiles whose meshes melt into each other with the distance
+//! Levels of detail of the drawn ground: a quadtree of tiles whose meshes morph into each other with distance
 //! [Strugar 2009, "Continuous Distance-Dependent Level of Detail for Rendering Heightmaps", JGT 14(4)].
 //!
-//! **Meshes.** A tile of level `l` has `(N + 1)²` vertices, `N` = [`TILE_QUADS`], at the spacing `s_l = finest_spacing * 2^l`.
-//! Tile `(ix, iz)` begins at `x = ix * N * s_l`, `z = iz * N * s_l` and goes east and south; tiles cover the whole plane, the
-//! surroundings of the field included. Every quad is cut along the **diagonal from its north-western to its south-eastern
-//! corner** ([`tile_indices`]). With one direction for all, the mesh of a level refines the triangles of the next
-//! coarser one exactly, so a vertex knows the height it has there (`parent_height`): its own at even indices, the mean of
-//! its two neighbours along the row, the column or the diagonal at odd ones.
+//! **Meshes.** A tile of level `l` has `(N + 1)²` vertices, `N` = [`TILE_QUADS`], at the spacing
+//! `s_l = finest_spacing * 2^l`. Tile `(ix, iz)` begins at `x = ix * N * s_l`, `z = iz * N * s_l` and goes east and
+//! south; tiles cover the whole plane, the surroundings of the field included. Every quad is cut along the **diagonal
+//! from its north-western to its south-eastern corner** ([`tile_indices`]). With one direction for all, the mesh of a
+//! level refines the triangles of the next coarser one exactly, so a vertex knows the height it has there
+//! (`parent_height`): its own at even indices, the mean of its two neighbours along the row, the column or the diagonal
+//! at odd ones.
 //!
 //! **Morph**, in the shader as here ([`Tile::morph`]):
 //!
@@ -16,12 +17,13 @@
 //! y = mix(height, parent_height, k)                          x and z stay
 //! ```
 //!
-//! `clearance` is a lower bound of the distance from the camera to the ground. `D` therefore is never above the true distance
-//! (so errors are never larger than planned), and it depends on x and z alone: both sides of an edge compute the same
-//! `D` at the same place, whatever their level.
+//! `clearance` is a lower bound of the distance from the camera to the ground. `D` therefore is never above the true
+//! distance (so errors are never larger than planned), and it depends on x and z alone: both sides of an edge compute
+//! the same `D` at the same position, whatever their level.
 //!
 //! **Ranges.** `e_l` is the vertical deviation of level `l`'s mesh from [`Terrain::height`] that the share
-//! [`TileSettings::coverage`] of the ground does not exceed (all of it at 1), measured once over the terrain. A level melts into the next between
+//! [`TileSettings::coverage`] of the ground does not exceed (all of it at 1), measured once over the terrain. A level
+//! morphs into the next between
 //!
 //! ```text
 //! start_l = max(e_(l+1) * focal_px / pixel_error + sqrt(2) s_l,   the next level's error is small enough
@@ -31,12 +33,14 @@
 //! ```
 //!
 //! so that at every distance the error of the drawn mesh stays below `pixel_error` pixels (an angle of
-//! `pixel_error / focal_px`). Nearer than `e_0 * focal_px / pixel_error` there is no finer level: choose `finest_spacing` for that.
+//! `pixel_error / focal_px`). Nearer than `e_0 * focal_px / pixel_error` there is no finer level: choose
+//! `finest_spacing` for that.
 //!
-//! **No cracks.** A tile of level `l` is split if its nearest `D` is below `end_(l-1)`. A split tile then lies wholly before
-//! `start_l` (its diagonal is `sqrt(2) N s_l`), a whole one wholly behind `end_(l-1)`. Where a tile of level `l` meets one of
-//! level `l - 1`, both hold on the common edge: the coarse side does not morph yet, the fine side has become the coarse mesh. Tiles
-//! two levels apart cannot meet. What remains are T-junctions whose vertices lie on the coarse edge up to rounding (1e-4 m).
+//! **No cracks.** A tile of level `l` is split if its nearest `D` is below `end_(l-1)`. A split tile then lies wholly
+//! before `start_l` (its diagonal is `sqrt(2) N s_l`), a whole one wholly behind `end_(l-1)`. Where a tile of level `l`
+//! meets one of level `l - 1`, both hold on the common edge: the coarse side does not morph yet, the fine side has
+//! become the coarse mesh. Tiles two levels apart cannot meet. What remains are T-junctions whose vertices lie on the
+//! coarse edge up to rounding (1e-4 m).
 
 mod deviation;
 mod mesh;
@@ -62,18 +66,19 @@ const NEVER: f64 = 1.0e12;
 /// Cameras farther out (metres) are taken as standing here, so that tile coordinates fit i32.
 const FARTHEST_CAMERA: f64 = 1.0e7;
 
-/// How finely the ground is drawn.
+/// Settings for the detail of the drawn ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TileSettings {
-    /// Distance of vertices at the finest level in metres, 0.01 to 10 000. Smaller follows the ground closer right before
-    /// the camera and costs only there.
+    /// Distance of vertices at the finest level in metres, 0.01 to 10 000. Smaller follows the ground more
+    /// closely right in front of the camera, and costs only there.
     pub finest_spacing: f64,
-    /// The ground is drawn in a square that reaches this far from the camera, in metres, above 0 to 1 000 000.
+    /// Half the edge of the square around the camera in which the ground is drawn, in metres, above 0 to 1 000 000.
     pub max_distance: f64,
-    /// Error of the drawn mesh in pixels, 0.05 to 100. Twice the error is about a quarter of the triangles on rough ground.
+    /// Error of the drawn mesh in pixels, 0.05 to 100. Doubling it leaves about a quarter of the triangles on rough
+    /// ground.
     pub pixel_error: f64,
-    /// The share of the ground that keeps the pixel error, 0.5 to 1. At 1 the roughest spot of the whole terrain sets the
-    /// distances for all of it, which is strict, and dear on measured data with their noise.
+    /// Fraction of the ground that keeps the pixel error, 0.5 to 1. At 1 the roughest spot of the whole terrain
+    /// determines the distances for all of it, which is strict, and expensive for measured, noisy data.
     pub coverage: f64,
 }
 
@@ -94,13 +99,13 @@ pub struct Tile {
     pub iz: i32,
     /// Distance `D` at which vertices begin to move to their `parent_height`, in metres.
     pub morph_start: f32,
-    /// Distance `D` from which on they are there, in metres; above `morph_start`.
+    /// Distance `D` at which they arrive there, in metres; above `morph_start`.
     pub morph_end: f32,
 }
 
 impl Tile {
-    /// The share of `parent_height` at a vertex at local position `vertex` (x east, y south, metres): 0 to 1. This is the
-    /// formula of the module's head, in f64.
+    /// The weight of `parent_height` at a vertex at local position `vertex` (x east, y south, metres): 0 to 1. This is
+    /// the formula of the module's head, in f64.
     pub fn morph(&self, vertex: DVec2, camera: DVec3, clearance: f64) -> f64 {
         let distance = vertex.distance(DVec2::new(camera.x, camera.z)).max(clearance);
         let (start, end) = (f64::from(self.morph_start), f64::from(self.morph_end));
@@ -108,7 +113,7 @@ impl Tile {
     }
 }
 
-/// Where a level melts into the next coarser one.
+/// The distances over which a level morphs into the next coarser one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MorphRange {
     /// Distance `D` in metres where the morph begins.
@@ -193,8 +198,8 @@ impl TileTree {
         self.bounds.over(origin, origin + self.tile_width(level))
     }
 
-    /// The vertical deviation of each level's mesh from the ground in metres (see the module's head), finest level first, never
-    /// falling.
+    /// The vertical deviation of each level's mesh from the ground in metres (see the module's head), finest level
+    /// first, never falling.
     pub fn deviations(&self) -> &[f64] {
         &self.deviations
     }
@@ -221,11 +226,11 @@ impl TileTree {
     }
 
     /// Chooses the tiles to draw from `camera` (local x, height, local z; metres) into `out` (cleared first), nearest
-    /// first, always in the same order. `visible` says whether a box (lower and upper corner: x, height, z) may be seen;
-    /// it is asked for coarse boxes before the finer ones inside them.
+    /// first, always in the same order. `visible` says whether a box (lower and upper corner: x, height, z) may be
+    /// seen; it is asked for coarse boxes before the finer ones inside them.
     ///
-    /// Returns the clearance that the morph needs: a lower bound of the distance from the camera to the ground, in metres.
-    /// About 0.3 us a tile.
+    /// Returns the clearance that the morph needs: a lower bound of the distance from the camera to the ground, in
+    /// metres. About 0.3 us a tile.
     pub fn select(
         &self,
         camera: DVec3,
@@ -283,14 +288,14 @@ impl TileTree {
         clearance
     }
 
-    /// The vertices of a tile, row by row from the north, each row from the west: `(N + 1)²` of them; x and z follow from
-    /// [`TileTree::tile_origin`] and [`TileTree::spacing`]. About 50 us.
+    /// The vertices of a tile, row by row from the north, each row from the west: `(N + 1)²` of them; x and z follow
+    /// from [`TileTree::tile_origin`] and [`TileTree::spacing`]. About 50 us.
     pub fn tile_vertices(&self, terrain: &Terrain, level: u32, ix: i32, iz: i32) -> Vec<TileVertex> {
         mesh::vertices(terrain, self.tile_origin(level, ix, iz), self.spacing(level))
     }
 
-    /// A lower bound of the distance from a point to the ground: the largest `r` so that all ground within a square of half
-    /// width `r` lies `r` or more below the point. Ground outside the square is `r` away anyway. 0 under ground.
+    /// A lower bound of the distance from a point to the ground: the largest `r` so that all ground within a square of
+    /// half width `r` lies `r` or more below the point. Ground outside the square is `r` away anyway. 0 under ground.
     fn clearance(&self, camera: DVec3) -> f64 {
         let ground = DVec2::new(camera.x, camera.z);
         let above = |radius: f64| camera.y - f64::from(self.bounds.over(ground - radius, ground + radius).1);

@@ -310,7 +310,7 @@ impl Baker {
         let mut state = self.shared.state();
         state.requests += 1;
         // A full bake with no more generators than a preview needs no preview.
-        let slow = request.cross.is_none() || request.settings.in_range().generator_share > PREVIEW_SHARE;
+        let slow = request.cross.is_none() || request.settings.sanitized().generator_share > PREVIEW_SHARE;
         let previewed = if slow { 0 } else { request.plants.len() };
         let (number, requested) = (state.requests, Instant::now());
         let job = Job { number, requested, previewed, lit: Vec::new(), crossed: 0, request };

@@ -10,7 +10,7 @@ use crate::math::{
 };
 use crate::plant::texture::{AlphaFade, alpha_tested_mips, dilate_colors, fade_alpha};
 
-/// Colour mips of a picture of `resolution`² texels. Alpha is the coverage, restructured by [`fade_alpha`] with the
+/// Colour mips of a texture of `resolution`² texels. Alpha is the coverage, restructured by [`fade_alpha`] with the
 /// cutoff for which the area inside the outline is the sum of the coverages: a thin crown is full of texels that are
 /// covered in part, and a cutoff of one half would drop or fill them all.
 pub(super) fn mips(texels: &[Texel], resolution: usize, fade: AlphaFade) -> MipChain {

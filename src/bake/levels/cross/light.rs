@@ -1,24 +1,27 @@
-//! Lighting textures of crosses: how the sky's light reaches a texel's leaves [Franzke 2005, 4.3.3, "Spherical Harmonics
-//! Beleuchtungstextur"].
+//! Lighting textures of crosses: the transfer of the sky's light to a texel's leaves [Franzke 2005, 4.3.3, "Spherical
+//! Harmonics Beleuchtungstextur"].
 //!
-//! The transfer of the vertices ([`crate::bake::lighting::transfer`]) is rasterised like their colour. Of its coefficients the first two
-//! bands are kept: what comes in the mean over all directions, and a vector, in the plane's frame as the normals are, so that a
-//! plane seen from behind is mirrored by turning its third component. A leaf shows the light of the side that faces the viewer
-//! and, times its transmission `t`, that of the other; one texture holds the sum of both over `1 + t`, with the luminance of
-//! `t`, so that the shader can give each channel its own:
+//! The transfer of the vertices ([`crate::bake::lighting::transfer`]) is rasterised like their colour. The
+//! first two bands of its coefficients are kept: the mean over all directions, and a vector. Like the normals, the
+//! vector is in the plane's frame, so that a plane seen from behind only flips its third component. A leaf shows the
+//! light on the side that faces the viewer plus, times its transmission `t`, the light on the other side. One texture
+//! holds this sum over `1 + t`, with the luminance of `t`, so that the shader can apply the transmission of each
+//! channel:
 //!
 //! ```text
 //!  stored = (near + t far) / (1 + t)
-//!  what leaves under the sky = base colour (1 + t) (l_0 stored.w + L . stored.xyz)
-//!                                                   l_0, L: the sky's first coefficient and the vector of its second band
+//!  radiance under the sky = base colour (1 + t) (l_0 stored.w + L . stored.xyz)
+//!                                          l_0, L: the sky's first coefficient and the vector of its second band
 //! ```
 //!
-//! Cost: 4 bytes a texel, a third more for mips: 1.05 MB a plant at 256 texels, none where a plant is not lit by transfer.
+//! Cost: 4 bytes per texel plus a third for mips: 1.05 MB per plant at 256 texels. None for plants that are not lit by
+//! transfer.
 //!
-//! Error against the model's own light in the same pictures (three bands, clamped at each vertex), luminance, skies of a sun 60
-//! to -4 degrees high, a broadleaf and a conifer, mips 0 to 4: 0.96 to 1.00 of the light and a relative RMSE of 0.03 to 0.23;
-//! k_a and the mean normal, which this replaces, 0.88 to 0.98 and 0.06 to 0.33. Both sides in a texture of their own are no
-//! better, and their plain mean is worse (0.93 to 0.96, 0.11 to 0.24). `the_light_of_a_picture` below holds the order.
+//! Error against the model's own light in the same images (three bands, clamped at each vertex), luminance, skies of a
+//! sun 60 to -4 degrees high, a broadleaf and a conifer, mips 0 to 4: 0.96 to 1.00 of the light and a relative RMSE of
+//! 0.03 to 0.23; the ambient term and the mean normal, which this replaces, 0.88 to 0.98 and 0.06 to 0.33. Both sides
+//! in a texture of their own are no better, and their plain mean is worse (0.93 to 0.96, 0.11 to 0.24).
+//! `the_light_of_a_texture` below checks the order.
 
 use glam::{Mat3, Vec3, Vec4};
 
@@ -26,7 +29,7 @@ use super::Texel;
 use crate::bake::lighting::BakedLighting;
 use crate::math::MipChain;
 
-/// What a code of 127 stands for. A free side has a first coefficient of 0.282 and a vector 0.326 long.
+/// The value of a code of 127. An unoccluded side has a first coefficient of 0.282 and a vector of length 0.326.
 pub const LIGHT_SCALE: f32 = 0.4;
 
 /// The two sides of a vertex in the plant's frame: the vector, and in w the first coefficient.
@@ -59,9 +62,9 @@ pub(super) fn stored(near: Vec4, far: Vec4, transmission: f32, to_plane: &Mat3) 
     if sum.is_finite() { sum } else { Vec4::ZERO }
 }
 
-/// Mips as signed bytes, a picture of `resolution`² texels (a power of two) on top. Means are weighted with the coverage, from
-/// level to level in floating point; a texel of air holds what the coarser level does, and one of no plant at all is in the
-/// open.
+/// Mips as signed bytes, a texture of `resolution`² texels (a power of two) on top. Means are weighted with the
+/// coverage, from level to level in floating point; a texel of air holds what the coarser level does, and one of no
+/// plant at all is in the open.
 pub(super) fn mips(texels: &[Texel], resolution: usize) -> MipChain {
     let mut levels: Vec<Vec<(Vec4, f32)>> = vec![texels.iter().map(|texel| (texel.light, texel.coverage)).collect()];
     let mut size = resolution;
@@ -104,7 +107,7 @@ mod tests {
     use std::f32::consts::PI;
     use std::sync::Arc;
 
-    use super::super::{CrossSettings, picture, planes};
+    use super::super::{CrossSettings, planes, render_plane};
     use super::*;
     use crate::bake::lighting::LightingSettings;
     use crate::bake::lighting::transfer::{TransferSettings, share};
@@ -112,9 +115,10 @@ mod tests {
     use crate::math::luminance;
     use crate::plant::grow::{GrowParameters, grow};
 
-    /// The texture is nearer to the light of the model's vertices in the same picture than k_a with the mean normal.
+    /// The texture is nearer to the light of the model's vertices in the same image than the ambient term with the mean
+    /// normal.
     #[test]
-    fn the_light_of_a_picture_is_nearer_than_by_k_a() {
+    fn the_light_of_a_texture_is_nearer_than_by_the_ambient_term() {
         let plant = Arc::new(grow(&GrowParameters::broadleaf(), 1, 5000).unwrap());
         let bake = TransferSettings { rays: 64, ..TransferSettings::default() };
         let lighting = BakedLighting::bake(&plant, &LightingSettings::Transfer(bake));
@@ -124,14 +128,14 @@ mod tests {
         let plane = &planes(&plant)[0];
         let frame = plane.frame();
         let sides = vertex_sides(&lighting).unwrap();
-        let texels = picture(&plant, &lighting, Some(&sides), plane, &settings);
+        let texels = render_plane(&plant, &lighting, Some(&sides), plane, &settings);
         let codes = mips(&texels, 64);
         let air = Atmosphere::new(AtmosphereParams::with_visibility_km(60.0)).unwrap();
         for elevation in [40.0, 5.0, -4.0] {
             let sun = SunPosition::from_degrees(250.0, elevation).unwrap();
             let state = LightState::new(&air, sun, None, &LightSettings::default()).unwrap();
             let sky = state.surroundings().project(3);
-            // The light of each vertex in place of its first coefficient: the picture is that of the model.
+            // The light of each vertex in place of its first coefficient: so the image shows the model.
             let lit = |side: &[f32]| Vec3::ZERO.extend(luminance(share(&sky, side)));
             let vertices = |part: usize| {
                 let part = &baked.parts[part];
@@ -140,9 +144,9 @@ mod tests {
                 (0..count).map(side).collect::<Vec<Sides>>()
             };
             let lit: Vec<Vec<Sides>> = (0..baked.parts.len()).map(vertices).collect();
-            let truth = picture(&plant, &lighting, Some(&lit), plane, &settings);
+            let truth = render_plane(&plant, &lighting, Some(&lit), plane, &settings);
             let vector = frame.transpose() * Vec3::new(-luminance(sky[1]), luminance(sky[2]), -luminance(sky[3]));
-            let (mut error, mut error_by_k_a, mut square) = (0.0, 0.0, 0.0);
+            let (mut error, mut error_by_ambient, mut square) = (0.0, 0.0, 0.0);
             for (at, (texel, truth)) in texels.iter().zip(&truth).enumerate().filter(|(_, (t, _))| t.foliage > 0.0) {
                 let code = |i: usize| f32::from(codes.levels[0][4 * at + i] as i8) / 127.0 * LIGHT_SCALE;
                 let got = (luminance(sky[0]) * code(3) + vector.dot(Vec3::new(code(0), code(1), code(2)))).max(0.0);
@@ -150,13 +154,16 @@ mod tests {
                 let normal = frame * texel.normal.try_normalize().unwrap_or(Vec3::Z);
                 let even = |normal| luminance(sh::irradiance(&state.sky_sh, normal)).max(0.0) / PI;
                 // With as much light through a leaf as from its face.
-                let by_k_a = texel.ambient / texel.coverage * 0.5 * (even(normal) + even(-normal));
+                let by_ambient = texel.ambient / texel.coverage * 0.5 * (even(normal) + even(-normal));
                 error += (got - wanted).powi(2) * texel.coverage;
-                error_by_k_a += (by_k_a - wanted).powi(2) * texel.coverage;
+                error_by_ambient += (by_ambient - wanted).powi(2) * texel.coverage;
                 square += wanted * wanted * texel.coverage;
             }
-            let [ours, theirs] = [error, error_by_k_a].map(|sum| (sum / square).sqrt());
-            assert!(ours < 0.85 * theirs && ours < 0.25, "{elevation}: {ours} by the texture, {theirs} by k_a");
+            let [ours, theirs] = [error, error_by_ambient].map(|sum| (sum / square).sqrt());
+            assert!(
+                ours < 0.85 * theirs && ours < 0.25,
+                "{elevation}: {ours} by the texture, {theirs} by the ambient term"
+            );
         }
     }
 

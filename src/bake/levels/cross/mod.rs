@@ -1,17 +1,18 @@
 //! Crossed billboards made from the model itself [Franzke 2005, 4.3, "Kreuzebenen"].
 //!
 //! Two vertical planes at right angles through the trunk's axis and a horizontal one through the foliage's centre.
-//! Each plane's picture is the *whole* plant seen along the plane's normal, so three quads stand for the tree from
-//! every side. No light is baked in: a texel keeps base colour, normal, ambient visibility k_a and whether it is
-//! leaf or wood, and is lit like the full model; of a plant lit by radiance transfer also how the sky reaches it (`light.rs`).
+//! Each plane's texture shows the *whole* plant seen along the plane's normal, so three quads represent the tree from
+//! every side. No light is baked in: a texel has a base colour, normal, ambient term and a fraction of foliage, and is
+//! lit like the full model. If the plant is lit by radiance transfer, a texel also has the transfer of the sky's light
+//! (`light.rs`).
 //!
 //! ```text
-//!   plant + k_a --rasterise (rasterize.rs)--> samples --resolve--> texels --color.rs------> base colour, alpha
-//!                                                                         \-properties.rs-> normal, k_a, foliage
+//! plant, lighting --rasterise (rasterize.rs)--> samples --resolve--> texels --color.rs-----> base colour, alpha
+//!                                                                           \-properties.rs-> normal, ambient term, foliage
 //! ```
 //!
-//! Cost: three pictures of (resolution * supersampling)² samples. Limits: a plane looks right along its normal and
-//! loses parallax away from it; a plane seen from behind shows the picture of its front, mirrored.
+//! Cost: three images of (resolution * supersampling)² samples. Limits: a plane looks right along its normal and
+//! lacks parallax in other directions; a plane seen from behind shows the texture of its front, mirrored.
 
 mod color;
 mod light;
@@ -23,7 +24,7 @@ use glam::{Mat3, Vec3, Vec4};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use self::properties::SpreadSum;
+use self::properties::IsotropicSum;
 use super::rasterize::{Hit, Raster, View};
 use crate::bake::lighting::BakedLighting;
 use crate::math::{MipChain, luminance};
@@ -34,17 +35,20 @@ use crate::plant::{Bounds, PartKind, Plant, PlantMaterial, geometry, texture::Al
 pub struct Cross {
     /// The planes: facing +Z, facing +X, and facing up. Always three.
     pub planes: Vec<CrossPlane>,
-    /// Their pictures, in the order of the planes.
+    /// Their textures, in the order of the planes.
     pub textures: CrossTextures,
-    /// Transmission of the foliage (mean over its area), a factor as in [`PlantMaterial::transmission`]; applies to texels in the measure of their foliage.
+    /// Transmission of the foliage (mean over its area), a factor as in [`PlantMaterial::transmission`]. It applies to
+    /// a texel in proportion to its fraction of foliage.
     pub transmission: Vec3,
-    /// Share of the leaves in a texel that face everywhere alike, 0..1, for each of the pictures' first mips (the last one
-    /// stands for all that follow): what their mean normal no longer tells. 0: one leaf with the texel's normal.
-    pub spread: [f32; SPREAD_LEVELS],
+    /// Per mip: fraction of a texel's leaf area whose normals are isotropic, 0..1, which averaging the normals hides
+    /// (compare [Toksvig 2005, "Mipmapping Normal Maps"]). 0: all leaves share the texel's normal. The last entry
+    /// serves all coarser mips.
+    pub isotropic_fraction: [f32; ISOTROPIC_LEVELS],
 }
 
 impl Cross {
-    /// Whether the lists go together, of a plant that is lit by radiance transfer or not, and all values are in their ranges.
+    /// Whether the lists go together, of a plant that is lit by radiance transfer or not, and all values are in their
+    /// ranges.
     pub fn is_whole(&self, of_transfer: bool) -> bool {
         let CrossTextures { color, properties, light } = &self.textures;
         let planes = self.planes.len();
@@ -53,23 +57,23 @@ impl Cross {
             && [color.len(), properties.len(), light.len()] == [planes, planes, if of_transfer { planes } else { 0 }]
             && color.iter().chain(properties).chain(light).all(MipChain::is_whole)
             && self.transmission.is_finite()
-            && self.spread.iter().all(|share| (0.0..=1.0).contains(share))
+            && self.isotropic_fraction.iter().all(|share| (0.0..=1.0).contains(share))
     }
 }
 
-/// Mips for which [`Cross::spread`] is known.
-pub const SPREAD_LEVELS: usize = 8;
+/// Mips for which [`Cross::isotropic_fraction`] is known.
+pub const ISOTROPIC_LEVELS: usize = 8;
 
-/// A rectangle `center + s u + t v` with s and t in -1..=1; its picture's upper left is at `center - u + v`.
+/// A rectangle `center + s u + t v` with s and t in -1..=1; its texture's upper left corner is at `center - u + v`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CrossPlane {
     /// Middle, metres, in the plant's frame.
     pub center: Vec3,
-    /// From the middle to the right border of the picture, metres. Zero where the plant has no extent.
+    /// From the centre to the right border of the texture, metres. Zero where the plant has no extent.
     pub u: Vec3,
-    /// From the middle to the upper border of the picture, metres. Zero where the plant has no extent.
+    /// From the centre to the upper border of the texture, metres. Zero where the plant has no extent.
     pub v: Vec3,
-    /// Unit normal, to the side from which the picture was taken; right-handed with u and v.
+    /// Unit normal, towards the side from which the texture was rendered; right-handed with u and v.
     pub normal: Vec3,
 }
 
@@ -88,7 +92,7 @@ impl CrossPlane {
     }
 }
 
-/// The pictures of crossed billboards, one of each kind a plane.
+/// The textures of crossed billboards: one of each kind per plane.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CrossTextures {
     /// Base colour: sRGB-encoded RGB, to be drawn with an alpha test at 0.5 or above. At 0.5 the outline covers what
@@ -99,30 +103,31 @@ pub struct CrossTextures {
     /// Vectors"; Bevy's `octahedral_decode`], **in the plane's frame** (x right, y up, z to the front): decode, flip
     /// z where the plane is seen from behind, then multiply with [`CrossPlane::frame`]. In that frame the seam of
     /// the encoding lies behind the plane, where no normal points, so the texture can be filtered.
-    /// B: ambient visibility k_a. A: share of foliage (1 leaf, 0 wood), the weight of transmission.
+    /// B: ambient term (ambient occlusion). A: fraction of foliage (1 leaf, 0 wood), the weight of transmission.
     /// Linear 8 bit; texels outside the outline continue those inside.
     pub properties: Vec<MipChain>,
-    /// How the light of the sky reaches the leaves, of plants that are lit by radiance transfer; none for others. Signed bytes,
-    /// of which 127 stands for [`LIGHT_SCALE`]: a vector in the plane's frame, whose third component is turned like the normal's
-    /// where the plane is seen from behind, and the mean over all directions. What leaves a texel under the sky is its base
-    /// colour times `1 + transmission` times the mean times the sky's first coefficient plus the vector times that of its second
-    /// band.
+    /// Radiance transfer of the sky's light, for plants that are lit by it; empty for others. Signed bytes, of which
+    /// 127 stands for [`LIGHT_SCALE`]. RGB: a vector in the plane's frame, whose third component is flipped like the
+    /// normal's where the plane is seen from behind. A: the mean over all directions. The radiance of a texel under the
+    /// sky is its base colour times `1 + transmission` times (mean times the sky's first coefficient, plus the vector's
+    /// dot product with the sky's second band).
     pub light: Vec<MipChain>,
 }
 
-/// How crossed billboards are made. Values out of range are moved into it.
+/// Settings of the crossed billboards. Values out of range are clamped.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CrossSettings {
-    /// Edge of the square textures in texels, a power of two, 64..=1024 (rounded up to one). Larger: crosses may come
-    /// nearer to the viewer; memory grows with the square (256: 2.1 MB a plant, 3.1 MB of one lit by transfer).
+    /// Edge of the square textures in texels, 64..=1024, rounded up to a power of two. Larger textures allow crosses
+    /// nearer to the viewer; memory grows with the square (256: 2.1 MB per plant, 3.1 MB if it is lit by transfer).
     pub resolution: u32,
-    /// Samples a texel along each axis, 1..=8. More: smoother colours and normals, time grows with the square.
+    /// Samples per texel along each axis, 1..=8. More give smoother colours and normals; time grows with the square.
     pub supersampling: u32,
-    /// Standard deviation of the normals' smoothing as a share of the picture's width, 0..=0.1. 0: every leaf is lit for
-    /// itself; larger: the crown is lit as a rounded body. Either way [`Cross::spread`] keeps what a mean loses.
+    /// Standard deviation of the blur of the normals, as a fraction of the texture's width, 0..=0.1. 0: every leaf
+    /// keeps its normal. Larger: the crown is lit as a rounded body. [`Cross::isotropic_fraction`] keeps what averaging
+    /// loses.
     pub normal_smoothing: f32,
-    /// Which texels appear first while a cross fades in. The default is truer where nothing fades, the published order pops
-    /// less (`docs/measurements/alpha-fade.md`).
+    /// Which texels appear first while a cross fades in. The default is more accurate where nothing fades; the
+    /// published order pops less (`docs/measurements/alpha-fade.md`).
     pub fade: AlphaFade,
 }
 
@@ -133,8 +138,8 @@ impl Default for CrossSettings {
 }
 
 impl CrossSettings {
-    /// The settings with every value moved into its range; what is not finite becomes the default.
-    pub fn in_range(self) -> Self {
+    /// The settings with every value clamped to its range; a value that is not finite becomes the default.
+    pub fn sanitized(self) -> Self {
         let smoothing =
             if self.normal_smoothing.is_finite() { self.normal_smoothing } else { Self::default().normal_smoothing };
         Self {
@@ -146,39 +151,44 @@ impl CrossSettings {
     }
 }
 
-/// Makes the crossed billboards of `plant` with the normals and the k_a of its `lighting`; what is missing there is the
-/// plant's own, or 1. The planes cover the plant's bounds exactly; an empty plant gets three planes without extent
-/// and wholly transparent pictures.
+/// Makes the crossed billboards of `plant` with the normals and the ambient term of its `lighting`; missing values are
+/// the plant's own, or 1. The planes cover the plant's bounds exactly; an empty plant gets three planes without extent
+/// and wholly transparent textures.
 pub fn bake_cross(plant: &Plant, lighting: &BakedLighting, settings: &CrossSettings) -> Cross {
-    let settings = settings.in_range();
+    let settings = settings.sanitized();
     let planes = planes(plant);
     let resolution = settings.resolution as usize;
     let sides = light::vertex_sides(lighting);
-    let pictures: Vec<_> = planes
+    let images: Vec<_> = planes
         .par_iter()
         .map(|plane| {
-            let texels = picture(plant, lighting, sides.as_deref(), plane, &settings);
+            let texels = render_plane(plant, lighting, sides.as_deref(), plane, &settings);
             let properties = properties::mips(&texels, resolution, settings.normal_smoothing);
             let light = sides.is_some().then(|| light::mips(&texels, resolution));
             (color::mips(&texels, resolution, settings.fade), (properties, light))
         })
         .collect();
-    let (color, properties): (Vec<_>, Vec<_>) = pictures.into_iter().unzip();
+    let (color, properties): (Vec<_>, Vec<_>) = images.into_iter().unzip();
     let (properties, light): (Vec<_>, Vec<_>) = properties.into_iter().unzip();
-    let (properties, spreads): (Vec<_>, Vec<_>) = properties.into_iter().unzip();
+    let (properties, isotropy): (Vec<_>, Vec<_>) = properties.into_iter().unzip();
     let textures = CrossTextures { color, properties, light: light.into_iter().flatten().collect() };
-    Cross { planes, textures, transmission: mean_transmission(plant), spread: mean_spread(&spreads) }
+    Cross {
+        planes,
+        textures,
+        transmission: mean_transmission(plant),
+        isotropic_fraction: mean_isotropic_fraction(&isotropy),
+    }
 }
 
-/// Mean over the pictures, level by level; levels beyond the smallest picture repeat it.
-fn mean_spread(pictures: &[Vec<SpreadSum>]) -> [f32; SPREAD_LEVELS] {
+/// Mean over the planes' images, level by level; levels beyond the coarsest mip repeat it.
+fn mean_isotropic_fraction(images: &[Vec<IsotropicSum>]) -> [f32; ISOTROPIC_LEVELS] {
     std::array::from_fn(|level| {
-        let (mut spread, mut weight) = (0.0, 0.0);
-        for sum in pictures.iter().filter_map(|levels| levels.get(level).or(levels.last())) {
-            spread += sum.spread;
+        let (mut isotropic, mut weight) = (0.0, 0.0);
+        for sum in images.iter().filter_map(|levels| levels.get(level).or(levels.last())) {
+            isotropic += sum.isotropic;
             weight += sum.weight;
         }
-        if weight > 0.0 { (spread / weight) as f32 } else { 0.0 }
+        if weight > 0.0 { (isotropic / weight) as f32 } else { 0.0 }
     })
 }
 
@@ -236,7 +246,7 @@ struct Texel {
     coverage: f32,
     /// Linear base colour.
     color: Vec3,
-    /// Normal in the plane's frame; a leaf's own is turned towards the viewer.
+    /// Normal in the plane's frame; that of a leaf is flipped towards the viewer.
     normal: Vec3,
     /// Ambient visibility.
     ambient: f32,
@@ -246,8 +256,8 @@ struct Texel {
     light: Vec4,
 }
 
-/// The picture of the plant on one plane, row by row from the top.
-fn picture(
+/// Renders the plant onto one plane, row by row from the top.
+fn render_plane(
     plant: &Plant,
     lighting: &BakedLighting,
     sides: Option<&[Vec<light::Sides>]>,
@@ -307,8 +317,9 @@ impl Shader<'_> {
         let normals = self.lighting.normals(hit.part as usize).unwrap_or(&mesh.normals);
         let normal: Vec3 = weighted().map(|(c, w)| w * normals.get(c).copied().unwrap_or(Vec3::Y)).sum();
         let [a, b, c] = corners.map(|c| mesh.positions[c]);
-        // A leaf has two sides, the viewer sees the one that is turned to him; a crown has only its outside. Bark has one, but an open branch may
-        // be seen into; only then is its normal turned, a smooth one may well look over the edge.
+        // A leaf has two sides, the viewer sees the one that faces him; a crown has only its outside. Bark has
+        // one, but an open branch may be seen into; only then is its normal flipped, a smooth one may well look over
+        // the edge.
         let from_behind = match part.kind {
             PartKind::Foliage => !self.lighting.is_realigned() && normal.dot(self.toward) < 0.0,
             PartKind::Wood => (b - a).cross(c - a).dot(self.toward) < 0.0,

@@ -17,7 +17,7 @@ struct Sum {
 }
 
 impl Sum {
-    /// Faces the viewer in the open: what a picture without a plant holds.
+    /// Faces the viewer, unoccluded: the value of a texture without a plant.
     const OPEN: Self = Self { normal: Vec3::Z, ambient: 1.0, foliage: 1.0, coverage: 1.0 };
 
     fn code(&self) -> [u8; 4] {
@@ -28,31 +28,31 @@ impl Sum {
     }
 }
 
-/// How far leaves face everywhere, summed over the texels of one level: the sum of weights, and of spreads by weight.
+/// Isotropic fraction summed over the texels of one level: the sum of the weights, and the weighted sum.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct SpreadSum {
+pub(super) struct IsotropicSum {
     pub weight: f64,
-    pub spread: f64,
+    pub isotropic: f64,
 }
 
-/// The share of leaves that face everywhere alike, in a mixture with leaves that all face one way, whose normals (turned
-/// towards the viewer, each counted by the area that it shows) have a mean of the length `resultant`, 0..1: that of the
-/// former is 2/3, that of the latter 1.
-fn spread(resultant: f32) -> f32 {
+/// Isotropic fraction of a mixture of isotropic leaves and leaves that share one normal. `resultant`, 0..1, is the
+/// length of the mean normal, where normals are flipped towards the viewer and weighted by projected area. It is 2/3
+/// for isotropic leaves and 1 for parallel ones.
+fn isotropic_fraction(resultant: f32) -> f32 {
     (3.0 - 3.0 * resultant).clamp(0.0, 1.0)
 }
 
-fn spread_of(level: &[Sum]) -> SpreadSum {
-    level.iter().filter(|sum| sum.coverage > 0.0).fold(SpreadSum::default(), |total, sum| SpreadSum {
+fn isotropic_sum(level: &[Sum]) -> IsotropicSum {
+    level.iter().filter(|sum| sum.coverage > 0.0).fold(IsotropicSum::default(), |total, sum| IsotropicSum {
         weight: total.weight + f64::from(sum.foliage),
-        spread: total.spread + f64::from(sum.foliage * spread(sum.normal.length() / sum.coverage)),
+        isotropic: total.isotropic + f64::from(sum.foliage * isotropic_fraction(sum.normal.length() / sum.coverage)),
     })
 }
 
-/// Property mips of a picture of `resolution`² texels (a power of two). Means are weighted with the coverage, from
-/// level to level in floating point, so that air has no say; a texel of air continues what the coarser level holds. With
-/// them, how far the leaves of a texel face everywhere, level by level.
-pub(super) fn mips(texels: &[Texel], resolution: usize, smoothing: f32) -> (MipChain, Vec<SpreadSum>) {
+/// Property mips of a texture of `resolution`² texels (a power of two), and the isotropic fraction level by level.
+/// Means are weighted with the coverage, from level to level in floating point, so empty texels have no weight. An
+/// empty texel takes the value of the coarser level.
+pub(super) fn mips(texels: &[Texel], resolution: usize, smoothing: f32) -> (MipChain, Vec<IsotropicSum>) {
     let normals = smoothed(texels, resolution, smoothing * resolution as f32);
     let finest = texels.iter().zip(normals).map(|(texel, normal)| Sum {
         normal: texel.coverage * normal,
@@ -67,7 +67,7 @@ pub(super) fn mips(texels: &[Texel], resolution: usize, smoothing: f32) -> (MipC
         levels.push(halved);
         size /= 2;
     }
-    let spreads = levels.iter().map(|level| spread_of(level)).collect();
+    let isotropy = levels.iter().map(|level| isotropic_sum(level)).collect();
     // From the coarsest level down: holes are filled from above.
     let mut coded: Vec<Vec<u8>> = Vec::with_capacity(levels.len());
     let mut above: Vec<Sum> = vec![Sum::OPEN];
@@ -80,7 +80,7 @@ pub(super) fn mips(texels: &[Texel], resolution: usize, smoothing: f32) -> (MipC
         above = level;
     }
     coded.reverse();
-    (MipChain { width: resolution as u32, height: resolution as u32, levels: coded }, spreads)
+    (MipChain { width: resolution as u32, height: resolution as u32, levels: coded }, isotropy)
 }
 
 /// What a level of `size`² texels holds at texel (`x`, `y`) of the next finer one, bilinearly, borders continued.
@@ -117,8 +117,8 @@ fn halve(finer: &[Sum], size: usize) -> Vec<Sum> {
         .collect()
 }
 
-/// Mean normals under a Gaussian of `deviation` texels over what is covered, as long as the normals agree; straight ahead
-/// where nothing is.
+/// Mean normals under a Gaussian of `deviation` texels over what is covered, as long as the normals agree; straight
+/// ahead where nothing is.
 fn smoothed(texels: &[Texel], resolution: usize, deviation: f32) -> Vec<Vec3> {
     let radius = (3.0 * deviation).ceil() as isize;
     let kernel: Vec<f32> = (-radius..=radius)
@@ -175,7 +175,7 @@ mod tests {
             texels[y * 64 + 1] =
                 Texel { coverage: 0.5, normal: 0.5 * right, ambient: 0.4, foliage: 0.0, ..Default::default() };
         }
-        let (chain, spreads) = mips(&texels, 64, 0.0);
+        let (chain, isotropy) = mips(&texels, 64, 0.0);
         assert_eq!(chain.levels.len(), 7);
         let texel = |level: usize, at: usize| -> [u8; 4] { std::array::from_fn(|c| chain.levels[level][4 * at + c]) };
         let mean = Vec3::new(-0.6 + 0.3, 0.0, 0.8 + 0.4).normalize();
@@ -185,10 +185,10 @@ mod tests {
             assert_eq!(texel(level, 0)[3], unorm8(1.0 / 1.5));
         }
         // Level 0 has one direction a texel, the others two that disagree; wood has no say.
-        assert!(spreads[0].spread.abs() < 1e-5 && spreads[0].weight == 64.0);
-        let expected = spread(Vec3::new(-0.3, 0.0, 1.2).length() / 1.5);
-        for level in &spreads[1..] {
-            assert!((level.spread / level.weight - f64::from(expected)).abs() < 1e-5, "{level:?}");
+        assert!(isotropy[0].isotropic.abs() < 1e-5 && isotropy[0].weight == 64.0);
+        let expected = isotropic_fraction(Vec3::new(-0.3, 0.0, 1.2).length() / 1.5);
+        for level in &isotropy[1..] {
+            assert!((level.isotropic / level.weight - f64::from(expected)).abs() < 1e-5, "{level:?}");
         }
         // Air continues the coarser means.
         assert!(decode(texel(0, 63)).angle_between(mean) < 0.03);

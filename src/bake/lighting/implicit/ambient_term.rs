@@ -1,9 +1,9 @@
-//! The ambient reflection coefficient k_a from the density [Luft 2007, 3.2, eq. 4].
+//! The ambient term (the paper's ambient reflection coefficient k_a) from the density [Luft 2007, 3.2, eq. 4].
 
 use super::parameters::ImplicitParameters;
 
-/// Eq. 4: k_a of a point with the density `d` (F - τ as published, else the depth): 1 where it is not above 0, falling to
-/// k_a_min at d_min and staying there. In `least..=1` for any input; 1 where the density is not a number.
+/// Eq. 4: the ambient term k_a of a point with the density `d` (F - τ as published, else the depth). It is 1 for `d` up
+/// to 0, falls to k_a_min at d_min, and stays there. In `least..=1` for any input; 1 if the density is NaN.
 pub fn ambient_term(d: f32, parameters: &ImplicitParameters) -> f32 {
     let ImplicitParameters { least, core, exponent, .. } = *parameters;
     if d.is_nan() || d <= 0.0 {

@@ -1,10 +1,10 @@
 //! The 256 ways in which a surface crosses a cube, as triangles over the cube's edges.
 //!
 //! The table of marching cubes [Lorensen & Cline 1987] is made by rule, not typed in: on each face the inside corners
-//! that hang together are cut off, and the cuts are joined to closed loops. Two cubes see the same corners on the face that
-//! they share, so their cuts agree: no holes, where the published table has some. A loop is cut into triangles by
-//! diagonals that never lie in a face of the cube, so no diagonal can meet one of the neighbour's, and every edge of the
-//! surface has exactly two triangles.
+//! that hang together are cut off, and the cuts are joined to closed loops. Two cubes see the same corners on the face
+//! that they share, so their cuts agree: no holes, where the published table has some. A loop is cut into triangles by
+//! diagonals that never lie in a face of the cube, so no diagonal can meet one of the neighbour's, and every edge of
+//! the surface has exactly two triangles.
 
 use std::sync::LazyLock;
 
@@ -109,14 +109,14 @@ mod tests {
 
     #[test]
     fn triangles_face_away_from_the_inside() {
-        let place = |e: u8| {
+        let point = |e: u8| {
             let (corner, axis) = EDGES[usize::from(e)];
             let mut p = glam::Vec3::new((corner & 1) as f32, (corner >> 1 & 1) as f32, (corner >> 2) as f32);
             p[usize::from(axis)] = 0.5;
             p
         };
         for corner in 0..8u8 {
-            let [a, b, c] = TRIANGLES[1 << corner][0].map(place);
+            let [a, b, c] = TRIANGLES[1 << corner][0].map(point);
             let inside = glam::Vec3::new((corner & 1) as f32, (corner >> 1 & 1) as f32, (corner >> 2) as f32);
             assert!((b - a).cross(c - a).dot(a - inside) > 0.0);
         }

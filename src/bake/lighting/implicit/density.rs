@@ -6,15 +6,16 @@
 //! ```
 //!
 //! Generators and points are both sorted into compact groups of eight (`partition.rs`). For a group
-//! of points the tree over the generators is walked once: boxes that are out of reach are skipped, boxes that lie
-//! within reach as a whole give a polynomial (`moments.rs`), and what remains, the rim of the ball, is
-//! summed in pairs, eight points side by side in vector registers (glam's, as compilers do not find them here). So the time grows with the surface of the ball of
-//! influence, and not with its volume: a large ρ is as cheap as a small one.
+//! of points the tree over the generators is traversed once: boxes outside the radius are skipped, boxes wholly within
+//! the radius give a polynomial (`moments.rs`), and the rest, the rim of the ball, is summed in pairs, eight points
+//! side by side in vector registers (glam's, because compilers do not vectorise this loop). So the time grows with the
+//! surface of the ball of influence and not with its volume: a large ρ is as cheap as a small one.
 //!
 //! Accuracy: pairs are f32, sums of pairs and polynomials f64. Rounding moves each 1 - (d/ρ)² by at most
-//! 3e-7, which only matters where all generators in reach are near the rim; there the point is summed again in f64. The relative
-//! error of F is at most 1e-5 (measured: 1e-6), whatever the plant's size and place. Points are independent of each
-//! other, so the result is the same for any number of threads.
+//! 3e-7, which only matters where all generators within the radius are near the rim; there the point is summed again in
+//! f64. The
+//! relative error of F is at most 1e-5 (measured: 1e-6), whatever the plant's size and position. Points are independent
+//! of each other, so the result is the same for any number of threads.
 
 use glam::{DVec3, Vec3, Vec3A, Vec4};
 use rayon::prelude::*;
@@ -29,8 +30,8 @@ const LANES: usize = 8;
 const HALVES: usize = LANES / 4;
 /// Generators of a group.
 const GROUP: usize = 8;
-/// Room for rounding when squared distances are compared with the reach: what is left out must be 0, as a sum that is
-/// nothing but a few generators at the very rim is to be right as well.
+/// Margin for rounding when squared distances are compared with the radius: skipped terms must be exactly 0, because a
+/// sum of only a few generators at the very rim must be right as well.
 const ROOM: f32 = 1.0 + 1.0e-6;
 /// Radii and coordinates beyond this many metres (and radii below its inverse) overflow f32 somewhere.
 const FARTHEST: f32 = 1.0e15;
@@ -74,8 +75,8 @@ struct Sums {
 }
 
 impl DensityField {
-    /// The field of `generators` with the radius of influence `radius` in metres. A radius that is not above 0 or not
-    /// a number makes a field that is 0 everywhere, as no generators do; beyond 1e15 m it is moved there. Generators
+    /// The field of `generators` with the radius of influence `radius` in metres. A radius that is not above 0, or
+    /// NaN, gives a field that is 0 everywhere, as does an empty list; radii are clamped to 1e15 m. Generators
     /// that weigh nothing or are not finite are left out.
     pub fn new(generators: &[Generator], radius: f32, weighting: Weighting) -> Self {
         let radius = if radius > 0.0 { radius.clamp(1.0 / FARTHEST, FARTHEST) } else { 0.0 };
@@ -121,7 +122,7 @@ impl DensityField {
         self.radius
     }
 
-    /// The box around all generators that count.
+    /// The box around all generators with a weight.
     pub(super) fn extent(&self) -> Aabb {
         self.nodes.first().map_or(Aabb::EMPTY, |root| root.bounds)
     }
@@ -176,13 +177,13 @@ impl DensityField {
         }
     }
 
-    /// The finite ones of `points` with their places, in the order in which they are evaluated.
+    /// The finite ones of `points` with their indices, in the order in which they are evaluated.
     pub(super) fn order(points: &[Vec3]) -> Vec<(Vec3, u32)> {
         partition::compact_order(points, LANES)
     }
 
-    /// Calls `put` with the place and the field of each point of `order`, a result of [`Self::order`]; the gradient
-    /// means nothing where it is not asked for.
+    /// Calls `put` with the index and the field of each point of `order`, a result of [`Self::order`]; the gradient
+    /// is meaningless if it was not requested.
     pub(super) fn evaluate_in<const GRADIENT: bool>(
         &self,
         order: &[(Vec3, u32)],
@@ -237,8 +238,8 @@ impl DensityField {
         })
     }
 
-    /// Calls `at_rim` with each group at the rim of the ball around `region` and returns the moments, about the region's
-    /// centre, of all generators that reach all of it.
+    /// Calls `at_rim` with each group at the rim of the ball around `region` and returns the moments, about the
+    /// region's centre, of all generators that reach all of it.
     fn walk(&self, region: &Aabb, mut at_rim: impl FnMut(u32)) -> Option<Moments> {
         let reach = self.radius * self.radius;
         let beyond = reach * ROOM;

@@ -1,16 +1,16 @@
-//! How much foliage and wood lies around a point: the mean optical depth over all directions, as a sum of the bumps of
-//! eq. 2 of [Luft 2007] over radii that double.
+//! The foliage and wood around a point: the mean optical depth over all directions, as a sum of the bumps of eq. 2 of
+//! [Luft 2007] over radii that double.
 //!
-//! An occluder of the leaf area A at the distance r hides A / (8 π r²) of the sphere on average (a leaf shows half of its
-//! area to a ray), so the mean depth is the sum of that over all occluders. One bump of one radius knows nothing of that:
-//! it is blind beyond ρ and does not tell near from nearer. But bumps that are weighted by A / ρ² and added up over
-//! radii that double fall off as 1 / r² does, between the first radius and the last (with x = r / ρ):
+//! An occluder of the leaf area A at the distance r hides A / (8 π r²) of the sphere on average (a leaf shows half of
+//! its area to a ray), so the mean depth is the sum of that over all occluders. A single bump does not
+//! behave like that: it is 0 beyond ρ and nearly constant close to its centre. But the sum of bumps with the weight A /
+//! ρ² over radii that double falls off like 1 / r² between the first radius and the last (with x = r / ρ):
 //!
 //! ```text
 //!   sum over ρ of A (1 - x²)² / (b ρ²)  ~  A / (b r² ln 2) ∫ x (1 - x²)² dx  =  A / (6 ln 2 b r²)      b = 32 π / 105
 //! ```
 //!
-//! Radii that double leave a ripple of 7 %.
+//! The doubling radii leave a ripple of 7 %.
 //!
 //! The slope gives the depth of a half of the sphere: ρ grad F, added up likewise, is A / r² times the direction to the
 //! occluder, 16/5 as long as the value. To first order a half around n is T + 3/2 V·n deep, V being that vector in the

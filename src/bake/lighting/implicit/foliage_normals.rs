@@ -1,17 +1,17 @@
 //! Normals of the foliage realigned to the shape of the crown [Luft 2007, 3.3].
 //!
 //! As published a vertex takes the normal of the nearest *vertex* of the implicit surface, found exactly. Between
-//! lobes of the crown the nearest vertex jumps, and the normal with it. The smooth variant asks the field itself: the
+//! lobes of the crown the nearest vertex jumps, and the normal with it. The smooth variant uses the field itself: the
 //! direction of steepest descent,
 //!
 //! ```text
 //!   N = normalize(g(ρ) + g(3 ρ))        g(r) = -r grad F_r / F_r
 //! ```
 //!
-//! The logarithm's slope does not depend on how dense the crown is. Deep inside, where leaves are spread evenly, the
-//! narrow field's gradient vanishes and what is left of it is noise; the field of three times the radius sees the
-//! outline from there. Where both vanish (in the very middle of a symmetric crown) there is no outward direction, and the leaf
-//! keeps its own normal.
+//! The logarithm's slope does not depend on how dense the crown is. Deep inside, where leaves are evenly distributed,
+//! the narrow field's gradient vanishes and only noise remains; the field of three times the radius still senses the
+//! outline from there. Where both vanish (in the very centre of a symmetric crown) there is no outward direction, and
+//! the leaf keeps its own normal.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -116,9 +116,9 @@ fn outward(sample: &FieldSample, radius: f32) -> Vec3 {
 }
 
 /// A linear blend between the realigned normal and a share (0..=1) of the leaf's own [Luft 2007, 3.3]; both are unit
-/// vectors, and so is the result. A leaf has two sides and its normal may be stored for either, so it is first turned to the
-/// side of the realigned one. A share of 1 is the leaf's own normal as it is stored. Where there is no realigned normal, or
-/// the blend has no length, one of the two is left.
+/// vectors, and so is the result. A leaf has two sides and its normal may be stored for either, so it is first flipped
+/// to the side of the realigned one. A share of 1 gives the leaf's own normal as it is stored. Where there is no
+/// realigned normal, or the blend has no length, one of the two is left.
 pub fn blend(own: Vec3, realigned: Option<Vec3>, own_share: f32) -> Vec3 {
     let Some(realigned) = realigned.filter(|_| own_share < 1.0) else { return own };
     let facing = if own.dot(realigned) < 0.0 { -own } else { own };

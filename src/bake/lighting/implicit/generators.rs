@@ -1,8 +1,8 @@
 //! Generator points of the foliage [Luft 2007, 3.1]: one a primitive at its centre of mass, or one a vertex [Luft 2006, 4.1],
 //! or an even choice of them.
 //!
-//! The mass of a leaf card is what its alpha leaves of it, a seventh to a half in the models that this was tried on: by
-//! whole cards no two of them would have densities that mean the same.
+//! The mass of a leaf card is the area that passes its alpha test: a seventh to a half of the card in the models that
+//! were tried. With the area of whole cards, densities of different models would not be comparable.
 
 use std::collections::{HashMap, HashSet};
 
@@ -18,16 +18,16 @@ use crate::plant::{PartKind, PlantMesh, PlantPart, geometry, surface::Surface};
 pub struct Generator {
     /// Centre of mass of its primitive, or its vertex; metres.
     pub position: Vec3,
-    /// Leaf area that it stands for, one side, square metres.
+    /// Leaf area that it represents, one side, square metres.
     pub area: f32,
     /// Number of primitives that it stands for; of vertices where those are the generators.
     pub primitives: f32,
 }
 
-/// What a generator counts in the density field.
+/// The weight of a generator in the density field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Weighting {
-    /// Each primitive counts 1, as published. A finer tessellation of the same leaves makes the crown darker.
+    /// Each primitive has the weight 1, as published. A finer tessellation of the same leaves makes the crown darker.
     Primitives,
     /// The foliage's vertices are the generators and each counts 1 [Luft 2006, 4.1]. It depends on the tessellation as well,
     /// and leaves that share vertices count less. Of vertices in one place, as at a seam of the texture, one counts.
@@ -55,8 +55,8 @@ impl Weighting {
 
 /// A generator for each valid triangle of `part`: indices in range, corners finite. Foliage has the area that passes
 /// the alpha test, wood the leaf area that casts as much shade: half of its surface, as a round body shows a quarter of
-/// its surface on average and a leaf half of its one side. A triangle without area and a copy of one in its place, also
-/// one that faces the other way, have a generator as well; by leaf area they weigh nothing.
+/// its surface on average and a leaf half of its one side. A triangle without area and a duplicate of one, also one
+/// that faces the other way, have a generator as well; by leaf area they weigh nothing.
 pub fn generators(part: &PlantPart) -> Vec<Generator> {
     generators_of(part, &part.mesh)
 }
@@ -113,8 +113,8 @@ fn with_corners(part: &PlantPart, mesh: &PlantMesh) -> Vec<([usize; 3], Generato
     triangles.par_iter().map(of_triangle).filter(|(_, generator)| generator.position.is_finite()).collect()
 }
 
-/// The share of a triangle with these texture coordinates that passes the alpha test, and the centre of that share as
-/// weights of the corners (the middle where nothing passes).
+/// Fraction of a triangle with these texture coordinates that passes the alpha test, and the centre of that part as
+/// weights of the corners (the middle if nothing passes).
 fn covered(surface: &Surface, [a, b, c]: [Vec2; 3]) -> (f32, [f32; 3]) {
     /// Rows of samples; there are as many samples as its square.
     const ROWS: usize = 8;
@@ -138,11 +138,11 @@ fn covered(surface: &Surface, [a, b, c]: [Vec2; 3]) -> (f32, [f32; 3]) {
     (count / (ROWS * ROWS) as f32, [1.0 - center.x - center.y, center.x, center.y])
 }
 
-/// A share (0..=1) of the generators, at least one, drawn evenly over the crown. The crown is cut by medians into as
-/// many compact groups of equal number as generators are wanted, and a generator at the group's centre of area stands
-/// for all of it, with their area and number. So the sums keep their level, and neither τ nor d_min needs a factor.
-/// (The publication draws primitives by luck; a centre of mass is off by the second order of the group's size only.)
-/// In the order of the groups; a share that is not below 1 or not a number gives all, in their order.
+/// A fraction (0..=1) of the generators, at least one, chosen evenly over the crown. Medians cut the crown into as many
+/// compact groups of equal number as generators are wanted. One generator at the centre of area of each group
+/// represents the whole group, with its total area and number. So sums keep their level, and neither τ nor d_min needs
+/// a factor. (The publication picks primitives at random; a centre of mass has an error of second order in the group's
+/// size only.) In the order of the groups; a fraction that is not below 1, or NaN, returns all of them, in their order.
 pub fn even_share(generators: &[Generator], share: f32) -> Vec<Generator> {
     let wanted = (f64::from(share.max(0.0)) * generators.len() as f64).ceil() as usize;
     if share.is_nan() || wanted >= generators.len() {

@@ -1,12 +1,12 @@
 //! The implicit surface F = τ as a closed triangle mesh [Luft 2007, 2.3], by marching cubes [Lorensen & Cline 1987].
 //!
 //! Only cells near the surface are visited. A cube around everything is cut into eight again and again; a piece whose
-//! bounds of F (`DensityField::bounds`) do not hold τ is dropped. The bounds are rigorous, so no piece of the surface can be missed, neither
-//! a lone twig nor a hollow, and every edge that the surface crosses has all its four cells: the mesh
-//! is closed and manifold, each edge has two triangles. The field is evaluated at the corners of what remains.
+//! bounds of F (`DensityField::bounds`) do not hold τ is dropped. The bounds are rigorous, so no piece of the surface
+//! can be missed, neither a lone twig nor a hollow, and every edge that the surface crosses has all its four cells: the
+//! mesh is closed and manifold, each edge has two triangles. The field is evaluated at the corners of what remains.
 //!
-//! Limits: what is thinner than a cell and slips between its corners is not seen. More than [`MOST_CELLS`] cells are
-//! not kept; the cells are doubled until they fit, which the bake's report tells.
+//! Limits: features that are thinner than a cell and lie between its corners are missed. There are at most
+//! [`MOST_CELLS`] cells: their size is doubled until they fit, and the bake's report has the size.
 
 use glam::{UVec3, Vec3, Vec3A};
 use rayon::prelude::*;
@@ -25,7 +25,7 @@ const MOST_ALONG: f32 = (1 << 20) as f32;
 pub struct SurfaceMesh {
     /// Vertex positions, metres.
     pub positions: Vec<Vec3>,
-    /// Unit normals, outward: the field's gradient, turned round.
+    /// Unit normals, outward: the field's negative gradient.
     pub normals: Vec<Vec3>,
     /// Counter-clockwise triangles as seen from outside, as vertex indices.
     pub triangles: Vec<[u32; 3]>,
@@ -47,7 +47,7 @@ struct Lattice {
 }
 
 impl Lattice {
-    fn place(&self, node: UVec3) -> Vec3 {
+    fn point(&self, node: UVec3) -> Vec3 {
         (self.origin.as_dvec3() + f64::from(self.cell) * node.as_dvec3()).as_vec3()
     }
 }
@@ -93,8 +93,8 @@ fn extract_with(field: &DensityField, region: &Aabb, threshold: f32, cell: f32) 
     let cells = cells_at_surface(field, lattice, along, threshold)?;
 
     let nodes = nodes_of(&cells);
-    let places: Vec<Vec3> = nodes.par_iter().map(|&node| lattice.place(unkey(node))).collect();
-    let values = field.values(&places);
+    let points: Vec<Vec3> = nodes.par_iter().map(|&node| lattice.point(unkey(node))).collect();
+    let values = field.values(&points);
     let value = |node: UVec3| nodes.binary_search(&key(node)).map_or(0.0, |at| values[at]);
     let corners: Vec<[f32; 8]> = cells
         .par_iter()
@@ -111,10 +111,10 @@ fn extract_with(field: &DensityField, region: &Aabb, threshold: f32, cell: f32) 
             if (a > 0.0) != (b > 0.0) {
                 // Kept off the nodes, where triangles would lose their area.
                 let share = (a / (a - b)).clamp(0.02, 0.98);
-                let mut place = at.as_dvec3();
-                place[axis] += f64::from(share);
+                let mut point = at.as_dvec3();
+                point[axis] += f64::from(share);
                 owned[axis] = positions.len() as u32;
-                positions.push((lattice.origin.as_dvec3() + f64::from(lattice.cell) * place).as_vec3());
+                positions.push((lattice.origin.as_dvec3() + f64::from(lattice.cell) * point).as_vec3());
             }
         }
     }
@@ -144,7 +144,7 @@ fn cells_at_surface(field: &DensityField, lattice: Lattice, along: u32, threshol
             .into_par_iter()
             .filter(|&piece| {
                 // A little larger than the piece: the places of the corners are rounded.
-                let (low, high) = (lattice.place(piece), lattice.place(piece + edge));
+                let (low, high) = (lattice.point(piece), lattice.point(piece + edge));
                 let room = 1.0e-3 * lattice.cell + 2.0 * f32::EPSILON * low.abs().max(high.abs()).max_element();
                 let region = Aabb { min: (low - room).into(), max: (high + room).into() };
                 let (least, most) = field.bounds(&region);
@@ -195,13 +195,13 @@ pub(super) mod tests {
             && edges.iter().all(|(&(a, b), &count)| a != b && count == 1 && edges.contains_key(&(b, a)))
     }
 
-    fn generators_at(places: &[Vec3]) -> Vec<Generator> {
-        places.iter().map(|&position| Generator { position, area: 1.0, primitives: 1.0 }).collect()
+    fn generators_at(points: &[Vec3]) -> Vec<Generator> {
+        points.iter().map(|&position| Generator { position, area: 1.0, primitives: 1.0 }).collect()
     }
 
-    fn surface(places: &[Vec3], radius: f32, threshold: f32, cell: f32) -> Extracted {
-        let field = DensityField::new(&generators_at(places), radius, Weighting::Primitives);
-        extract(&field, &Aabb::around(places.iter().copied()), threshold, cell)
+    fn surface(points: &[Vec3], radius: f32, threshold: f32, cell: f32) -> Extracted {
+        let field = DensityField::new(&generators_at(points), radius, Weighting::Primitives);
+        extract(&field, &Aabb::around(points.iter().copied()), threshold, cell)
     }
 
     /// A ball about the origin, and its radius.

@@ -14,10 +14,10 @@
 //! | [`generators`] | generator points, an even share of them (3.1) |
 //! | [`density`] | density field and gradient (2.3, eq. 2 and 3) |
 //! | [`isosurface`], [`simplify_surface`] | the surface as a closed mesh (2.3, 3.1) |
-//! | [`ambient_term`](mod@ambient_term) | k_a from the density (3.2, eq. 4) |
-//! | [`depth_field`] | the density over all radii, for k_a: not in the publication |
+//! | [`ambient_term`](mod@ambient_term) | ambient term (k_a) from the density (3.2, eq. 4) |
+//! | [`depth_field`] | the density over all radii, for the ambient term: not in the publication |
 //! | [`foliage_normals`] | realigned normals (3.3) |
-//! | [`packing`] | k_a as the length of the normal (3.2) |
+//! | [`packing`] | ambient term as the length of the normal (3.2) |
 //! | [`parameters`] | settings, and values that follow from the model (3.1) |
 //! | [`stand`] | several plants that darken each other (5) |
 //!
@@ -39,7 +39,8 @@
 //! Crosses, which the paper does not have, replace what the shadow map cannot know of their own crown by constants
 //! (`shaders/forest/cross.wgsl`).
 //!
-//! Pure functions: the same plant and settings give the same bytes, with any number of threads. Cost: `benches/README.md`.
+//! Pure functions: the same plant and settings give the same bytes, with any number of threads. Cost:
+//! `benches/README.md`.
 
 pub mod ambient_term;
 mod cube_table;
@@ -73,10 +74,10 @@ pub use parameters::{AmbientField, ImplicitParameters, ImplicitSettings, NormalS
 pub use simplify::{COARSE_SHARE, FINE_SHARE};
 pub use stand::{StandBake, StandPlant, bake_implicit_stand};
 
-/// Why the foliage keeps its own normals. As published its ambient term is 1 throughout in the first two cases.
+/// Why the foliage keeps its own normals. In the first two cases the published ambient term is 1 everywhere.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
 pub enum NoSurface {
-    /// There is no leaf that counts, or ρ is 0.
+    /// No leaf has an area, or ρ is 0.
     #[error("there is no density field: the plant has no foliage with an area, or the radius is 0; normals are kept")]
     NoField,
     /// τ is above the field.
@@ -90,7 +91,7 @@ pub enum NoSurface {
         /// The greatest density at a vertex or generator.
         greatest: f32,
     },
-    /// All that there is of a surface is smaller than a cell.
+    /// The whole surface is smaller than a cell.
     #[error("the implicit surface is finer than its cells of {cell} m; normals are kept; raise the radius")]
     BelowResolution {
         /// Edge of a cell, metres.
@@ -109,7 +110,7 @@ impl NoSurface {
     }
 }
 
-/// How a bake went.
+/// Report of a bake.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImplicitReport {
     /// The values that were used.
@@ -118,40 +119,40 @@ pub struct ImplicitReport {
     pub generators: usize,
     /// Edge of the cells from which the returned surface was extracted, metres; 0 where no surface was asked for.
     pub cell: f32,
-    /// Why normals were kept; `None` where they were realigned.
+    /// Why the foliage kept its normals; `None` if they were realigned.
     pub no_surface: Option<NoSurface>,
 }
 
 /// A plant lit by implicit surfaces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImplicitBake {
-    /// Unit normals, one list a part in the plant's order, one a vertex. Wood has its own; foliage that could not be
-    /// realigned (no surface, a position that is not finite) too.
+    /// Unit normals: one list per part in the plant's order, one value per vertex. Wood keeps its own normals, and so
+    /// does foliage that could not be realigned (no surface, a position that is not finite).
     pub normals: Vec<Vec<Vec3>>,
-    /// k_a, one list a part in the plant's order, one a vertex, k_a_min..=1.
+    /// Ambient term, k_a_min..=1: one list per part in the plant's order, one value per vertex.
     pub ambient: Vec<Vec<f32>>,
     /// The implicit surface in the plant's frame; `None` where there is none or none was asked for.
     pub surface: Option<SurfaceMesh>,
-    /// How it went.
+    /// Report of the bake.
     pub report: ImplicitReport,
 }
 
-/// Bakes the implicit surface of `plant`, and its foliage's normals and everything's ambient term from it. A plant
-/// that has no surface keeps its own normals, and the report says why.
+/// Bakes the implicit surface of `plant`, the normals of its foliage and the ambient term of all its vertices. A plant
+/// without a surface keeps its own normals, and the report says why.
 pub fn bake_implicit(plant: &Plant, settings: &ImplicitSettings) -> ImplicitBake {
-    let settings = settings.in_range();
+    let settings = settings.sanitized();
     let (parts, origin) = centered(parts_of(plant));
     let Basis { leaves, generators, field, parameters, extent } = basis(&parts, &settings);
     let depth = depth_field(&parts, leaves, &parameters, extent, &settings);
     let mut baked = bake_parts(&parts, generators, &field, depth.as_ref(), parameters, &settings);
-    let places = baked.surface.iter_mut().flat_map(|surface| surface.positions.iter_mut());
-    places.for_each(|place| *place += origin);
+    let positions = baked.surface.iter_mut().flat_map(|surface| surface.positions.iter_mut());
+    positions.for_each(|position| *position += origin);
     baked
 }
 
-/// The values that a bake of `plant` with `settings` goes by, without the bake: a tenth of its time, or less.
+/// The parameters that a bake of `plant` with `settings` would use, in a tenth of its time or less.
 pub fn implicit_parameters(plant: &Plant, settings: &ImplicitSettings) -> ImplicitParameters {
-    basis(&centered(parts_of(plant)).0, &settings.in_range()).parameters
+    basis(&centered(parts_of(plant)).0, &settings.sanitized()).parameters
 }
 
 fn parts_of(plant: &Plant) -> Vec<Part<'_>> {
@@ -250,7 +251,8 @@ fn generators_of(parts: &[Part], kind: PartKind) -> Vec<Generator> {
     parts.flat_map(|part| generators::generators_of(part.source, &part.mesh)).collect()
 }
 
-/// The field of the ambient term for parts with the generators `leaves` of their foliage; `None` where it is the density.
+/// The field of the ambient term for parts with the generators `leaves` of their foliage; `None` where it is the
+/// density.
 fn depth_field(
     parts: &[Part],
     leaves: Vec<Generator>,
@@ -272,10 +274,10 @@ fn depth_field(
 /// The depth at each vertex of all parts in one list: around a leaf, above the surface of wood.
 fn depths(parts: &[Part], field: &DepthField) -> Vec<f32> {
     let of = |kind: PartKind| parts.iter().filter(move |part| part.source.kind == kind);
-    let places = |kind: PartKind| of(kind).flat_map(|part| &part.mesh.positions).copied().collect::<Vec<Vec3>>();
+    let positions = |kind: PartKind| of(kind).flat_map(|part| &part.mesh.positions).copied().collect::<Vec<Vec3>>();
     let normals: Vec<Vec3> = of(PartKind::Wood).flat_map(|part| part.own_normals()).collect();
-    let mut leaves = field.depths(&places(PartKind::Foliage)).into_iter();
-    let mut wood = field.depths_above(&places(PartKind::Wood), &normals).into_iter();
+    let mut leaves = field.depths(&positions(PartKind::Foliage)).into_iter();
+    let mut wood = field.depths_above(&positions(PartKind::Wood), &normals).into_iter();
     let mut all = Vec::new();
     for part in parts {
         let count = part.mesh.positions.len();
@@ -344,9 +346,9 @@ fn bake_parts(
     ImplicitBake { normals, ambient, surface, report }
 }
 
-/// The surface F = `threshold` with `target` triangles or more, for [`simplify_surface`] to reach the target from above:
-/// `surface`, extracted with cells of `cell` metres, or one with finer cells. As near to it as [`isosurface::MOST_CELLS`]
-/// allows. With the edge of its cells; a finer surface has no normals yet.
+/// The surface F = `threshold` with `target` triangles or more, for [`simplify_surface`] to reach the target from
+/// above: `surface`, extracted with cells of `cell` metres, or one with finer cells. As near to it as
+/// [`isosurface::MOST_CELLS`] allows. With the edge of its cells; a finer surface has no normals yet.
 fn with_triangles(
     surface: SurfaceMesh,
     cell: f32,
@@ -354,11 +356,11 @@ fn with_triangles(
     field: &DensityField,
     threshold: f32,
 ) -> (SurfaceMesh, f32) {
-    /// Triangles that a finer surface aims at, as a multiple of the target: the simplification is to choose where they go,
-    /// not the lattice.
+    /// Triangles that a finer surface aims at, as a multiple of the target: the simplification is to choose where they
+    /// go, not the lattice.
     const SURPLUS: f32 = 2.0;
-    /// Triangles grow with the square of the resolution, and somewhat faster where finer cells find more lobes: the first
-    /// attempt is enough as a rule.
+    /// Triangles grow with the square of the resolution, and somewhat faster where finer cells find more lobes: the
+    /// first attempt is enough as a rule.
     const ATTEMPTS: usize = 4;
     let (mut surface, mut cell) = (surface, cell);
     for _ in 0..ATTEMPTS {

@@ -1,34 +1,34 @@
-//! Normal and k_a in one vector of small integers [Luft 2007, 3.2]: k_a is the length of the stored normal, and needs
-//! no memory of its own.
+//! Normal and ambient term (k_a) in one vector of small integers [Luft 2007, 3.2]: the ambient term is the length of
+//! the stored normal and needs no memory of its own.
 //!
-//! A length of 0 would lose the direction, so the length runs from [`LEAST_LENGTH`] at k_a = 0 to 1 at k_a = 1. The
-//! vertex shader decodes, before interpolation (in textures, where filtering shortens normals, the two are stored
+//! A length of 0 would lose the direction, so the length runs from [`LEAST_LENGTH`] at an ambient term of 0 to 1 at 1.
+//! The vertex shader decodes, before interpolation (in textures, where filtering shortens normals, the two are stored
 //! apart):
 //!
 //! ```wgsl
 //!   let stored = vertex.normal.xyz * ((2.0 * NORMAL_STEPS + 1.0) / NORMAL_STEPS) - 1.0;      // unorm10-10-10-2
 //!   let size = length(stored);
 //!   let normal = stored / size;
-//!   let k_a = saturate((size - NORMAL_LEAST_LENGTH) / (1.0 - NORMAL_LEAST_LENGTH));
+//!   let ambient = saturate((size - NORMAL_LEAST_LENGTH) / (1.0 - NORMAL_LEAST_LENGTH));
 //! ```
 //!
-//! Each axis has 511 steps on either side of a zero that is exact. Rounding moves the stored vector by at most √3/2 of a
-//! step: the direction by at most 0.1° at k_a = 1 and 0.4° at k_a = 0, k_a by at most 0.0023. (Four bytes of snorm8,
-//! which take the same room, would cost 1.6° and 0.0092.)
+//! Each axis has 511 steps on either side of a zero that is exact. Rounding moves the stored vector by at most √3/2 of
+//! a step: the direction by at most 0.1° at an ambient term of 1 and 0.4° at 0, the term by at most 0.0023. (Four bytes
+//! of snorm8, which take the same space, would have errors of 1.6° and 0.0092.)
 
 use glam::Vec3;
 
-/// Length of the stored normal where k_a is 0. Longer: directions are better kept and k_a is kept worse.
+/// Length of the stored normal where the ambient term is 0. Longer: more accurate directions, less accurate terms.
 pub const LEAST_LENGTH: f32 = 0.25;
 
-/// The vector that is stored: `normal` (any length but 0) with the length that means `ambient` (moved into 0..=1).
-/// Up where there is no normal; a k_a that is not a number counts as 1.
+/// The stored vector: `normal` (any length but 0), scaled to the length that encodes `ambient` (clamped to 0..=1). Up
+/// if there is no normal; NaN counts as 1.
 fn scaled(normal: Vec3, ambient: f32) -> Vec3 {
     let ambient = if ambient.is_nan() { 1.0 } else { ambient.clamp(0.0, 1.0) };
     normal.try_normalize().unwrap_or(Vec3::Y) * (LEAST_LENGTH + (1.0 - LEAST_LENGTH) * ambient)
 }
 
-/// Unit normal and k_a (0..=1) of a stored vector; up where it has no length.
+/// Unit normal and ambient term (0..=1) of a stored vector; up where it has no length.
 fn unscaled(stored: Vec3) -> (Vec3, f32) {
     let ambient = (stored.length() - LEAST_LENGTH) / (1.0 - LEAST_LENGTH);
     (stored.try_normalize().unwrap_or(Vec3::Y), ambient.clamp(0.0, 1.0))
@@ -37,13 +37,14 @@ fn unscaled(stored: Vec3) -> (Vec3, f32) {
 /// Steps on either side of zero.
 pub const STEPS: f32 = 511.0;
 
-/// Packs a normal and k_a (0..=1) as unorm10-10-10-2, x in the lowest bits. Any input gives a vector that can be decoded.
+/// Packs a normal and an ambient term (0..=1) as unorm10-10-10-2, x in the lowest bits. Any input gives a vector that
+/// can be decoded.
 pub fn encode(normal: Vec3, ambient: f32) -> u32 {
     let [x, y, z] = scaled(normal, ambient).to_array().map(|axis| (axis * STEPS).round() as i32 + STEPS as i32);
     (x | y << 10 | z << 20) as u32
 }
 
-/// Unit normal and k_a of a vector packed by [`encode`], as the shader finds them.
+/// Unit normal and ambient term of a vector packed by [`encode`], as the shader decodes them.
 pub fn decode(stored: u32) -> (Vec3, f32) {
     unscaled(Vec3::from([0, 10, 20].map(|shift| (stored >> shift & 0x3ff) as f32 / STEPS - 1.0)))
 }

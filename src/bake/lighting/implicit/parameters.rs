@@ -1,4 +1,4 @@
-//! What a bake is told, and the values of ρ, τ, k_a_min, d_min and n that follow from the model where it is not told.
+//! Settings of the implicit-surface bake, and the automatic values of ρ, τ, k_a_min, d_min and n for those left `None`.
 //!
 //! [Luft 2007, 3.1] sets ρ and τ by hand and finds that adequate values follow from the model's size. Here:
 //!
@@ -63,7 +63,7 @@ struct Curve {
 }
 
 impl AmbientField {
-    /// Foliage is clumped, so more light comes through than exp(-depth): at first k_a falls by n / d_min a leaf.
+    /// Foliage is clumped, so it transmits more light than exp(-depth): at first k_a falls by n / d_min per leaf.
     fn curve(self) -> Curve {
         match self {
             Self::Published => Curve { least: 0.2, core: 5.0, exponent: 6.0 },
@@ -84,8 +84,9 @@ pub enum NormalSource {
     Gradient,
 }
 
-/// How a plant is lit by implicit surfaces. Values out of range are moved into it; `None`, and what a scene file leaves out
-/// behind `lighting: Expressive(`, follows from the model. Scene files state values within the ranges that are constants here.
+/// Settings of the implicit-surface bake. Values out of range are clamped. Values that are `None`, or that a scene file
+/// leaves out in `lighting: Expressive(...)`, are derived from the plant. Scene files must keep within the ranges that
+/// are constants here.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ImplicitSettings {
@@ -96,17 +97,18 @@ pub struct ImplicitSettings {
     /// What the ambient term is a function of: `Depth`, nearer to the truth, or `Published`, lit by the paper's equations
     /// alone ([`AmbientField`]).
     pub ambient: AmbientField,
-    /// First radius of [`AmbientField::Depth`], metres, 0..=1e6. Larger: gaps between twigs no longer count. 0: k_a is 1.
+    /// First radius of [`AmbientField::Depth`], metres, 0..=1e6. Larger: gaps between twigs no longer count. 0: the
+    /// ambient term is 1.
     pub ambient_radius: Option<f32>,
-    /// k_a_min, 0..=1: what is left of the ambient light in the core.
+    /// k_a_min, 0..=1: the least ambient term, in the core of the crown.
     pub least: Option<f32>,
-    /// d_min in units of the ambient field, 0..=1e6: from which on k_a is k_a_min. Larger: brighter.
+    /// d_min in units of the ambient field, 0..=1e6: from this value on the ambient term is k_a_min. Larger: brighter.
     pub core: Option<f32>,
-    /// n, 0.01..=100: below 1 the crown darkens late on the way inside, above 1 early.
+    /// n, 0.01..=100. Below 1 the crown darkens only near its core, above 1 already near its surface.
     pub exponent: Option<f32>,
-    /// Share of the foliage's primitives that are generators, 0..=1 (at least one is). Smaller: faster, a little off.
-    /// [`AmbientField::Depth`] has all of them: it is from few leaves that it finds gaps, and it thins them out itself.
-    /// In a scene file: `share`.
+    /// Fraction of the foliage's primitives that become generators, 0..=1 (at least one does). Smaller: faster and less
+    /// accurate. [`AmbientField::Depth`] always uses all of them: it needs single leaves to find gaps, and thins them
+    /// out itself. In a scene file: `share`.
     #[serde(rename = "share")]
     pub generator_share: f32,
     /// What a generator counts: `LeafArea`, `Primitives` [Luft 2007, 3.1] or `Vertices` [Luft 2006, 4.1]. It changes the units
@@ -114,17 +116,18 @@ pub struct ImplicitSettings {
     pub weighting: Weighting,
     /// Where the normals come from.
     pub normals: NormalSource,
-    /// Share of a leaf's own normal in the result, 0..=1; the publication shows 0. 1: the leaves' own normals, unchanged.
+    /// Weight of a leaf's own normal in the result, 0..=1; the publication shows 0. 1: the leaves' own normals,
+    /// unchanged.
     pub own_normal: f32,
-    /// Whether the surface is extracted where the normals do not need it.
+    /// Whether the surface is extracted even if the normals do not need it.
     pub surface: bool,
-    /// Cells of the surface a radius ρ, 1..=16. More: a finer surface, with the square in triangles.
+    /// Cells of the surface per radius ρ, 1..=16. More: a finer surface, whose triangles grow with the square.
     pub resolution: f32,
-    /// Triangles of the surface that is returned as a share of the foliage's, 0..=1 (the presets
-    /// [`COARSE_SHARE`](super::COARSE_SHARE) and [`FINE_SHARE`](super::FINE_SHARE)); `None` leaves it as extracted. The share
-    /// is reached: a surface with fewer triangles is extracted again with finer cells. Exceptions: more separate lobes than
-    /// the share has tetrahedra for, and more cells than [`MOST_CELLS`](super::isosurface::MOST_CELLS). Normals always come
-    /// from the surface as `resolution` gives it.
+    /// Triangles of the returned surface as a fraction of the foliage's, 0..=1 (the presets
+    /// [`COARSE_SHARE`](super::COARSE_SHARE) and [`FINE_SHARE`](super::FINE_SHARE)); `None` leaves it as extracted. The
+    /// fraction is always reached: a surface with fewer triangles is extracted again with finer cells. Exceptions: more
+    /// separate lobes than the share has tetrahedra for, and more cells than
+    /// [`MOST_CELLS`](super::isosurface::MOST_CELLS). Normals always come from the surface as `resolution` gives it.
     pub surface_share: Option<f32>,
     /// Whether all trees of such species are lit together, so that a small tree is darkened by its tall neighbour [Luft
     /// 2007, 5]. Each tree then is a model of its own, of which a scene has at most 64. The first such species' values
@@ -167,14 +170,14 @@ impl ImplicitSettings {
     pub const EXPONENT: RangeInclusive<f32> = 0.01..=100.0;
     /// Range of [`generator_share`](Self::generator_share) in a scene.
     pub const SHARE: RangeInclusive<f32> = 1e-3..=1.0;
-    /// Range of [`least`](Self::least), [`own_normal`](Self::own_normal) and [`surface_share`](Self::surface_share) in a
-    /// scene.
+    /// Range of [`least`](Self::least), [`own_normal`](Self::own_normal) and [`surface_share`](Self::surface_share) in
+    /// a scene.
     pub const UNIT: RangeInclusive<f32> = 0.0..=1.0;
     /// Range of [`resolution`](Self::resolution) in a scene, cells a radius.
     pub const RESOLUTION: RangeInclusive<f32> = 1.0..=16.0;
 
-    /// The settings with every value moved into its range; what is not finite becomes the default.
-    pub fn in_range(self) -> Self {
+    /// The settings with every value clamped to its range; a value that is not finite becomes the default.
+    pub fn sanitized(self) -> Self {
         let default = Self::default();
         let or = |value: f32, default: f32| if value.is_finite() { value } else { default };
         let within = |value: Option<f32>, low: f32, high: f32| {
@@ -213,8 +216,8 @@ pub struct ImplicitParameters {
     pub exponent: f32,
 }
 
-/// ρ in metres for a plant with `generators`, one a primitive, whose longest extent is `extent` metres: as the settings say or as follows from the model.
-/// 0 where there are no generators or they have no extent.
+/// ρ in metres for a plant with `generators`, one a primitive, whose longest extent is `extent` metres: as the settings
+/// say or as follows from the model. 0 where there are no generators or they have no extent.
 pub fn radius(generators: &[Generator], extent: f32, settings: &ImplicitSettings) -> f32 {
     if let Some(radius) = settings.radius {
         return radius;
@@ -237,8 +240,8 @@ pub fn radius(generators: &[Generator], extent: f32, settings: &ImplicitSettings
     (RADIUS_SHARE.max(RADIUS_SPACINGS * spacing).min(1.0)) * longest
 }
 
-/// The ambient field's first radius in metres for a plant whose longest extent is `extent` metres and whose field has the
-/// radius `radius`: as the settings say or as follows from the model, 0 where there is no extent.
+/// The ambient field's first radius in metres for a plant whose longest extent is `extent` metres and whose field has
+/// the radius `radius`: as the settings say or as follows from the model, 0 where there is no extent.
 pub fn ambient_radius(radius: f32, extent: f32, settings: &ImplicitSettings) -> f32 {
     match settings.ambient {
         AmbientField::Published => radius,
@@ -248,8 +251,9 @@ pub fn ambient_radius(radius: f32, extent: f32, settings: &ImplicitSettings) -> 
     }
 }
 
-/// All values for a model with `generators`, one a primitive, and the `field` of them or of a share of them, whose radius
-/// is kept, as is the ambient field's `ambient_radius`: as the settings say or as follows from the density at the leaves.
+/// All values for a model with `generators`, one a primitive, and the `field` of them or of a share of them, whose
+/// radius is kept, as is the ambient field's `ambient_radius`: as the settings say or as follows from the density at
+/// the leaves.
 pub fn parameters(
     generators: &[Generator],
     field: &DensityField,
@@ -257,8 +261,8 @@ pub fn parameters(
     settings: &ImplicitSettings,
 ) -> ImplicitParameters {
     let share = SAMPLES as f32 / generators.len().max(1) as f32;
-    let places: Vec<Vec3> = even_share(generators, share).iter().map(|generator| generator.position).collect();
-    let mut densities = field.values(&places);
+    let points: Vec<Vec3> = even_share(generators, share).iter().map(|generator| generator.position).collect();
+    let mut densities = field.values(&points);
     densities.sort_by(f32::total_cmp);
     let median = densities.get(densities.len() / 2).copied().unwrap_or(0.0);
     let curve = settings.ambient.curve();
@@ -302,12 +306,12 @@ mod tests {
             surface_share: Some(7.0),
             ..ImplicitSettings::default()
         }
-        .in_range();
+        .sanitized();
         assert_eq!((wild.radius, wild.threshold, wild.least, wild.core), (Some(0.0), None, Some(1.0), None));
         assert_eq!(wild.ambient_radius, Some(0.0));
         assert_eq!((wild.exponent, wild.generator_share, wild.own_normal), (Some(0.01), 1.0, 0.0));
         assert_eq!((wild.resolution, wild.surface_share), (16.0, Some(1.0)));
-        assert_eq!(ImplicitSettings::default().in_range(), ImplicitSettings::default());
+        assert_eq!(ImplicitSettings::default().sanitized(), ImplicitSettings::default());
     }
 
     #[test]

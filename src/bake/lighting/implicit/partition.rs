@@ -149,9 +149,9 @@ mod tests {
         points[5] = Vec3::NAN;
         points.extend([Vec3::ONE; 40]);
         let order = compact_order(&points, 8);
-        let mut places: Vec<u32> = order.iter().map(|(_, index)| *index).collect();
-        places.sort_unstable();
-        assert_eq!(places, (0..1043).filter(|i| *i != 5).collect::<Vec<u32>>());
+        let mut slots: Vec<u32> = order.iter().map(|(_, index)| *index).collect();
+        slots.sort_unstable();
+        assert_eq!(slots, (0..1043).filter(|i| *i != 5).collect::<Vec<u32>>());
         let nodes = tree(&order, 8);
         let groups: Vec<u32> = nodes.iter().filter(|n| n.group != Node::INNER).map(|n| n.group).collect();
         assert_eq!(groups, (0..order.len().div_ceil(8) as u32).collect::<Vec<_>>());

@@ -77,17 +77,17 @@ pub(super) fn simplify(positions: &[Vec3], triangles: &[[u32; 3]], target: usize
     let mut mesh = Mesh::new(positions.iter().map(|p| p.as_dvec3() - origin).collect(), triangles.to_vec());
     mesh.collapse_to(target);
 
-    let mut places = vec![u32::MAX; positions.len()];
+    let mut points = vec![u32::MAX; positions.len()];
     let mut kept = Vec::new();
     let mut faces = Vec::new();
     for (face, _) in mesh.faces.iter().zip(&mesh.alive).filter(|(_, alive)| **alive) {
         faces.push(face.map(|v| {
-            let place = &mut places[v as usize];
-            if *place == u32::MAX {
-                *place = kept.len() as u32;
+            let point = &mut points[v as usize];
+            if *point == u32::MAX {
+                *point = kept.len() as u32;
                 kept.push((mesh.positions[v as usize] + origin).as_vec3());
             }
-            *place
+            *point
         }));
     }
     (kept, faces)
@@ -124,11 +124,11 @@ impl Mesh {
             if (self.stamps[a as usize], self.stamps[b as usize]) != (stamp_a, stamp_b) {
                 continue;
             }
-            let (place, _) = self.best_place(a, b);
-            if !self.may_collapse(a, b, place) {
+            let (point, _) = self.best_point(a, b);
+            if !self.may_collapse(a, b, point) {
                 continue;
             }
-            self.collapse(a, b, place);
+            self.collapse(a, b, point);
             left -= 2;
             for other in self.neighbours(a) {
                 heap.push(self.candidate(a.min(other), a.max(other)));
@@ -137,12 +137,12 @@ impl Mesh {
     }
 
     fn candidate(&self, a: u32, b: u32) -> Candidate {
-        let (_, cost) = self.best_place(a, b);
+        let (_, cost) = self.best_point(a, b);
         Reverse((cost.to_bits(), a, b, self.stamps[a as usize], self.stamps[b as usize]))
     }
 
     /// Where the vertex of a collapsed edge goes, and the quadric error there.
-    fn best_place(&self, a: u32, b: u32) -> (DVec3, f64) {
+    fn best_point(&self, a: u32, b: u32) -> (DVec3, f64) {
         let (pa, pb) = (self.positions[a as usize], self.positions[b as usize]);
         let quadric = self.quadrics[a as usize].plus(&self.quadrics[b as usize]);
         let (middle, length) = (0.5 * (pa + pb), pa.distance(pb));
@@ -156,10 +156,10 @@ impl Mesh {
             }
         }
         let mut best = (middle, quadric.at(middle));
-        for place in [pa, pb] {
-            let cost = quadric.at(place);
+        for point in [pa, pb] {
+            let cost = quadric.at(point);
             if cost < best.1 {
-                best = (place, cost);
+                best = (point, cost);
             }
         }
         best
@@ -174,7 +174,7 @@ impl Mesh {
         found
     }
 
-    fn may_collapse(&self, a: u32, b: u32, place: DVec3) -> bool {
+    fn may_collapse(&self, a: u32, b: u32, point: DVec3) -> bool {
         let (of_a, of_b) = (self.neighbours(a), self.neighbours(b));
         let common = of_a.iter().filter(|v| of_b.binary_search(v).is_ok()).count();
         // Two ends of three neighbours each are two corners of a tetrahedron.
@@ -186,15 +186,15 @@ impl Mesh {
             faces.filter(|face| !face.contains(&other)).all(|face| {
                 let normal = |[p, q, r]: [DVec3; 3]| (q - p).cross(r - p);
                 let before = normal(face.map(|v| self.positions[v as usize]));
-                let after = normal(face.map(|v| if v == end { place } else { self.positions[v as usize] }));
+                let after = normal(face.map(|v| if v == end { point } else { self.positions[v as usize] }));
                 before.dot(after) > 0.2 * before.length() * after.length()
             })
         })
     }
 
-    /// Moves `a` to `place` and takes `b` into it.
-    fn collapse(&mut self, a: u32, b: u32, place: DVec3) {
-        self.positions[a as usize] = place;
+    /// Moves `a` to `point` and merges `b` into it.
+    fn collapse(&mut self, a: u32, b: u32, point: DVec3) {
+        self.positions[a as usize] = point;
         self.quadrics[a as usize] = self.quadrics[a as usize].plus(&self.quadrics[b as usize]);
         for face in std::mem::take(&mut self.around[b as usize]) {
             let corners = &mut self.faces[face as usize];

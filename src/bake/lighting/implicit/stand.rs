@@ -1,10 +1,10 @@
-//! Several plants in one field [Luft 2007, 5]: a small tree is darkened by the tall one beside it.
+//! Several plants in one field [Luft 2007, 5]: a tall tree darkens the small one beside it.
 //!
-//! Such a bake belongs to one plant at one place, so the plants cannot be instances of one model. Memory: the result
-//! is 16 bytes a vertex (normal and k_a, 4 bytes once packed) and 24 a vertex and 12 a triangle of the surface; while it
-//! is made there are all meshes once more in the stand's frame (32 bytes a vertex, 12 a triangle), 20 bytes a
-//! leaf and a triangle of wood, 62 more for each of them in the density field and in each level of the depth field (the
-//! coarse half of the levels has few), and at most 48 bytes a vertex for the evaluation.
+//! Such a bake belongs to one plant at one position, so the plants cannot be instances of one model. Memory: the result
+//! is 16 bytes a vertex (normal and ambient term, 4 bytes once packed) and 24 a vertex and 12 a triangle of the
+//! surface; while it is made there are all meshes once more in the stand's frame (32 bytes a vertex, 12 a triangle), 20
+//! bytes a leaf and a triangle of wood, 62 more for each of them in the density field and in each level of the depth
+//! field (the coarse half of the levels has few), and at most 48 bytes a vertex for the evaluation.
 
 use std::borrow::Cow;
 
@@ -25,7 +25,7 @@ pub struct StandPlant<'a> {
     pub plant: &'a Plant,
     /// Its foot in the scene, metres.
     pub position: DVec3,
-    /// Turn about the upright axis in radians, from +Z towards +X.
+    /// Rotation about the upright axis in radians, from +Z towards +X.
     pub yaw: f32,
     /// Factor on its size, above 0.
     pub scale: f32,
@@ -34,35 +34,36 @@ pub struct StandPlant<'a> {
 /// Normals and ambient term of one plant of a stand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlantShading {
-    /// Unit normals in the plant's own frame, one list a part, one a vertex.
+    /// Unit normals in the plant's own frame: one list per part, one value per vertex.
     pub normals: Vec<Vec<Vec3>>,
-    /// k_a, one list a part, one a vertex.
+    /// Ambient term: one list per part, one value per vertex.
     pub ambient: Vec<Vec<f32>>,
 }
 
 /// Plants that are lit together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StandBake {
-    /// One a plant, in their order.
+    /// One per plant, in their order.
     pub plants: Vec<PlantShading>,
-    /// Where the surface's frame (not turned, not scaled) lies in the scene, metres.
+    /// Where the surface's frame (not rotated, not scaled) lies in the scene, metres.
     pub origin: DVec3,
     /// The surface around all crowns, relative to `origin`; `None` where there is none or none was asked for.
     pub surface: Option<SurfaceMesh>,
-    /// How it went.
+    /// Report of the bake.
     pub report: ImplicitReport,
 }
 
 /// Bakes all `plants` in one field. Values that the settings leave open are the means of what each plant would have
-/// alone, weighted by leaf area: that a stand is dense must darken it, and not raise τ. The depth field reaches as far as
-/// in a plant of the mean extent. A plant whose place, yaw or scale is not usable is lit alone, as it is modelled.
+/// alone, weighted by leaf area: that a stand is dense must darken it, and not raise τ. The depth field reaches as far
+/// as in a plant of the mean extent. A plant whose position, yaw or scale is not usable is lit alone, as it is
+/// modelled.
 pub fn bake_implicit_stand(plants: &[StandPlant], settings: &ImplicitSettings) -> StandBake {
-    let settings = settings.in_range();
+    let settings = settings.sanitized();
     let usable = |plant: &&StandPlant| {
         plant.position.is_finite() && plant.yaw.is_finite() && plant.scale.is_finite() && plant.scale > 0.0
     };
-    let places: Vec<DVec3> = plants.iter().filter(usable).map(|plant| plant.position).collect();
-    let origin = places.iter().copied().sum::<DVec3>() / places.len().max(1) as f64;
+    let points: Vec<DVec3> = plants.iter().filter(usable).map(|plant| plant.position).collect();
+    let origin = points.iter().copied().sum::<DVec3>() / points.len().max(1) as f64;
     let origin = if origin.is_finite() { origin } else { DVec3::ZERO };
 
     let moved: Vec<Vec<Part>> = plants.iter().filter(usable).map(|plant| in_stand(plant, origin)).collect();

@@ -1,8 +1,8 @@
-//! Light from leaf to leaf: each bounce passes the coefficients on along the rays that met something.
+//! Multiple scattering: each bounce carries the coefficients along the rays that hit something.
 //!
 //! [Sloan, Kautz & Snyder 2002, 5; Franzke 2005, 4.2.3, note 4]: what a surface sends out is a vector of coefficients
-//! like its incoming light, so a bounce is a weighted sum of vectors. They are those of the middle of the triangle that
-//! was met; the colours are those of the texture where it was met.
+//! like its incoming light, so a bounce is a weighted sum of vectors. The coefficients are those of the middle of the
+//! triangle that was hit; the colours are those of the texture at the hit.
 
 use rayon::prelude::*;
 

@@ -1,17 +1,17 @@
-//! What a vertex sends out under a light: the twin of what the vertex shader computes.
+//! The radiance that leaves a vertex under a light: the CPU twin of the vertex shader.
 
 use glam::Vec3;
 
-use super::SCATTERED;
+use super::INDIRECT_SUN_COEFFICIENTS;
 
-/// Irradiance over pi, per channel, that `light` (coefficients of radiance, turned into the plant's yaw) brings to
-/// the side with the coefficients `side`, as [`super::TransferPart`] holds them: one channel or three, told apart by
-/// their number. The bands that both have count. Never negative: a sum of a few bands can be, where next to nothing
-/// arrives, and is clamped.
+/// Irradiance over pi, per channel, of a side with the transfer coefficients `side` under `light` (coefficients of
+/// radiance, rotated into the plant's yaw). `side` has one channel or three, told apart by the number of coefficients,
+/// as [`super::TransferPart`] holds them. Only the bands that both have are used. Never negative: where almost no light
+/// arrives, the sum of a few bands can be, and is clamped.
 ///
-/// The loss: measured in `benches/transfer.rs` under "clamped".
+/// The clamping error is measured in `benches/transfer.rs` under "clamped".
 pub fn share(light: &[Vec3], side: &[f32]) -> Vec3 {
-    // Three times a square is no square.
+    // Three times a square is never a square.
     let one_channel = side.len().isqrt().pow(2) == side.len();
     let sum = if one_channel {
         light.iter().zip(side).map(|(l, t)| *l * *t).sum::<Vec3>()
@@ -22,13 +22,13 @@ pub fn share(light: &[Vec3], side: &[f32]) -> Vec3 {
     Vec3::from(sum.to_array().map(|value| value.max(0.0)))
 }
 
-/// Irradiance over pi that light of 1 lux (on what faces it) from the unit vector `direction`, in the plant's frame, brings
-/// over other leaves to a vertex with the coefficients `scattered` ([`super::TransferPart::scattered`]); the same on both of
-/// its sides. Never negative.
-pub fn scattered_share(scattered: &[f32], direction: Vec3) -> f32 {
-    let basis = crate::light::sh::basis::<SCATTERED>(direction);
+/// Irradiance over pi of the indirect sunlight at a vertex with the coefficients `indirect_sun`
+/// ([`super::TransferPart::indirect_sun`]), for sunlight of 1 lux (on a surface that faces it) from the unit vector
+/// `direction` in the plant's frame. The same on both sides. Never negative.
+pub fn indirect_sun_share(indirect_sun: &[f32], direction: Vec3) -> f32 {
+    let basis = crate::light::sh::basis::<INDIRECT_SUN_COEFFICIENTS>(direction);
     // `f32::max` also turns NaN into zero.
-    scattered.iter().zip(basis).map(|(value, basis)| value * basis).sum::<f32>().max(0.0)
+    indirect_sun.iter().zip(basis).map(|(value, basis)| value * basis).sum::<f32>().max(0.0)
 }
 
 /// Radiance that leaves the side `near`, diffusely reflected from it and transmitted from the side `far` (empty for

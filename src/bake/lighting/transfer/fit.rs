@@ -2,16 +2,17 @@
 //!
 //! A projection keeps the transfer function's own low bands and answers the light's low bands only; what the higher
 //! bands of the light would have added is lost, and it is not noise: skies are bright at the horizon and around the
-//! sun, always in the same way. So, with l_s the coefficients of the sky s, L_s its radiance and k the transfer function,
+//! sun, always in the same way. So, with l_s the coefficients of the sky s, L_s its radiance and k the transfer
+//! function,
 //!
 //! ```text
 //!  minimise over T    mean_s ( T . l_s - integral L_s k )^2 + lambda |T - integral y k|^2
 //!  T = integral f k   f(w) = (mean_s l_s l_s' + lambda 1)^-1 (mean_s l_s L_s(w) + lambda y(w))
 //! ```
 //!
-//! where the integral of y k is the projection, towards which what the skies leave open is drawn. The functions f are as
-//! many as those of the basis and take their place. The skies are scaled to the same mean; red, green and blue count as
-//! skies of their own. An even surrounding is among them, so that an overcast sky keeps its level.
+//! where the integral of y k is the projection, towards which what the skies leave open is drawn. The functions f are
+//! as many as those of the basis and take their place. The skies are scaled to the same mean; red, green and blue count
+//! as skies of their own. An even surrounding is among them, so that an overcast sky keeps its level.
 //!
 //! A plant may have any yaw, so the mean goes over all azimuths of the sun, which is done analytically: with phi the
 //! azimuth, functions of different order m do not mix, and f_lm is a profile over the height y times cos m phi or
@@ -81,7 +82,7 @@ fn skies_of(state: &LightState) -> Vec<Sky> {
                 let y = (part as f32 + (sample as f32 + 0.5) / SAMPLES as f32) * 2.0 / HEIGHTS as f32;
                 let s = (1.0 - y * y).max(0.0).sqrt();
                 for k in 0..AZIMUTHS {
-                    // Dense around the sun, as the sky's picture is.
+                    // Dense around the sun, as the sky texture is.
                     let u = (k as f32 + 0.5) / AZIMUTHS as f32;
                     let phi = PI * u * u;
                     let radiance = surroundings.radiance(Vec3::new(s * phi.sin(), y, s * phi.cos()));
@@ -108,8 +109,8 @@ fn skies_of(state: &LightState) -> Vec<Sky> {
 /// The functions f of the module's page for one number of bands.
 pub(super) struct Fit {
     bands: usize,
-    /// Integrals of the profiles from -1 up to each of the `HEIGHTS` + 1 bounds of the parts; `bands`² values each, those
-    /// of f_lm at l (l + 1) + |m|.
+    /// Integrals of the profiles from -1 up to each of the `HEIGHTS` + 1 bounds of the parts; `bands`² values each,
+    /// those of f_lm at l (l + 1) + |m|.
     integrals: Vec<f64>,
 }
 

@@ -1,6 +1,7 @@
-//! The rays: from every point in every direction, what reaches it directly, and what it sees instead of the sky.
+//! Sends rays from every point in every direction: which light arrives directly, and what hides the sky.
 //!
-//! All rays of one direction are answered at once, with those of the opposite one ([`crate::trace::ParallelTracer`]).
+//! All rays of one direction are traced at once, together with those of the opposite direction
+//! ([`crate::trace::ParallelTracer`]).
 
 use std::ops::ControlFlow;
 
@@ -13,11 +14,11 @@ use super::scene::{Link, Links, Scene, Sides};
 use crate::plant::PartKind;
 use crate::trace::{LineCrossing, ParallelTracer};
 
-/// Lines whose answers are kept until they are summed up: 36 MB for 70,000 points in one channel.
+/// Number of lines whose results are buffered before they are summed: 36 MB for 70,000 points in one channel.
 const BLOCK: usize = 64;
 
-/// Which of a line's two rays, 0 along it or 1 against it, reaches each side of `point`, front first, and at which
-/// cosine; `None` where none counts.
+/// For each side of `point` (front, back): which of the line's two rays arrives there (0 along the line, 1 against it),
+/// and the absolute cosine. `None` for lines within the surface.
 fn sides(point: &Point, line: Vec3) -> Option<([usize; 2], f32)> {
     let cosine = point.normal.dot(line);
     (cosine != 0.0).then_some((if cosine > 0.0 { [0, 1] } else { [1, 0] }, cosine.abs()))
@@ -27,13 +28,13 @@ fn sides(point: &Point, line: Vec3) -> Option<([usize; 2], f32)> {
 pub(super) struct Gathered {
     /// Coefficients of front and back.
     pub sides: Sides,
-    /// The share of even surroundings that is hidden from front and back, 0..=1.
+    /// Fraction of uniform surroundings that is hidden from front and back, 0..=1.
     pub hidden: Sides,
 }
 
-/// Light that goes straight on through up to `leaves` leaves; with none, direct light.
+/// Light that continues straight through up to `leaves` leaves; with 0, direct light only.
 ///
-/// Scaled so that even surroundings bring a free point exactly their radiance.
+/// Scaled so that an unoccluded point in uniform surroundings gets exactly their radiance.
 pub(super) fn straight(scene: &Scene, directions: &Directions, leaves: u8) -> Gathered {
     let count = scene.settings.coefficients();
     let channels = scene.settings.channels.count();

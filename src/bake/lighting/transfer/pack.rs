@@ -1,8 +1,8 @@
 //! Coefficients as bytes for the GPU and the cache.
 //!
 //! ```text
-//! Float32, Float16:  vertex = front, and for foliage back; each bands² × channels numbers, as in TransferPart; padding to
-//!                    4 bytes
+//! Float32, Float16:  vertex = front, and for foliage back; each bands² × channels numbers, as in
+//!                    TransferPart; padding to 4 bytes
 //! Snorm8:            vertex = means, codes
 //!   means            one f16 a side and channel, c_0; padding to 4 bytes
 //!   codes            for each side and channel (bands² - 1) × i8, 127 c_i / (c_0 scale_l), rounded; padding to 4 bytes
@@ -11,9 +11,9 @@
 //! Codes begin at whole words, so that a shader unpacks four of them at once.
 //!
 //! A transfer function is not negative, so by the addition theorem the coefficients of its band l are at most
-//! sqrt(2 l + 1) c_0 long, and fitted ones not much longer: eight bits relative to c_0 are spent on what can occur, in
-//! the dark inside of a crown as in the light. `scale_l` is the largest ratio among the part's sides that get at least
-//! a 64th of the light of the brightest; what exceeds it in darker ones is clamped.
+//! sqrt(2 l + 1) c_0 long, and fitted ones not much longer: eight bits relative to c_0 cover exactly the possible
+//! range, in the dark interior of a crown as in the light. `scale_l` is the largest ratio among the part's sides that
+//! get at least a 64th of the light of the brightest; larger ratios of darker sides are clamped.
 //!
 //! Errors, for light of the coefficients l: Float16 at most 2^-11 of each coefficient (2^-25 below 6e-5); Snorm8 at
 //! most `|c_0| sum_l scale_l / 254 sum_m |l_lm|` and 2^-11 of c_0's share. `benches/transfer.rs` has what that
@@ -22,7 +22,7 @@
 use half::f16;
 use serde::{Deserialize, Serialize};
 
-use super::{SCATTERED, TransferBake, TransferPart, TransferSettings};
+use super::{INDIRECT_SUN_COEFFICIENTS, TransferBake, TransferPart, TransferSettings};
 use crate::light::sh::MAX_BANDS;
 
 /// How a coefficient is stored.
@@ -39,11 +39,11 @@ pub enum TransferFormat {
 /// A plant's transfer as bytes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PackedTransfer {
-    /// The settings it was baked with.
+    /// The settings of the bake.
     pub settings: TransferSettings,
     /// How its coefficients are stored.
     pub format: TransferFormat,
-    /// One a part, in the plant's order.
+    /// One per part, in the plant's order.
     pub parts: Vec<PackedPart>,
 }
 
@@ -52,16 +52,16 @@ pub struct PackedTransfer {
 pub struct PackedPart {
     /// 1 for wood, 2 for foliage.
     pub sides: usize,
-    /// From one vertex to the next, bytes; a multiple of 4.
+    /// Stride between vertices in bytes, a multiple of 4.
     pub vertex_bytes: usize,
     /// [`TransferFormat::Snorm8`]: what 127 stands for in each band, relative to c_0. Zero in the first band.
     pub scale: [f32; MAX_BANDS],
     /// Vertex by vertex.
     pub bytes: Vec<u8>,
-    /// What 127 stands for in `scattered`.
-    pub scattered_scale: f32,
-    /// [`TransferPart::scattered`], a signed byte each, in any format.
-    pub scattered: Vec<u8>,
+    /// What 127 stands for in `indirect_sun`.
+    pub indirect_sun_scale: f32,
+    /// [`TransferPart::indirect_sun`], a signed byte each, in any format.
+    pub indirect_sun: Vec<u8>,
 }
 
 impl TransferFormat {
@@ -100,12 +100,12 @@ impl TransferBake {
 impl PackedTransfer {
     /// Whether the settings are in their ranges, all parts have whole vertices of them, and all scales are finite.
     pub fn is_whole(&self) -> bool {
-        self.settings == self.settings.in_range()
+        self.settings == self.settings.sanitized()
             && self.parts.iter().all(|part| {
                 (1..=2).contains(&part.sides)
                     && part.vertex_bytes == self.format.vertex_bytes(&self.settings, part.sides)
                     && part.bytes.len().is_multiple_of(part.vertex_bytes)
-                    && part.scale.iter().chain([&part.scattered_scale]).all(|scale| scale.is_finite())
+                    && part.scale.iter().chain([&part.indirect_sun_scale]).all(|scale| scale.is_finite())
             })
     }
 
@@ -123,9 +123,9 @@ impl PackedTransfer {
                     self.decode(bytes, part, side, &mut target[start..]);
                 }
             }
-            let code = |code: &u8| f32::from((*code as i8).max(-127)) / 127.0 * part.scattered_scale;
-            out.scattered = part.scattered.iter().map(code).collect();
-            out.scattered.resize(vertices * SCATTERED, 0.0);
+            let code = |code: &u8| f32::from((*code as i8).max(-127)) / 127.0 * part.indirect_sun_scale;
+            out.indirect_sun = part.indirect_sun.iter().map(code).collect();
+            out.indirect_sun.resize(vertices * INDIRECT_SUN_COEFFICIENTS, 0.0);
             out
         };
         TransferBake { settings: self.settings, parts: self.parts.iter().map(unpack).collect() }
@@ -188,10 +188,10 @@ fn pack_part(part: &TransferPart, settings: &TransferSettings, format: TransferF
         }
         bytes.resize((vertex + 1) * vertex_bytes, 0);
     }
-    let greatest = part.scattered.iter().fold(0.0f32, |max, value| max.max(value.abs()));
+    let greatest = part.indirect_sun.iter().fold(0.0f32, |max, value| max.max(value.abs()));
     let code = |value: &f32| ((127.0 * value / greatest).clamp(-127.0, 127.0).round() as i8) as u8;
-    let scattered = part.scattered.iter().map(code).collect();
-    PackedPart { sides, vertex_bytes, scale, bytes, scattered_scale: greatest, scattered }
+    let indirect_sun = part.indirect_sun.iter().map(code).collect();
+    PackedPart { sides, vertex_bytes, scale, bytes, indirect_sun_scale: greatest, indirect_sun }
 }
 
 /// Appends a vertex.
@@ -258,7 +258,7 @@ mod tests {
 
     #[test]
     fn errors_are_within_their_bounds() {
-        for channels in [Channels::One, Channels::Rgb] {
+        for channels in [Channels::Luminance, Channels::Rgb] {
             let bake = bake(channels);
             let exact = bake.pack(TransferFormat::Float32).unpack();
             assert_eq!((&exact.parts[0].front, &exact.parts[0].back), (&bake.parts[0].front, &bake.parts[0].back));
@@ -286,7 +286,7 @@ mod tests {
 
     #[test]
     fn darkness_and_missing_bytes_are_zeros() {
-        let mut bake = bake(Channels::One);
+        let mut bake = bake(Channels::Luminance);
         bake.parts[0].front[..9].fill(0.0);
         bake.parts[0].front[9] = -1e-9;
         let mut packed = bake.pack(TransferFormat::Snorm8);

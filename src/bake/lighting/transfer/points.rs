@@ -1,4 +1,4 @@
-//! Where transfer is computed: each place and normal once, neighbours beside each other.
+//! The points at which transfer is computed: each position and normal once, neighbours next to each other.
 
 use std::collections::HashMap;
 
@@ -6,29 +6,29 @@ use glam::Vec3;
 
 use crate::plant::{PartKind, Plant, PlantMesh, geometry};
 
-/// Rays start this share of the plant's longest extent away from their vertex, so that they meet neither the
-/// triangles that meet there nor what touches them: 0.3 mm for a tree of 20 m.
+/// Distance between a vertex and the origin of its rays, as a fraction of the plant's longest extent, so that they hit
+/// neither the triangles of the vertex nor those that touch them: 0.3 mm for a tree of 20 m.
 const START: f32 = 1.0 / 65_536.0;
 
 /// Marks a vertex that has no point.
 pub(super) const NO_SLOT: u32 = u32::MAX;
 
-/// A place whose light is wanted.
+/// A point whose light is computed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point {
     /// Metres.
     pub position: Vec3,
     /// Unit length.
     pub normal: Vec3,
-    /// Whether the back is wanted as well.
+    /// Whether the back side is computed as well.
     pub two_sided: bool,
 }
 
 /// All points of a plant, along a curve through space, so that the rays of consecutive ones meet the same triangles.
 pub(super) struct Points {
-    /// The points; a place in this list is a slot.
+    /// The points; an index into this list is a slot.
     pub list: Vec<Point>,
-    /// How far from its point a ray starts, metres.
+    /// Distance between a point and the origin of its rays, metres.
     pub start: f32,
     /// The slot of each vertex of each part, or [`NO_SLOT`].
     slots: Vec<Vec<u32>>,
@@ -37,7 +37,7 @@ pub(super) struct Points {
 impl Points {
     /// The points of all vertices that have a finite position and a normal.
     pub fn new(plant: &Plant) -> Self {
-        let mut places: HashMap<([u32; 6], bool), u32> = HashMap::new();
+        let mut indices: HashMap<([u32; 6], bool), u32> = HashMap::new();
         let mut list: Vec<Point> = Vec::new();
         let mut slots: Vec<Vec<u32>> = Vec::with_capacity(plant.parts.len());
         for part in &plant.parts {
@@ -46,10 +46,10 @@ impl Points {
                 (0..part.mesh.positions.len())
                     .map(|vertex| {
                         let Some((position, normal)) = frame(&part.mesh, vertex) else { return NO_SLOT };
-                        // Adding zero turns -0.0 into 0.0, which is the same place.
+                        // Adding zero turns -0.0 into 0.0, which is the same position.
                         let [a, b, c] = (position + Vec3::ZERO).to_array().map(f32::to_bits);
                         let [d, e, f] = (normal + Vec3::ZERO).to_array().map(f32::to_bits);
-                        *places.entry(([a, b, c, d, e, f], two_sided)).or_insert_with(|| {
+                        *indices.entry(([a, b, c, d, e, f], two_sided)).or_insert_with(|| {
                             list.push(Point { position, normal, two_sided });
                             list.len() as u32 - 1
                         })

@@ -1,4 +1,4 @@
-//! The directions of the rays, and what each adds to the coefficients.
+//! The directions of the rays, and the contribution of each to the coefficients.
 
 use std::f64::consts::TAU;
 
@@ -31,8 +31,8 @@ pub fn direction_set(n: u32) -> Vec<Vec3> {
 pub(super) struct Directions {
     /// Unit vectors along the lines, in the upper hemisphere.
     pub lines: Vec<Vec3>,
-    /// For each line and ray, bands² values: what an unhidden ray adds to the coefficients, times its cosine over the sum
-    /// of all cosines to its side.
+    /// For each line and ray, bands² values: what an unhidden ray adds to the coefficients, times its cosine over the
+    /// sum of all cosines to its side.
     rows: Vec<f32>,
     coefficients: usize,
     /// The lines that are followed to what they meet.
@@ -40,7 +40,7 @@ pub(super) struct Directions {
 }
 
 impl Directions {
-    /// For `settings` in range.
+    /// The rays for sanitized `settings`.
     pub fn new(settings: &TransferSettings) -> Self {
         let bands = usize::from(settings.bands);
         // The first half of the set is the upper hemisphere.

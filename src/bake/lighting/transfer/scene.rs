@@ -1,4 +1,4 @@
-//! What a bake of transfer works on: the plant's points, and the rays that connect them with what they met.
+//! The scene of a transfer bake: the plant's points, and the rays that connect them with the surfaces that they hit.
 
 use glam::Vec3;
 
@@ -30,7 +30,7 @@ impl Scene<'_> {
     }
 }
 
-/// A ray that met a surface, which may send light back along it.
+/// A ray that hit a surface, which may scatter light back along it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Link {
     /// The part and its triangle that were met, and whether from the front.
@@ -69,8 +69,8 @@ pub(super) struct Links {
 }
 
 impl Links {
-    /// From the links of each line, each with `2 * slot + side`; those of one side stay in the order of the lines. Their
-    /// weights are scaled to the share of even surroundings that is `hidden` from each side.
+    /// From the links of each line, each with `2 * slot + side`; those of one side stay in the order of the lines.
+    /// Their weights are scaled to the share of even surroundings that is `hidden` from each side.
     pub fn new(by_line: Vec<Vec<(u32, Link)>>, hidden: &[Vec<f32>; 2]) -> Self {
         let keys = 2 * hidden[0].len();
         let mut starts = vec![0u32; keys + 1];

@@ -87,7 +87,7 @@ impl Grower<'_> {
     }
 }
 
-/// Turns a frame towards the zenith (4.8; the paper turns about x only, which leaves stems that wander sideways).
+/// Rotates a frame towards the zenith (4.8; the paper rotates about x only, which leaves stems that wander sideways).
 fn attract(rotation: Quat, amount: f32) -> Quat {
     let axis = (rotation * Vec3::Z).cross(Vec3::Y);
     let sine = axis.length();

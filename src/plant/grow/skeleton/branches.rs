@@ -36,9 +36,9 @@ impl Grower<'_> {
         let mut children = Vec::with_capacity(count);
         for index in 0..count {
             let whorl = branches.whorl.max(1) as usize;
-            let (place, places) = (index / whorl, count.div_ceil(whorl));
+            let (row, rows) = (index / whorl, count.div_ceil(whorl));
             let jitter = if whorl == 1 { 0.8 } else { 0.35 };
-            let along = (place as f32 + 0.5 + jitter * (draw.unit() - 0.5)) / places as f32;
+            let along = (row as f32 + 0.5 + jitter * (draw.unit() - 0.5)) / rows as f32;
             let distance = first + (last - first) * along;
             let wobble = branches.rotate_variation_deg * draw.signed();
             let turn = if branches.rotate_deg < 0.0 {
@@ -47,8 +47,8 @@ impl Grower<'_> {
             } else {
                 azimuth += branches.rotate_deg + if whorl == 1 { wobble } else { 0.0 };
                 let spoke = if whorl == 1 { 0.0 } else { 360.0 * (index % whorl) as f32 / whorl as f32 + wobble };
-                // Within a whorl the golden angle turns the whorl, not the branch.
-                if whorl == 1 { azimuth } else { place as f32 * branches.rotate_deg + spoke }
+                // Within a whorl the golden angle rotates the whorl, not the branch.
+                if whorl == 1 { azimuth } else { row as f32 * branches.rotate_deg + spoke }
             };
             let knot = at(knots, distance);
             let under = node_at(nodes, distance);

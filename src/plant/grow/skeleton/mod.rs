@@ -1,6 +1,6 @@
 //! The skeleton of a tree: its stems as polylines with radii (Weber & Penn 1995, 4.1 to 4.6 and 4.8).
 //!
-//! A stem's frame has its z axis along the stem; x is the axis about which the stem turns away from its parent.
+//! A stem's frame has its z axis along the stem; x is the axis about which the stem bends away from its parent.
 //! Every stem draws from a random stream of its own, split from its parent's by its index, so that a change of one
 //! level's parameters leaves the levels before it as they were.
 

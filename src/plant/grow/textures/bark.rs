@@ -1,4 +1,4 @@
-//! Bark: a height field, coloured by how deep a place lies, with the normals of its slopes.
+//! Bark: a height field, coloured by its depth, with the normals of its slopes.
 
 use std::sync::Arc;
 
@@ -11,12 +11,12 @@ use super::lattice::{cell, octaves};
 use crate::math::smoothstep;
 use crate::plant::grow::parameters::BarkKind;
 
-/// Width of the pictures.
+/// Width of the textures.
 const WIDTH: usize = 512;
-/// Height of the pictures.
+/// Height of the textures.
 const HEIGHT: usize = 1024;
 
-/// Paints both pictures.
+/// Paints both textures.
 pub(super) fn paint(kind: BarkKind) -> BarkTextures {
     let (place, relief): (fn(f32, f32) -> Place, f32) = match kind {
         BarkKind::Fissured => (fissured, 13.0),
@@ -36,7 +36,7 @@ pub(super) fn paint(kind: BarkKind) -> BarkTextures {
         let at = |dx: usize, dy: usize| field[(y + dy) % HEIGHT * WIDTH + (x + dx) % WIDTH].height;
         let right = at(1, 0) - at(WIDTH - 1, 0);
         let down = at(0, 1) - at(0, HEIGHT - 1);
-        // +Y of the normal is up, the picture's rows run down.
+        // +Y of the normal is up, the texture's rows run down.
         let normal = Vec3::new(-right * relief, down * relief, 1.0).normalize();
         Rgba([byte(0.5 + 0.5 * normal.x), byte(0.5 + 0.5 * normal.y), byte(0.5 + 0.5 * normal.z), 255])
     });
@@ -83,7 +83,7 @@ fn scaly(x: f32, y: f32) -> Place {
     let scale = cell(u * 12.0, v * 17.0, [12, 17], 1.41, 22);
     let flake = cell(u * 27.0, v * 40.0, [27, 40], 1.35, 32);
     let grain = octaves(x, y, [48, 80], 4, 42);
-    // A place below its cell's point (rows run down) is at the free rim, where the scale casts a shadow; above, it
+    // A position below its cell's point (rows run down) is at the free rim, where the scale casts a shadow; above, it
     // passes into the scale over it.
     let low = smoothstep(-0.15, 0.35, -scale.to_point[1]);
     let flake_low = smoothstep(-0.2, 0.4, -flake.to_point[1]);

@@ -35,7 +35,7 @@ pub(super) fn noise(x: f32, y: f32, period: [i32; 2], seed: u32) -> f32 {
 }
 
 /// Octaves of [`noise`], each twice as fine and half as strong, about -1 to 1; `x` and `y` run from 0 to 1 over
-/// the picture, `period` is that of the first octave.
+/// the texture, `period` is that of the first octave.
 pub(super) fn octaves(x: f32, y: f32, period: [i32; 2], count: u32, seed: u32) -> f32 {
     let (mut sum, mut weight, mut total) = (0.0, 1.0, 0.0);
     for octave in 0..count {
@@ -47,7 +47,7 @@ pub(super) fn octaves(x: f32, y: f32, period: [i32; 2], count: u32, seed: u32) -
     sum / total
 }
 
-/// What the nearest cells say about a place.
+/// Distances to the nearest cells of a position.
 pub(super) struct Cell {
     /// Distance to the border with the neighbouring cell, in widths of a cell.
     pub border: f32,
@@ -57,7 +57,7 @@ pub(super) struct Cell {
     pub value: f32,
 }
 
-/// The cell at a place of a lattice that repeats after `period` cells each way; cells are `stretch` times as high as
+/// The cell at a position of a lattice that repeats after `period` cells each way; cells are `stretch` times as high as
 /// wide. `x` and `y`, in cells, may leave the period by less than one more.
 pub(super) fn cell(x: f32, y: f32, period: [i32; 2], stretch: f32, seed: u32) -> Cell {
     let (cell_x, cell_y) = (x.floor() as i32, y.floor() as i32);

@@ -11,7 +11,7 @@ use crate::math::smoothstep;
 use crate::plant::grow::parameters::LeafShape;
 use crate::plant::grow::random::Random;
 
-/// Width and height of the picture.
+/// Width and height of the texture.
 const SIZE: usize = 1024;
 /// Mean colour of a leaf's upper side, sRGB.
 const GREEN: Vec3 = Vec3::new(0.298, 0.402, 0.178);
@@ -53,7 +53,7 @@ pub(super) fn paint(shape: LeafShape) -> RgbaImage {
     canvas.finish()
 }
 
-/// A twig in units of the picture's width; angles clockwise from straight up.
+/// A twig in units of the texture's width; angles clockwise from straight up.
 struct Twig {
     base: Vec2,
     angle: f32,
@@ -79,7 +79,7 @@ impl Twig {
         }
     }
 
-    /// Sets leaves left and right in turn from the fraction `from`, and one at the tip.
+    /// Sets leaves alternately left and right from the fraction `from`, and one at the tip.
     fn leaves(&self, random: &mut Random, count: usize, from: f32, size: f32, leaves: &mut Vec<Leaf>) {
         for index in 0..count {
             let along = from + (0.95 - from) * (index as f32 + 0.3 * random.unit()) / count as f32;
@@ -103,7 +103,7 @@ struct Leaf {
     bend: f32,
     depth: f32,
     color: Vec3,
-    /// Which half is turned to the light.
+    /// Which half faces the light.
     lit: f32,
 }
 
@@ -152,7 +152,7 @@ impl Leaf {
         }
     }
 
-    /// The colour of a place on the blade: midrib, veins, the swelling between them, mottling, a lighter rim.
+    /// The colour of a point on the blade: midrib, veins, the swelling between them, mottling, a lighter rim.
     fn color_at(&self, outline: &Outline, place: Place, seed: u32) -> Vec3 {
         let half = (outline.half_width(place.along) * self.width).max(1e-3);
         let across = (place.across / half).clamp(-1.0, 1.0);
@@ -175,7 +175,7 @@ impl Leaf {
     }
 }
 
-/// A place on a leaf, in lengths of its blade.
+/// A position on a leaf, in lengths of its blade.
 #[derive(Clone, Copy)]
 struct Place {
     along: f32,

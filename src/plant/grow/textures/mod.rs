@@ -1,6 +1,6 @@
 //! Bark and leaf clusters, painted by rule.
 //!
-//! Pictures are the same in every run, are painted when first asked for (a tenth to some tenths of a second each) and
+//! Textures are the same in every run, are painted when first asked for (a tenth to some tenths of a second each) and
 //! are then shared by all plants of the process. Colours are albedos of real bark and leaves: linear reflectance of
 //! leaves about 0.04 to 0.15 in green (Gates et al. 1965, "Spectral properties of plants", Applied Optics 4).
 
@@ -16,7 +16,7 @@ use image::RgbaImage;
 
 use super::parameters::{BarkKind, LeafShape};
 
-/// The two pictures of a bark. Both repeat without seams in both directions.
+/// The two textures of a bark. Both repeat without seams in both directions.
 #[derive(Clone, Debug)]
 pub struct BarkTextures {
     /// Albedo, sRGB, 512 by 1024, opaque.
@@ -25,7 +25,7 @@ pub struct BarkTextures {
     pub normal: Arc<RgbaImage>,
 }
 
-/// The pictures of a bark: painted once, then shared.
+/// The textures of a bark: painted once, then shared.
 pub fn bark(kind: BarkKind) -> BarkTextures {
     static PAINTED: [OnceLock<BarkTextures>; 2] = [const { OnceLock::new() }; 2];
     let slot = match kind {
@@ -35,7 +35,7 @@ pub fn bark(kind: BarkKind) -> BarkTextures {
     PAINTED[slot].get_or_init(|| bark::paint(kind)).clone()
 }
 
-/// The picture of a leaf cluster, 1024 by 1024, its twig entering in the middle of the lower edge: sRGB albedo with
+/// The texture of a leaf cluster, 1024 by 1024, its twig entering in the middle of the lower edge: sRGB albedo with
 /// straight alpha, antialiased, nothing within some pixels of the edges. Transparent texels carry the colours of
 /// leaves nearby, so that filtering shows no rims. Painted once, then shared.
 pub fn cluster(shape: LeafShape) -> Arc<RgbaImage> {
@@ -55,10 +55,10 @@ pub fn cluster(shape: LeafShape) -> Arc<RgbaImage> {
         .clone()
 }
 
-/// Share of the cluster's picture that is leaf (alpha at least one half), 0 to 1. Times `count * scale² * aspect`
+/// Fraction of the cluster's texture that is leaf (alpha at least one half), 0 to 1. Times `count * scale² * aspect`
 /// it is the leaf area of a tree.
 pub fn coverage(shape: LeafShape) -> f32 {
-    let picture = cluster(shape);
-    let opaque = picture.pixels().filter(|pixel| pixel[3] >= 128).count();
-    opaque as f32 / (picture.width() * picture.height()) as f32
+    let texture = cluster(shape);
+    let opaque = texture.pixels().filter(|pixel| pixel[3] >= 128).count();
+    opaque as f32 / (texture.width() * texture.height()) as f32
 }

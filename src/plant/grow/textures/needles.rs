@@ -6,7 +6,7 @@ use image::RgbaImage;
 use super::canvas::Canvas;
 use crate::plant::grow::random::Random;
 
-/// Width and height of the picture.
+/// Width and height of the texture.
 const SIZE: usize = 1024;
 /// Mean colour of a needle, sRGB.
 const GREEN: Vec3 = Vec3::new(0.245, 0.335, 0.180);
@@ -50,7 +50,7 @@ pub(super) fn paint() -> RgbaImage {
     canvas.finish()
 }
 
-/// A shoot in units of the picture's width; angles clockwise from straight up.
+/// A shoot in units of the texture's width; angles clockwise from straight up.
 struct Shoot {
     base: Vec2,
     angle: f32,
