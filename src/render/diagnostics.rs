@@ -21,6 +21,7 @@ use bevy::{
         schedule::IntoScheduleConfigs,
         system::{Res, ResMut},
     },
+    log::warn,
     render::{Render, RenderApp, RenderSystems, diagnostic::RenderDiagnosticsPlugin},
 };
 
@@ -40,7 +41,9 @@ impl Plugin for CanopyDiagnosticsPlugin {
         if !app.is_plugin_added::<DiagnosticsPlugin>() {
             app.add_plugins(DiagnosticsPlugin);
         }
-        if !app.is_plugin_added::<RenderDiagnosticsPlugin>() {
+        if app.get_sub_app(RenderApp).is_none() {
+            warn!("CanopyDiagnosticsPlugin was added before a renderer: there are counts, but no GPU times of passes");
+        } else if !app.is_plugin_added::<RenderDiagnosticsPlugin>() {
             app.add_plugins(RenderDiagnosticsPlugin);
         }
         app.init_resource::<Counts>().add_systems(First, record);
@@ -62,7 +65,14 @@ fn send(counts: Res<Counts>, forest: Option<Res<ForestStatistics>>, terrain: Opt
 }
 
 fn record(counts: Res<Counts>, mut store: ResMut<DiagnosticsStore>) {
-    let Some((forest, terrain)) = counts.0.lock().unwrap_or_else(PoisonError::into_inner).take() else { return };
+    let counts = counts.0.lock().unwrap_or_else(PoisonError::into_inner).take();
+    if let Some((forest, terrain)) = counts {
+        record_counts(&mut store, &forest, &terrain);
+    }
+}
+
+/// Adds the counts of one frame to `store`, and the paths that are not there yet.
+pub fn record_counts(store: &mut DiagnosticsStore, forest: &ForestStatistics, terrain: &TerrainStatistics) {
     let time = Instant::now();
     let mut measure = |path: String, value: usize| {
         let path = DiagnosticPath::new(path);

@@ -109,7 +109,7 @@ fn two_forests_are_both_drawn() {
 fn run_scene(example: fn(&mut App)) -> Renderer {
     let mut renderer = Renderer::new((192, 108), None, 1).expect("a renderer");
     let app = renderer.app();
-    app.add_plugins(example);
+    example(app);
     app.add_observer(|failed: On<SceneFailed>| panic!("{}", *failed));
     for _ in 0..PATIENCE {
         app.update();

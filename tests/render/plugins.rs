@@ -54,6 +54,9 @@ fn without_a_renderer_canopy_says_what_is_missing() {
     app.cleanup();
     app.update();
     let messages = gpu.messages();
-    assert_eq!(messages.len(), 1, "{messages:?}");
-    assert!(messages[0].contains("draws nothing") && messages[0].contains("DefaultPlugins"), "{messages:?}");
+    // One message of the renderer, one of the assets.
+    assert_eq!(messages.len(), 2, "{messages:?}");
+    assert!(messages.iter().any(|message| message.contains("draws nothing")), "{messages:?}");
+    assert!(messages.iter().any(|message| message.contains("assets cannot be loaded")), "{messages:?}");
+    assert!(messages.iter().all(|message| message.contains("DefaultPlugins")), "{messages:?}");
 }

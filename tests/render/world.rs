@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use bevy::{
-    app::Plugin,
     asset::RenderAssetUsages,
     camera::{RenderTarget, visibility::RenderLayers},
     core_pipeline::prepass::MotionVectorPrepass,
@@ -21,8 +20,9 @@ use canopy::{
     },
     render::{
         components::{CanopyCamera, CastsCanopyShadow, Forest, SunShadowSettings},
-        diagnostics::CanopyDiagnosticsPlugin,
+        diagnostics::record_counts,
         forest::{ForestStatistics, GpuForests},
+        terrain::TerrainStatistics,
     },
     scene::Viewpoint,
 };
@@ -367,13 +367,12 @@ fn counts_are_diagnostics() {
     let _gpu = gpu();
     let built = grove(1);
     let mut renderer = showing(&built.stage);
-    renderer.app().add_plugins(CanopyDiagnosticsPlugin);
-    // Added late, as here, a plugin is finished by hand.
-    CanopyDiagnosticsPlugin.finish(renderer.app());
     draw(&mut renderer, &built.stage, &super::pictures::over_the_grove(&built.stage), NOON);
     again(&mut renderer);
-    let statistics = renderer.app().sub_app(RenderApp).world().resource::<ForestStatistics>().clone();
-    let store = renderer.app().world().resource::<DiagnosticsStore>();
+    let world = renderer.app().sub_app(RenderApp).world();
+    let (statistics, terrain) = (world.resource::<ForestStatistics>(), world.resource::<TerrainStatistics>());
+    let mut store = DiagnosticsStore::default();
+    record_counts(&mut store, statistics, terrain);
     let value = |path: &str| store.get(&DiagnosticPath::new(path.to_owned())).and_then(Diagnostic::value);
     for level in &statistics.levels {
         let name = level.representation.name();
