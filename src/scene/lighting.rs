@@ -166,11 +166,14 @@ mod tests {
 
     #[test]
     fn a_scene_chooses_what_a_generator_counts() {
+        // Scene files are read so.
+        let options =
+            ron::Options::default().with_default_extension(ron::extensions::Extensions::UNWRAP_VARIANT_NEWTYPES);
         for weighting in [Weighting::LeafArea, Weighting::Primitives, Weighting::Vertices] {
             let text = format!("Expressive(weighting: {})", word(&weighting));
-            let lighting: Lighting = ron::from_str(&text).unwrap();
+            let lighting: Lighting = options.from_str(&text).unwrap();
             assert_eq!(lighting, Lighting::Expressive(ImplicitSettings { weighting, ..Default::default() }));
-            assert_eq!(ron::from_str::<Lighting>(&lighting.to_ron()).unwrap(), lighting);
+            assert_eq!(options.from_str::<Lighting>(&lighting.to_ron()).unwrap(), lighting);
         }
     }
 }
