@@ -118,7 +118,7 @@ fn info_tells_what_would_be_ignored_and_why() {
             "vigour: ignored",
             "centimetres (assumed",
             "of 1 of 2: 30.0 to 30.0 cm",
-            "height        not known",
+            "height        unknown for all trees",
         ],
     );
 
