@@ -1,4 +1,4 @@
-// Bind group 0, which all passes of a view share. Rust twins in src/render/frame/uniforms.rs.
+// Bind group 0, which all passes of a view share. Rust twins in src/render/bindings/uniforms.rs.
 #define_import_path canopy::frame
 
 #import canopy::constants::MAX_CASCADES

@@ -130,7 +130,7 @@ pub struct ImplicitSettings {
     /// [`MOST_CELLS`](super::isosurface::MOST_CELLS). Normals always come from the surface as `resolution` gives it.
     pub surface_share: Option<f32>,
     /// Whether all trees of such species are lit together, so that a small tree is darkened by its tall neighbour [Luft
-    /// 2007, 5]. Each tree then is a model of its own, of which a scene has at most 64. The first such species' values
+    /// 2007, 5]. Each tree then is a model of its own, of which a scene has at most 1,023. The first such species' values
     /// count for all. Their neighbours darken them by the common field alone: of the cover around them nothing is counted
     /// again, trees of other species included. The shadow maps and, in [`AmbientField::Depth`], the factor on the direct
     /// light count for each. For who places trees: the bake of one plant does not look at it. Default false.
