@@ -2,6 +2,7 @@
 
 mod foliage;
 mod levels;
+mod memory;
 mod pictures;
 mod plate;
 mod plugins;
