@@ -1,6 +1,6 @@
 //! Scenes in a Bevy program: built in the background, shown as children of their entity when they are ready.
 //!
-//! The bakes run in parallel on threads of their own, on all cores but one; bakes that are in the cache are loaded from
+//! The bakes run in parallel on background threads, on all cores but one; bakes that are in the cache are loaded from
 //! it. Until a scene is ready, a frame only reads a list of events; then it uploads the scene. A program that closes
 //! meanwhile does not wait: the build is cancelled. The cache stays valid, because its files appear whole or not at
 //! all.
@@ -159,18 +159,7 @@ fn begin(mut commands: Commands, scenes: Query<(Entity, Ref<CanopyScene>, Has<Jo
         if building && !scene.is_added() {
             info!("the build of another scene is cancelled in favour of {}", scene.source);
         }
-        let mut entity_commands = commands.entity(entity);
-        entity_commands.remove::<Job>();
-        match Job::start(&scene) {
-            Ok(job) => {
-                entity_commands.insert((job, SceneProgress::default()));
-            }
-            Err(error) => {
-                let progress = SceneProgress { state: SceneState::Failed, ..SceneProgress::default() };
-                entity_commands.insert(progress);
-                fail(&mut commands, entity, &scene, error);
-            }
-        }
+        commands.entity(entity).insert((Job::start(&scene), SceneProgress::default()));
     }
 }
 
@@ -184,9 +173,8 @@ fn follow(
     // Two scenes may become ready in the same frame.
     let mut lit = false;
     for (entity, scene, mut job, mut progress, loaded) in &mut scenes {
-        // Check for the end before reading the events: the build reports its last event before it ends, so none is
-        // lost.
-        let finished = job.is_finished();
+        // Take the result before reading the events: the build reports its last event before it ends, so none is lost.
+        let result = job.finished();
         for event in job.events() {
             match &event {
                 BuildEvent::Note(note) => info!("{}: {note}", scene.source),
@@ -195,11 +183,9 @@ fn follow(
             }
             progress.apply(event);
         }
-        if !finished {
-            continue;
-        }
+        let Some(result) = result else { continue };
         commands.entity(entity).remove::<Job>();
-        let checked = job.finish().and_then(|stage| {
+        let checked = result.and_then(|stage| {
             device.as_ref().map_or(Ok(()), |device| stage.check_device(device))?;
             Ok(Arc::new(stage))
         });
