@@ -15,6 +15,7 @@ use std::sync::{Arc, OnceLock};
 use image::RgbaImage;
 
 use super::parameters::{BarkKind, LeafShape};
+use crate::math::compute_once;
 
 /// The two textures of a bark. Both repeat without seams in both directions.
 #[derive(Clone, Debug)]
@@ -25,14 +26,14 @@ pub struct BarkTextures {
     pub normal: Arc<RgbaImage>,
 }
 
-/// The textures of a bark: painted once, then shared.
+/// The textures of a bark: painted when first needed, then shared.
 pub fn bark(kind: BarkKind) -> BarkTextures {
     static PAINTED: [OnceLock<BarkTextures>; 2] = [const { OnceLock::new() }; 2];
     let slot = match kind {
         BarkKind::Fissured => 0,
         BarkKind::Scaly => 1,
     };
-    PAINTED[slot].get_or_init(|| bark::paint(kind)).clone()
+    compute_once(&PAINTED[slot], || bark::paint(kind)).clone()
 }
 
 /// The texture of a leaf cluster, 1024 by 1024, its twig entering in the middle of the lower edge: sRGB albedo with
