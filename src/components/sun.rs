@@ -80,7 +80,7 @@ impl Default for SunRefresh {
 pub struct Sun {
     /// Location on earth.
     pub observer: Observer,
-    /// Universal Time.
+    /// Universal Time. Reflection does not show it: the type is chrono's, which knows nothing of reflection.
     #[reflect(ignore)]
     pub instant: DateTime<Utc>,
     /// Seconds of the clock per second of the app's virtual time; 0: it is stopped.

@@ -21,7 +21,8 @@ pub enum Lighting {
     Transfer(Transfer),
 }
 
-/// Radiance transfer, in a user's terms: [`TransferSettings`] has more options than a scene needs.
+/// Radiance transfer, in a user's terms: [`TransferSettings`] has more options than a scene needs, and how the sun lights
+/// full models is no part of a bake.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Transfer {

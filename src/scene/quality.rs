@@ -26,7 +26,10 @@ fn default_fade() -> f64 {
     20.0
 }
 
-/// Drawing quality.
+/// Drawing quality: the few values that a user trades against run time.
+///
+/// The passes' own settings ([`Levels`], [`SunShadowSettings`](crate::render::components::SunShadowSettings), ...) belong
+/// to different entities and have further values, which follow from these or are constants.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Quality {
@@ -50,7 +53,7 @@ pub struct Quality {
     pub levels: Vec<QualityLevel>,
     /// Samples per pixel, 1 or 4. 4: smooth leaf edges, slower. Default 4.
     pub msaa: u32,
-    /// Edge of a cross plane's picture in texels, 64 to 1024, rounded up to a power of two. Higher: sharper far trees, memory.
+    /// Edge of a cross plane's texture in texels, 64 to 1024, rounded up to a power of two. Higher: sharper far trees, memory.
     /// Default 256.
     pub cross_resolution: u32,
     /// Distance in metres beyond which no tree is drawn, 100 to 200000. Default 20000.

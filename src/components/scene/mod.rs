@@ -22,10 +22,13 @@ use bevy::{
         lifecycle::Remove,
         observer::On,
         query::{Changed, Has, With},
+        reflect::ReflectComponent,
         schedule::IntoScheduleConfigs,
         system::{Commands, Query, Res},
         world::Ref,
     },
+    prelude::ReflectDefault,
+    reflect::Reflect,
     render::renderer::RenderDevice,
     transform::components::Transform,
 };
@@ -50,7 +53,8 @@ pub use progress::{SceneProgress, SceneState};
 ///
 /// A new value on the same entity replaces the scene once the new one is ready, not before. The entity's transform and
 /// visibility apply to the whole scene. A world can hold several scenes; only one ground is drawn at a time.
-#[derive(Component, Clone, Debug, Default, PartialEq)]
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, Clone, Debug, Default, PartialEq)]
 #[require(Transform, Visibility, SceneProgress)]
 pub struct CanopyScene {
     /// The scene: a file, or a value.
@@ -92,16 +96,18 @@ impl fmt::Display for SceneFailed {
 }
 
 /// The scene that an entity shows. Added next to its [`CanopyScene`] when the scene is ready.
-#[derive(Component, Clone)]
+#[derive(Component, Clone, Reflect)]
+#[reflect(Component, from_reflect = false)]
 pub struct LoadedScene {
-    /// The built scene.
+    /// The built scene. Reflection does not show it: it is the shared result of a build.
+    #[reflect(ignore, clone)]
     pub stage: Arc<Stage>,
     /// Its entities, children of this one.
     pub shown: Shown,
 }
 
 /// Entities that show a stage.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 pub struct Shown {
     /// Its ground.
     pub ground: Entity,
@@ -147,7 +153,9 @@ pub struct ScenePlugin;
 
 impl Plugin for ScenePlugin {
     fn build(&self, app: &mut App) {
-        app.register_type::<SceneProgress>()
+        app.register_type::<CanopyScene>()
+            .register_type::<LoadedScene>()
+            .register_type::<SceneProgress>()
             .add_systems(First, (begin, follow).chain().in_set(CanopySystems::Load))
             .add_observer(remove_scene);
     }
