@@ -34,7 +34,8 @@ use bevy::{
 use chrono::{DateTime, Utc};
 
 use super::{
-    RenderOptions, RenderPlan, RenderReport, adapter, camera, error::AppError, notes::notes, picture::Picture,
+    RenderOptions, RenderPlan, RenderReport, adapter, camera, error::AppError, notes::notes,
+    rendered_image::RenderedImage,
 };
 use crate::{
     assets::Stage,
@@ -296,7 +297,7 @@ impl Renderer {
     ///
     /// # Errors
     /// [`AppError::Render`].
-    pub fn draw(&mut self, stage: &Stage, view: &Viewpoint, instant: DateTime<Utc>) -> Result<Picture, AppError> {
+    pub fn draw(&mut self, stage: &Stage, view: &Viewpoint, instant: DateTime<Utc>) -> Result<RenderedImage, AppError> {
         self.set_instant(stage, instant);
         self.set_view(view);
         self.update()?;
@@ -317,7 +318,7 @@ impl Renderer {
     ///
     /// # Errors
     /// [`AppError::Render`].
-    pub fn read(&self) -> Result<Picture, AppError> {
+    pub fn read(&self) -> Result<RenderedImage, AppError> {
         let render_world = self.app.sub_app(RenderApp).world();
         let device = render_world.resource::<RenderDevice>();
         let queue = render_world.resource::<RenderQueue>();
@@ -330,7 +331,7 @@ impl Renderer {
         self.check_fault()?;
         let pixels = pixels.map_err(|error| AppError::Render(error.to_string()))?;
         let (width, height) = self.size;
-        Ok(Picture { width, height, pixels })
+        Ok(RenderedImage { width, height, pixels })
     }
 }
 

@@ -10,9 +10,9 @@ mod headless;
 mod info;
 mod notes;
 mod parse;
-mod picture;
 mod plan;
 mod reference;
+mod rendered_image;
 mod request;
 mod tone;
 
@@ -22,9 +22,7 @@ pub use fly::fly;
 pub use headless::{Renderer, render};
 pub use info::info;
 pub use parse::{ArgumentError, parse_lighting, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size};
-pub use picture::Picture;
 pub use plan::{Frame, PlanError, RenderPlan};
 pub use reference::reference;
-pub use request::{
-    Clock, FlyOptions, LightGroup, Pictures, ReferenceOptions, RenderOptions, RenderReport, Still, View,
-};
+pub use rendered_image::RenderedImage;
+pub use request::{Clock, FlyOptions, LightGroup, Output, ReferenceOptions, RenderOptions, RenderReport, Still, View};

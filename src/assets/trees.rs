@@ -7,7 +7,7 @@ use crate::{
     progress::Progress,
     scatter::{
         Allometry, Area, Coordinates, Ground, Inventory, InventoryOptions, InventorySpecies, PlacementRules, PlantSize,
-        SizeRule, SpeciesRule, Stand, place, read_inventory, stand_from_inventory,
+        SizeRule, SpeciesRule, Stand, place_trees, read_inventory, stand_from_inventory,
     },
     scene::{Anchor, InventoryTrees, ScatteredTrees, Scene, Species, Trees},
     terrain::{CoordinateSystem, GeoReference, Terrain},
@@ -99,7 +99,7 @@ fn scatter(
         clearings: trees.clearings,
         species,
     };
-    let placement = place(&rules, terrain)?;
+    let placement = place_trees(&rules, terrain)?;
     let report = &placement.report;
     if report.placed < report.wanted {
         progress.warn(&format!(

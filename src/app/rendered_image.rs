@@ -7,7 +7,7 @@ use crate::files::write_whole;
 
 /// A rendered image.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Picture {
+pub struct RenderedImage {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
@@ -16,7 +16,7 @@ pub struct Picture {
     pub pixels: Vec<u8>,
 }
 
-impl Picture {
+impl RenderedImage {
     /// Writes the image as PNG. `notes` are pairs of keyword (Latin-1, 1 to 79 characters) and text.
     ///
     /// The file appears whole or not at all: it is written under a temporary name in the same folder, then renamed.
