@@ -1,5 +1,5 @@
-//! The program, behind the cargo feature `program`: the interactive flight, rendering without a window, the ground truth of
-//! a scene, and what a file holds. The command line fills the requests ([`FlyOptions`], [`RenderOptions`],
+//! The program, behind the cargo feature `program`: the interactive flight, rendering without a window, the ground
+//! truth of a scene, and what a file holds. The command line fills the requests ([`FlyOptions`], [`RenderOptions`],
 //! [`ReferenceOptions`]), and the functions here carry them out.
 
 mod adapter;

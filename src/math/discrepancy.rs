@@ -8,13 +8,13 @@ use glam::DVec2;
 
 use super::MathError;
 
-/// The star discrepancy of `points`, which must lie in [0, 1]². It is 1 if there are no points, since the whole square is
-/// empty.
+/// The star discrepancy of `points`, which must lie in [0, 1]². It is 1 if there are no points, since the whole square
+/// is empty.
 ///
-/// [de Clerck 1986], [Bundschuh & Zhu 1993]: the supremum is reached where each side of the box lies at a coordinate of a
-/// point (or at 1). Sort the points by x, and let ξ be the sorted y of the first `i` of them. Then the discrepancy is the
-/// largest of `k/n − x_i ξ_k` (a closed box, which holds too many points) and `x_{i+1} ξ_{k+1} − k/n` (an open box, which
-/// holds too few).
+/// [de Clerck 1986], [Bundschuh & Zhu 1993]: the supremum is reached where each side of the box lies at a coordinate of
+/// a point (or at 1). Sort the points by x, and let ξ be the sorted y of the first `i` of them. Then the discrepancy is
+/// the largest of `k/n − x_i ξ_k` (a closed box, which holds too many points) and `x_{i+1} ξ_{k+1} − k/n` (an open box,
+/// which holds too few).
 ///
 /// It takes O(n²) time, with an inner loop over contiguous memory (about 50 ms for 4,000 points), and O(n) memory.
 ///

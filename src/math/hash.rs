@@ -2,8 +2,8 @@
 //!
 //! This is a counter-based generator: it applies the finaliser of SplitMix64 ([Steele, Lea, Flood 2014], constants
 //! "variant 13" of [Stafford 2011]) to `key(seed, stream) + golden * index`. So each pair of seed and stream is a
-//! SplitMix64 sequence that can be read at any position. Any thread can compute any tree, and a tree does not change when
-//! its neighbours do.
+//! SplitMix64 sequence that can be read at any position. Any thread can compute any tree, and a tree does not change
+//! when its neighbours do.
 
 use std::f64::consts::TAU;
 
@@ -44,13 +44,14 @@ pub fn unit_f64(seed: u64, index: u64, stream: impl Into<u64>) -> f64 {
     (hash64(seed, index, stream) >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
 }
 
-/// An integer below `count`, uniform to within `count / 2⁶⁴` (multiply and shift, [Lemire 2019]). It is 0 if `count` is 0.
+/// An integer below `count`, uniform to within `count / 2⁶⁴` (multiply and shift, [Lemire 2019]). It is 0 if `count` is
+/// 0.
 pub fn below(seed: u64, index: u64, stream: impl Into<u64>, count: u32) -> u32 {
     ((u128::from(hash64(seed, index, stream)) * u128::from(count)) >> 64) as u32
 }
 
-/// A nearly normal deviate with mean 0 and standard deviation 1, bounded by ±2√3: the sum of four uniform 16-bit numbers
-/// (Irwin–Hall). Only the last step is not integer arithmetic, so the result is the same on every machine.
+/// A nearly normal deviate with mean 0 and standard deviation 1, bounded by ±2√3: the sum of four uniform 16-bit
+/// numbers (Irwin–Hall). Only the last step is not integer arithmetic, so the result is the same on every machine.
 pub fn bell_f32(seed: u64, index: u64, stream: impl Into<u64>) -> f32 {
     let bits = hash64(seed, index, stream);
     let sum: u32 = (0..4).map(|k| (bits >> (16 * k)) as u32 & 0xFFFF).sum();

@@ -1,9 +1,9 @@
 //! Unit vectors as two coordinates: the octahedral encoding [Cigolle et al. 2014, "A Survey of Efficient
 //! Representations for Independent Unit Vectors", 3.1; Meyer et al. 2010].
 //!
-//! The sphere is projected onto an octahedron, and the octahedron's lower half is folded outwards, so that all directions
-//! fill the square -1..=1 x -1..=1. The axis in the middle of the square is preserved exactly. Which axis that is depends
-//! on what is encoded.
+//! The sphere is projected onto an octahedron, and the octahedron's lower half is folded outwards, so that all
+//! directions fill the square -1..=1 x -1..=1. The axis in the middle of the square is preserved exactly. Which axis
+//! that is depends on what is encoded.
 
 use glam::{Vec2, Vec3};
 

@@ -9,8 +9,8 @@
 //! `0 <= Φ - result < 2⁻⁵³`, the result is in [0, 1), and a larger Φ never has a smaller result.
 //!
 //! Base 2 is a bit reversal. Other bases mirror several digits at once through a table, after the digit blocks of
-//! [Kollig & Keller 2002] and [Struckmeier 1995]. For base 3 an entry mirrors seven digits: 2187 entries of two bytes, so
-//! three look-ups are enough for any 32-bit index.
+//! [Kollig & Keller 2002] and [Struckmeier 1995]. For base 3 an entry mirrors seven digits: 2187 entries of two bytes,
+//! so three look-ups are enough for any 32-bit index.
 
 use super::MathError;
 
@@ -65,7 +65,8 @@ pub(super) fn floor_quotient(n: u64, d: u64) -> f64 {
 /// `floor(n / 3²¹ * 2⁵³) * 2⁻⁵³` for `n < 3²¹`, without a division.
 ///
 /// Division by an invariant integer ([Granlund & Montgomery 1994]): with `M = (2¹²⁰ + e) / 3²¹`, `0 < e < 3²¹`,
-/// `n M / 2⁶⁷` exceeds the quotient by `n e / 2⁶⁷ < 3⁴² / 2⁶⁷ < 1` units of 1 / 3²¹, too little to reach the next integer.
+/// `n M / 2⁶⁷` exceeds the quotient by `n e / 2⁶⁷ < 3⁴² / 2⁶⁷ < 1` units of 1 / 3²¹, too little to reach the next
+/// integer.
 #[inline]
 pub(super) fn ternary_quotient(n: u64) -> f64 {
     const M: u128 = (1 << 120) / TERNARY_BLOCK_3 as u128 + 1;
@@ -143,8 +144,8 @@ pub struct RadicalInverse {
     base: u32,
     /// `base` to the power of the number of digits that one table entry mirrors.
     block: u64,
-    /// `ceil(2⁴⁴ / block)`. Its product with a 32-bit index, divided by 2⁴⁴, has the integer part of the quotient, because
-    /// the rounding adds less than `2³² * block / 2⁴⁴ <= 1` units of 1 / `block`.
+    /// `ceil(2⁴⁴ / block)`. Its product with a 32-bit index, divided by 2⁴⁴, has the integer part of the quotient,
+    /// because the rounding adds less than `2³² * block / 2⁴⁴ <= 1` units of 1 / `block`.
     reciprocal: u64,
     /// All numbers below `block`, mirrored; empty if even two digits are too many for a table.
     table: Vec<u16>,

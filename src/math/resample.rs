@@ -1,8 +1,8 @@
 //! Resampling of images in linear light, with colours weighted by alpha.
 //!
-//! Texels have straight alpha (not premultiplied). Each pass computes the premultiplied average and divides by its alpha:
-//! `a = sum(w a_i)`, `c = sum(w a_i c_i) / a`. So passes can be chained (columns after rows, mip after mip). Where nothing
-//! is visible, the colour is still defined: it is the plain average.
+//! Texels have straight alpha (not premultiplied). Each pass computes the premultiplied average and divides by its
+//! alpha: `a = sum(w a_i)`, `c = sum(w a_i c_i) / a`. So passes can be chained (columns after rows, mip after mip).
+//! Where nothing is visible, the colour is still defined: it is the plain average.
 
 use image::{Rgba, RgbaImage};
 use rayon::prelude::*;
@@ -47,8 +47,8 @@ impl Layer {
         encoded.into_flattened()
     }
 
-    /// The image at another size (both sides at least 1): by area average where it shrinks, by linear interpolation where
-    /// it grows.
+    /// The image at another size (both sides at least 1): by area average where it shrinks, by linear interpolation
+    /// where it grows.
     pub fn resampled(&self, width: usize, height: usize) -> Self {
         let columns = taps(self.width, width);
         let rows = taps(self.height, height);

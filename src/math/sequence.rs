@@ -1,6 +1,7 @@
 //! Point sets in the unit square: Halton and Hammersley (Franzke 2005, figure 4.17).
 //!
-//! - Halton ([Halton 1964]): (Φ₂(i), Φ₃(i)). It is a sequence: its first points are even, however many, so a stand can grow.
+//! - Halton ([Halton 1964]): (Φ₂(i), Φ₃(i)). It is a sequence: its first points are even, however many, so a stand can
+//!   grow.
 //! - Hammersley ([Hammersley & Handscomb 1964]): (i/n, Φ₂(i)). It is a set: more even than Halton, but `n` is fixed.
 //!
 //! Star discrepancies are in `benches/sequences.rs`.
@@ -21,8 +22,8 @@ pub fn halton(i: u64) -> DVec2 {
     DVec2::new(radical_inverse_2(i), radical_inverse_3(i))
 }
 
-/// The i-th of the `n` Hammersley points; both coordinates in [0, 1). `i` counts modulo `n`. If `n` is 0, the point is the
-/// origin.
+/// The i-th of the `n` Hammersley points; both coordinates in [0, 1). `i` counts modulo `n`. If `n` is 0, the point is
+/// the origin.
 #[inline]
 pub fn hammersley(i: u64, n: u64) -> DVec2 {
     match i.checked_rem(n) {

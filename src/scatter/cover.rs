@@ -1,5 +1,5 @@
-//! Canopy cover as a map: the fraction of the ground under crowns. It darkens the forest floor where trees are too far away
-//! to be drawn.
+//! Canopy cover as a map: the fraction of the ground under crowns. It darkens the forest floor where trees are too far
+//! away to be drawn.
 
 use std::ops::Range;
 
@@ -51,8 +51,8 @@ impl CoverMap {
 }
 
 impl CoverMap {
-    /// The map, blurred with the weights 1, 2, 1 along both axes and enlarged by a border of one texel, because the light of
-    /// a point does not end at the edge of a texel.
+    /// The map, blurred with the weights 1, 2, 1 along both axes and enlarged by a border of one texel, because the
+    /// light of a point does not end at the edge of a texel.
     pub fn smoothed(&self) -> Self {
         let (columns, rows) = (self.columns as usize, self.rows as usize);
         if self.cover.len() != columns * rows || self.cover.is_empty() {
@@ -172,16 +172,16 @@ struct Crown {
 
 /// Maps the crowns of `stand` on texels of `texel` metres.
 ///
-/// A crown is a full disc with the radius of its variant, scaled. The fraction of a texel that a disc covers is exact along
-/// X, and integrated over slabs along Z (at least 8 per disc and 4 per texel); the area of each disc is preserved. Several
-/// discs cover `1 − Π (1 − share)`, as if they were independent. The map spans `extent`, or all crowns if that is `None`, in
-/// whole texels that begin at multiples of `texel`. Without trees it is empty. It takes about 50 ms for 300,000 trees of
-/// 3 m radius with texels of 8 m (two cores).
+/// A crown is a full disc with the radius of its variant, scaled. The fraction of a texel that a disc covers is exact
+/// along X, and integrated over slabs along Z (at least 8 per disc and 4 per texel); the area of each disc is
+/// preserved. Several discs cover `1 − Π (1 − share)`, as if they were independent. The map spans `extent`, or all
+/// crowns if that is `None`, in whole texels that begin at multiples of `texel`. Without trees it is empty. It takes
+/// about 50 ms for 300,000 trees of 3 m radius with texels of 8 m (two cores).
 ///
 /// # Errors
 /// [`ScatterError::PlantSize`], [`ScatterError::TooManyVariants`], [`ScatterError::UnknownVariant`] for the bounds,
-/// [`ScatterError::Unpackable`] for a scale out of range, [`ScatterError::Size`] for a texel below 1 cm, or so small that
-/// the map would have more than 2²⁶.
+/// [`ScatterError::Unpackable`] for a scale out of range, [`ScatterError::Size`] for a texel below 1 cm, or so small
+/// that the map would have more than 2²⁶.
 pub fn cover_map<S: Crowns>(
     stand: &S,
     bounds: &[PlantSize],
@@ -262,8 +262,8 @@ fn crowns_by_band(crowns: &[Crown], origin: DVec2, texel: f64, rows: usize) -> V
 struct UnitDisc {
     /// Distance of each chord from the centre, -1 to 1, and its half length.
     chords: Vec<(f64, f64)>,
-    /// Factor from a chord's length to its part of the disc's area: the spacing of the chords, minus the small excess of the
-    /// midpoint rule.
+    /// Factor from a chord's length to its part of the disc's area: the spacing of the chords, minus the small excess
+    /// of the midpoint rule.
     depth: f64,
 }
 
@@ -306,8 +306,8 @@ impl BandGrid<'_> {
         let Some(disc) = self.discs.get(UnitDisc::rung(radius)) else { return };
         let rows = texels.len() / self.columns;
         let depth = disc.depth * radius;
-        // The chords are the middles of slabs of equal height. A slab that crosses the border between two rows is divided
-        // between them.
+        // The chords are the middles of slabs of equal height. A slab that crosses the border between two rows is
+        // divided between them.
         let half_slab = radius / disc.chords.len() as f64;
         let per_slab = 0.5 / half_slab;
         let mut row = None;
@@ -319,8 +319,8 @@ impl BandGrid<'_> {
             if !(bottom >= 0.0 && top < rows as f64 && left < right) {
                 continue;
             }
-            // Truncate instead of calling rounding functions, which would cost more than everything else here. `bottom` and
-            // `left` are not negative, and a column that is only touched gets a share of 0.
+            // Truncate instead of calling rounding functions, which would cost more than everything else here. `bottom`
+            // and `left` are not negative, and a column that is only touched gets a share of 0.
             let (first, end) = (left as usize, (right as usize + 1).min(self.columns));
             let border = bottom as i64;
             let above = ((border as f64 - top) * per_slab).clamp(0.0, 1.0);

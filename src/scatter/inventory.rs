@@ -10,9 +10,9 @@
 //! | height | `height`, `h`, `ht`, `tree_height` + `_m`, `_cm`, `_mm` | by suffix, else by option (m) |
 //! | species | `species`, `sp`, `species_name`, `taxon` | |
 //!
-//! Other columns are ignored. The header determines the separator (`,` `;` tab); if it is not the comma, numbers may have
-//! a decimal comma. A byte-order mark, CRLF, quotes, empty lines, lines that begin with `#`, and Latin-1 text are accepted.
-//! Empty cells, `NA` and the like are missing values, and so are a dbh and a height of 0.
+//! Other columns are ignored. The header determines the separator (`,` `;` tab); if it is not the comma, numbers may
+//! have a decimal comma. A byte-order mark, CRLF, quotes, empty lines, lines that begin with `#`, and Latin-1 text are
+//! accepted. Empty cells, `NA` and the like are missing values, and so are a dbh and a height of 0.
 
 use std::path::Path;
 
@@ -21,8 +21,8 @@ use super::{BadValue, ScatterError};
 /// Maximum number of bad cells that an error lists.
 const LISTED: usize = 5;
 
-/// Thickest plausible trunk and tallest plausible tree, metres. Beyond them the unit is wrong: the Árbol del Tule has 14 m,
-/// Hyperion 116 m.
+/// Thickest plausible trunk and tallest plausible tree, metres. Beyond them the unit is wrong: the Árbol del Tule has
+/// 14 m, Hyperion 116 m.
 const MAX_DBH_M: f64 = 15.0;
 const MAX_HEIGHT_M: f64 = 130.0;
 
@@ -112,8 +112,8 @@ pub fn read_inventory(path: &Path, options: InventoryOptions) -> Result<Inventor
 ///
 /// # Errors
 /// [`ScatterError::NoPosition`], [`ScatterError::AmbiguousColumn`] for the header, [`ScatterError::Record`] for lines
-/// with the wrong number of cells, [`ScatterError::BadValues`] for text, infinities, negative sizes and impossible values
-/// in number columns.
+/// with the wrong number of cells, [`ScatterError::BadValues`] for text, infinities, negative sizes and impossible
+/// values in number columns.
 pub fn parse_inventory(bytes: &[u8], name: &str, options: InventoryOptions) -> Result<Inventory, ScatterError> {
     let text = decode(bytes, name)?;
     let separator = separator(&text);

@@ -1,16 +1,17 @@
 //! Places trees by rules.
 //!
-//! Candidates are the points of the sequence, mapped to the area. Those of a low-discrepancy sequence are also shifted by
-//! the seed, modulo one, which leaves them as even as they were [Cranley & Patterson 1976]. A candidate is dropped where
-//! the rules forbid a tree. Since the candidates have the wanted density everywhere, the remaining ones have it wherever
-//! trees may stand.
+//! Candidates are the points of the sequence, mapped to the area. Those of a low-discrepancy sequence are also shifted
+//! by the seed, modulo one, which leaves them as even as they were [Cranley & Patterson 1976]. A candidate is dropped
+//! where the rules forbid a tree. Since the candidates have the wanted density everywhere, the remaining ones have it
+//! wherever trees may stand.
 //!
-//! A minimum distance drops more candidates: of two that are too close, the one with the lower index stays (dart throwing,
-//! [Cook 1986]). Then more candidates follow until the density is met again. Halton and random points continue where they
-//! ended. Hammersley points cannot continue, so a larger set replaces them, and its surplus is removed at random.
+//! A minimum distance drops more candidates: of two that are too close, the one with the lower index stays (dart
+//! throwing, [Cook 1986]). Then more candidates follow until the density is met again. Halton and random points
+//! continue where they ended. Hammersley points cannot continue, so a larger set replaces them, and its surplus is
+//! removed at random.
 //!
-//! Cost: the points and rules run on all threads, the minimum distance on one. One million trees with ground look-ups take
-//! about 0.2 s on two cores, with a minimum distance about 0.5 s.
+//! Cost: the points and rules run on all threads, the minimum distance on one. One million trees with ground look-ups
+//! take about 0.2 s on two cores, with a minimum distance about 0.5 s.
 
 use std::ops::Range;
 
@@ -31,8 +32,8 @@ use crate::math::{
 /// Points per task: two rounds of the ternary table.
 const CHUNK: u64 = 4374;
 
-/// Maximum number of candidates per tree of the full area; then a minimum distance leaves trees out. 64 times 32 million
-/// trees still fit into 32-bit indices.
+/// Maximum number of candidates per tree of the full area; then a minimum distance leaves trees out. 64 times 32
+/// million trees still fit into 32-bit indices.
 const MAX_EFFORT: u64 = 64;
 
 /// A stand and how its rules were met.
@@ -53,8 +54,8 @@ pub struct PlacementReport {
     pub placed: u32,
     /// Candidates tried.
     pub candidates: u64,
-    /// Hectares on which the rules allow trees; margins of clearings count by their density. Estimated from the candidates,
-    /// with a relative error of about one over the square root of the wanted trees, or less.
+    /// Hectares on which the rules allow trees; margins of clearings count by their density. Estimated from the
+    /// candidates, with a relative error of about one over the square root of the wanted trees, or less.
     pub allowed_hectares: f64,
     /// Trees placed per hectare of allowed ground; 0 if there is none.
     pub stems_per_hectare: f64,
@@ -225,8 +226,8 @@ impl<G: Ground + ?Sized> Placer<'_, G> {
         (trees, tried)
     }
 
-    /// Applies the minimum distance to a set of fixed size: takes larger sets until there are enough trees, then thins them
-    /// at random.
+    /// Applies the minimum distance to a set of fixed size: takes larger sets until there are enough trees, then thins
+    /// them at random.
     fn space_set(&self, first: Vec<Tree>, full: u64) -> (Vec<Tree>, u64) {
         let wanted = first.len();
         let (mut trees, mut count) = (first, full);

@@ -42,8 +42,8 @@ pub struct ScatteredTrees {
     pub slope_limit: f64,
     /// Range of wooded ground heights in metres above the terrain's datum. Default: everywhere.
     pub elevation: Option<(f64, f64)>,
-    /// The wooded part of the terrain, `(west: ..., south: ..., east: ..., north: ...)` in metres from its centre, east and
-    /// north positive. Default: all of it.
+    /// The wooded part of the terrain, `(west: ..., south: ..., east: ..., north: ...)` in metres from its centre, east
+    /// and north positive. Default: all of it.
     pub area: Option<Area>,
     /// Treeless patches where smooth noise is high: `(wavelength: 400, share: 0.1, edge: 0.15)`. Default: none.
     pub clearings: Option<ClearingNoise>,

@@ -26,9 +26,9 @@ use crate::{
 
 /// Loads [`PlantAsset`]s: glTF files (.glb, .gltf) and species files (.species.ron).
 ///
-/// A species file has its own lighting, gloss and kind of leaf; the other bake values of [`PlantSettings`] apply to it too. The
-/// loader is registered only for the ending `species.ron`, because `glb` belongs to Bevy's own loader; any file can be
-/// loaded as a [`PlantAsset`] by its type.
+/// A species file has its own lighting, gloss and kind of leaf; the other bake values of [`PlantSettings`] apply to it
+/// too. The loader is registered only for the ending `species.ron`, because `glb` belongs to Bevy's own loader; any
+/// file can be loaded as a [`PlantAsset`] by its type.
 #[derive(Clone, Copy, Debug, Default, TypePath)]
 pub struct PlantLoader;
 

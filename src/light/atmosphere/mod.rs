@@ -5,18 +5,19 @@
 //! that assumes isotropic scattering, and that the neighbourhood of a point is lit as the point itself (section 5.5).
 //!
 //! It differs from the paper, because it runs only when the sun has moved, on the CPU:
-//! - The multiple-scattering table has 64 x 32 texels, dense at the horizon, computed from 256 directions per texel. This
-//!   table and the transmittance table interpolate logarithms. The paper's linear tables of 32 x 32 blur twilight over 4
-//!   degrees.
+//! - The multiple-scattering table has 64 x 32 texels, dense at the horizon, computed from 256 directions per texel.
+//!   This table and the transmittance table interpolate logarithms. The paper's linear tables of 32 x 32 blur twilight
+//!   over 4 degrees.
 //! - The sun is a disc for the shadow of the Earth, too, so that radiance is continuous everywhere.
-//! - Below the horizon, the ground, lit by sun and sky, shows through a haze that starts with the radiance of the horizon.
+//! - Below the horizon, the ground, lit by sun and sky, shows through a haze that starts with the radiance of the
+//!   horizon.
 //!
 //! # Known errors
-//! The assumption of isotropic and local scattering is weak where illumination changes over a mean free path, in twilight.
-//! Compared with published horizontal illuminances of clear skies (the tests of this room), the model is within 6 % for a
-//! sun above 30 degrees, and too bright by 20 % at 10 degrees, 30 % at 0, 50 % at -6 and 15 % at -12. Below -15 degrees
-//! nearly all light is that of the night sky. Rays in the air are not refracted; the position of the sun includes
-//! refraction. Polarisation is ignored (up to 10 % of Rayleigh radiance).
+//! The assumption of isotropic and local scattering is weak where illumination changes over a mean free path, in
+//! twilight. Compared with published horizontal illuminances of clear skies (the tests of this room), the model is
+//! within 6 % for a sun above 30 degrees, and too bright by 20 % at 10 degrees, 30 % at 0, 50 % at -6 and 15 % at -12.
+//! Below -15 degrees nearly all light is that of the night sky. Rays in the air are not refracted; the position of the
+//! sun includes refraction. Polarisation is ignored (up to 10 % of Rayleigh radiance).
 
 mod ground;
 mod multiple;
@@ -36,9 +37,9 @@ use self::transmittance::{Level, TransmittanceLut};
 use super::error::LightError;
 use super::sun::{SUN_ANGULAR_RADIUS, disc_fraction};
 
-/// Steps along a view ray, quadratically spaced. The error of a clear sky's radiance against 800 steps is below 0.5 % by
-/// day and below 7 % at dusk (worst with the sun 8 degrees below the horizon, where few steps straddle the Earth's shadow).
-/// Half as many steps take half the time and have about three times the error.
+/// Steps along a view ray, quadratically spaced. The error of a clear sky's radiance against 800 steps is below 0.5 %
+/// by day and below 7 % at dusk (worst with the sun 8 degrees below the horizon, where few steps straddle the Earth's
+/// shadow). Half as many steps take half the time and have about three times the error.
 const VIEW_STEPS: usize = 40;
 
 /// Angle below the horizon, radians, over which the haze decreases to 1/e.
@@ -95,8 +96,8 @@ impl Atmosphere {
         self.radiance_with_steps(view, sun, observer_height_m, VIEW_STEPS)
     }
 
-    /// [`Atmosphere::radiance`] with another number of steps along the ray, 1 to 10,000, to measure the error of the default
-    /// (40).
+    /// [`Atmosphere::radiance`] with another number of steps along the ray, 1 to 10,000, to measure the error of the
+    /// default (40).
     pub fn radiance_with_steps(&self, view: Vec3, sun: Vec3, observer_height_m: f64, steps: usize) -> Vec3 {
         let (view, sun) = (unit(view), unit(sun));
         let steps = steps.clamp(1, 10_000);
@@ -114,14 +115,14 @@ impl Atmosphere {
     }
 
     /// Illuminance in lux, per channel, of the sun's disc on a surface at the observer that faces it: above-air
-    /// illuminance times transmittance times the fraction of the disc above the horizontal. The transmittance is that of
-    /// the middle of the visible part, so that the illuminance decreases smoothly to zero while the disc sets.
+    /// illuminance times transmittance times the fraction of the disc above the horizontal. The transmittance is that
+    /// of the middle of the visible part, so that the illuminance decreases smoothly to zero while the disc sets.
     pub fn sun_illuminance(&self, sun: Vec3, observer_height_m: f64) -> Vec3 {
         self.params.solar_illuminance * self.disc_transmittance(sun, observer_height_m)
     }
 
-    /// Transmittance, 0 to 1 per channel, of air and horizon for the light of a disc as large as the sun (the moon's size
-    /// differs by 3 %) in the unit direction `light`.
+    /// Transmittance, 0 to 1 per channel, of air and horizon for the light of a disc as large as the sun (the moon's
+    /// size differs by 3 %) in the unit direction `light`.
     pub fn disc_transmittance(&self, light: Vec3, observer_height_m: f64) -> Vec3 {
         let elevation = f64::from(unit(light).y).clamp(-1.0, 1.0).asin();
         let fraction = disc_fraction(elevation, SUN_ANGULAR_RADIUS);
@@ -136,14 +137,14 @@ impl Atmosphere {
         self.transmittance.sample(&self.observer_level(observer_height_m), middle.sin()) * fraction as f32
     }
 
-    /// Transmittance, 0 to 1 per channel, from the observer to space along the unit direction `view`. A direction below the
-    /// horizontal has that of the horizontal.
+    /// Transmittance, 0 to 1 per channel, from the observer to space along the unit direction `view`. A direction below
+    /// the horizontal has that of the horizontal.
     pub fn transmittance(&self, view: Vec3, observer_height_m: f64) -> Vec3 {
         self.transmittance.sample(&self.observer_level(observer_height_m), f64::from(unit(view).y).max(0.0))
     }
 
-    /// Illuminance in lux, per channel, of horizontal ground at sea level by the sky alone (without the disc), from a table
-    /// over the sun's elevation. Never negative; continuous.
+    /// Illuminance in lux, per channel, of horizontal ground at sea level by the sky alone (without the disc), from a
+    /// table over the sun's elevation. Never negative; continuous.
     pub fn diffuse_illuminance(&self, sun: Vec3) -> Vec3 {
         self.ground.sample(f64::from(unit(sun).y)) * self.params.solar_illuminance
     }
@@ -167,8 +168,8 @@ impl Atmosphere {
         self.transmittance.level(self.observer_radius(height_m))
     }
 
-    /// Fraction of the sun's light, 0 to 1 per channel, that reaches a point where the cosine of the sun's zenith angle is
-    /// `mu`. The edge of the Earth's shadow is as wide as the disc.
+    /// Fraction of the sun's light, 0 to 1 per channel, that reaches a point where the cosine of the sun's zenith angle
+    /// is `mu`. The edge of the Earth's shadow is as wide as the disc.
     fn sunlight(&self, level: &Level, mu: f64) -> Vec3 {
         let sin_horizon = level.sin_horizon;
         let mu_horizon = -(1.0 - sin_horizon * sin_horizon).max(0.0).sqrt();
@@ -187,8 +188,8 @@ impl Atmosphere {
         self.march(r, mu, length, steps)
     }
 
-    /// Segments from radius `r` with zenith cosine `mu < 0` to the ground. A ray that misses the curved ground ends at its
-    /// nearest point to it, as on a plain.
+    /// Segments from radius `r` with zenith cosine `mu < 0` to the ground. A ray that misses the curved ground ends at
+    /// its nearest point to it, as on a plain.
     fn march_ground(&self, r: f64, mu: f64, steps: usize) -> (Vec<Segment>, Vec3) {
         let ground = self.params.ground_radius_m;
         let length = -r * mu - (r * r * (mu * mu - 1.0) + ground * ground).max(0.0).sqrt();
@@ -223,8 +224,8 @@ impl Atmosphere {
         (segments, transmittance)
     }
 
-    /// Radiance, per unit of above-air illuminance, that the segments of the ray from radius `r` towards `view` scatter to
-    /// the observer.
+    /// Radiance, per unit of above-air illuminance, that the segments of the ray from radius `r` towards `view` scatter
+    /// to the observer.
     fn in_scatter(&self, segments: &[Segment], r: f64, view: Vec3, sun: Vec3) -> Vec3 {
         let cosine = f64::from(view.dot(sun)).clamp(-1.0, 1.0);
         let rayleigh_phase = rayleigh_phase(cosine as f32);
@@ -239,7 +240,8 @@ impl Atmosphere {
         sum
     }
 
-    /// Radiance, per unit of above-air illuminance, of the lit ground behind `segments`, whose transmittance is `through`.
+    /// Radiance, per unit of above-air illuminance, of the lit ground behind `segments`, whose transmittance is
+    /// `through`.
     fn ground_seen(&self, segments: &[Segment], through: Vec3, r: f64, view: Vec3, sun: Vec3) -> Vec3 {
         let direct = self.disc_transmittance(sun, 0.0) * sun.y.max(0.0);
         let ground = self.params.ground_albedo / PI * (direct + self.ground.sample(f64::from(sun.y)));

@@ -1,8 +1,8 @@
 //! Multiple scattering: Hillaire 2020, section 5.5, eq. 5 to 10.
 //!
-//! The table holds `L_2nd / (1 - f_ms)` by the height of a point and the zenith angle of the sun: the light that reaches
-//! the point after its surroundings scattered or reflected it once, times the sum of the geometric series of all further
-//! scatterings. It assumes isotropic scattering.
+//! The table holds `L_2nd / (1 - f_ms)` by the height of a point and the zenith angle of the sun: the light that
+//! reaches the point after its surroundings scattered or reflected it once, times the sum of the geometric series of
+//! all further scatterings. It assumes isotropic scattering.
 
 use std::f32::consts::PI;
 
@@ -55,8 +55,8 @@ pub(super) fn ln(v: Vec3) -> Vec3A {
     v.max(Vec3::splat(1e-30)).map(f32::ln).into()
 }
 
-/// The rays of a point in all directions of half the sphere. The other half is its mirror image, because the sun lies in
-/// the plane between them.
+/// The rays of a point in all directions of half the sphere. The other half is its mirror image, because the sun lies
+/// in the plane between them.
 struct Rays {
     r: f64,
     rays: Vec<Ray>,

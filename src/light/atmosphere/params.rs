@@ -6,13 +6,13 @@ use crate::light::error::{LightError, check_range};
 
 /// Coefficients of an atmosphere, one for each of the Rec. 709 primaries. The default is clear air.
 ///
-/// The usual coefficients (Bruneton & Neyret 2008, Hillaire 2020) are those at 680, 550 and 440 nm. But the red primary of
-/// Rec. 709 does not respond at 680 nm, and that wavelength misses the absorption of ozone, which peaks at 600 nm: dusk
-/// turns purple. The default coefficients here are means over the spectrum of Rayleigh scattering (13.558e-6 at 550 nm,
-/// exponent -4.08) and of ozone absorption (Serdyuchenko et al. 2014; 1.881e-6 at 550 nm). The weights are sunlight
-/// (Planck, 5778 K) times the response of each primary (CIE 1931 observer as fitted by Wyman, Sloan & Shirley 2013, through
-/// the matrix of BT.709). They give the exact colour of thin air. Through five air masses, the error of the mean is below
-/// 3 %.
+/// The usual coefficients (Bruneton & Neyret 2008, Hillaire 2020) are those at 680, 550 and 440 nm. But the red primary
+/// of Rec. 709 does not respond at 680 nm, and that wavelength misses the absorption of ozone, which peaks at 600 nm:
+/// dusk turns purple. The default coefficients here are means over the spectrum of Rayleigh scattering (13.558e-6 at
+/// 550 nm, exponent -4.08) and of ozone absorption (Serdyuchenko et al. 2014; 1.881e-6 at 550 nm). The weights are
+/// sunlight (Planck, 5778 K) times the response of each primary (CIE 1931 observer as fitted by Wyman, Sloan & Shirley
+/// 2013, through the matrix of BT.709). They give the exact colour of thin air. Through five air masses, the error of
+/// the mean is below 3 %.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AtmosphereParams {
     /// Radius of the planet in metres, 1e6 to 1e8.
@@ -52,11 +52,11 @@ impl Default for AtmosphereParams {
 }
 
 impl AtmosphereParams {
-    /// The Earth (profiles: Hillaire 2020, table 1; Bruneton 2017) with the aerosol for a meteorological visibility of `km`
-    /// kilometres at sea level, clamped to 2 to 250. By Koschmieder's law (1924) the extinction at 550 nm is
+    /// The Earth (profiles: Hillaire 2020, table 1; Bruneton 2017) with the aerosol for a meteorological visibility of
+    /// `km` kilometres at sea level, clamped to 2 to 250. By Koschmieder's law (1924) the extinction at 550 nm is
     /// 3.912 / visibility. What remains after Rayleigh scattering is aerosol with a single-scattering albedo of 0.9 and an
-    /// Angstrom exponent of 1.3 (continental). 50 km is a clear day, with an aerosol optical depth of 0.077; 250 km means
-    /// almost no aerosol.
+    /// Angstrom exponent of 1.3 (continental). 50 km is a clear day, with an aerosol optical depth of 0.077; 250 km
+    /// means almost no aerosol.
     pub fn with_visibility_km(km: f64) -> Self {
         let rayleigh_scattering = Vec3::new(7.112e-6, 13.755e-6, 33.06e-6);
         let km = if km.is_finite() { km.clamp(2.0, 250.0) } else { 50.0 };

@@ -1,9 +1,9 @@
 //! The sky as a texture: radiance over azimuth and elevation, for the sky pass, the fog and the light.
 //!
 //! # Parametrisation (the shader repeats it)
-//! `W = 129` columns and `H = 97` rows, row-major, with texel centres on the grid: the first and last columns and rows lie
-//! at the ends of their ranges. With `a` the horizontal unit vector `(x, z)` towards the sun ([`SkyView::axis`]) and a
-//! unit view direction `d`:
+//! `W = 129` columns and `H = 97` rows, row-major, with texel centres on the grid: the first and last columns and rows
+//! lie at the ends of their ranges. With `a` the horizontal unit vector `(x, z)` towards the sun ([`SkyView::axis`])
+//! and a unit view direction `d`:
 //!
 //! ```text
 //! h   = d.xz                                        (need not be normalised; at the zenith any azimuth will do)
@@ -17,9 +17,9 @@
 //! ```
 //!
 //! The horizon is the horizontal, whatever the height of the observer. (Hillaire 2020, 5.3, has the same square root in
-//! elevation, but linear azimuths.) A texel is 0.02 degrees high at the horizon and 2.5 degrees at the zenith. It is 0.04
-//! degrees wide at the sun's azimuth and 5.6 degrees opposite. The error of the interpolated radiance is below 0.1 % on
-//! average and 1.3 % at worst, at dusk.
+//! elevation, but linear azimuths.) A texel is 0.02 degrees high at the horizon and 2.5 degrees at the zenith. It is
+//! 0.04 degrees wide at the sun's azimuth and 5.6 degrees opposite. The error of the interpolated radiance is below
+//! 0.1 % on average and 1.3 % at worst, at dusk.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -112,8 +112,8 @@ impl SkyView {
         });
     }
 
-    /// The texels times `scale` as RGBA with alpha 1, for a texture of format `Rgba16Float`. `scale` is an exposure that
-    /// keeps values within half precision; values beyond 65,504 are clamped to it.
+    /// The texels times `scale` as RGBA with alpha 1, for a texture of format `Rgba16Float`. `scale` is an exposure
+    /// that keeps values within half precision; values beyond 65,504 are clamped to it.
     pub fn to_rgba16f(&self, scale: f32) -> Vec<[f16; 4]> {
         let half = |v: f32| f16::from_f32((v * scale).clamp(0.0, 65_504.0));
         self.texels.iter().map(|t| [half(t[0]), half(t[1]), half(t[2]), f16::ONE]).collect()
@@ -121,9 +121,9 @@ impl SkyView {
 }
 
 impl Atmosphere {
-    /// The sky, without the disc, lit by the sun or the moon in the unit direction `light` with the above-air illuminance
-    /// `light_illuminance` (lux per channel). Its texels have the values of [`Atmosphere::radiance`], except for coarser
-    /// steps towards the ground.
+    /// The sky, without the disc, lit by the sun or the moon in the unit direction `light` with the above-air
+    /// illuminance `light_illuminance` (lux per channel). Its texels have the values of [`Atmosphere::radiance`],
+    /// except for coarser steps towards the ground.
     pub fn sky_view(&self, light: Vec3, light_illuminance: Vec3, observer_height_m: f64) -> SkyView {
         self.sky_view_with_steps(light, light_illuminance, observer_height_m, VIEW_STEPS)
     }
@@ -141,7 +141,8 @@ impl Atmosphere {
         let r = self.observer_radius(observer_height_m);
         let mut view = SkyView { axis: SkyView::axis_of(light), texels: Vec::new() };
         let middle = (SkyView::WIDTH - 1) / 2;
-        // The sky is symmetric about the plane of the sun, so only the middle column and those to its right are computed.
+        // The sky is symmetric about the plane of the sun, so only the middle column and those to its right are
+        // computed.
         let half: Vec<Vec3> = (0..=SkyView::HORIZON_ROW)
             .into_par_iter()
             .flat_map_iter(|row| {

@@ -1,8 +1,8 @@
 //! Transmittance from a point of the atmosphere to its top, as a table of 256 by 64 optical depths.
 //!
-//! It is parametrised by distances, after Bruneton & Neyret 2008 in the form of Bruneton 2017 (4.1), as in Hillaire 2020
-//! (5.2). The table holds optical depths instead of transmittances, because they interpolate well at the horizon, where
-//! transmittance falls by orders of magnitude. That is where the light of twilight passes.
+//! It is parametrised by distances, after Bruneton & Neyret 2008 in the form of Bruneton 2017 (4.1), as in Hillaire
+//! 2020 (5.2). The table holds optical depths instead of transmittances, because they interpolate well at the horizon,
+//! where transmittance falls by orders of magnitude. That is where the light of twilight passes.
 
 use glam::{FloatExt, Vec3, Vec3A};
 use rayon::prelude::*;
@@ -53,8 +53,8 @@ impl TransmittanceLut {
         }
     }
 
-    /// Transmittance from a level to the top along a ray with the zenith cosine `mu`. A ray that would hit the ground has the
-    /// transmittance of the horizon: the caller is responsible for visibility.
+    /// Transmittance from a level to the top along a ray with the zenith cosine `mu`. A ray that would hit the ground
+    /// has the transmittance of the horizon: the caller is responsible for visibility.
     pub fn sample(&self, level: &Level, mu: f64) -> Vec3 {
         let Level { r, rho, row, .. } = *level;
         let distance = -r * mu + (r * r * (mu * mu - 1.0) + self.top * self.top).max(0.0).sqrt();
@@ -102,8 +102,8 @@ pub(super) fn bilinear(table: &[Vec3A], width: usize, x: f64, y: f64) -> Vec3 {
 }
 
 /// The table axis that resolves twilight: the cosine of the sun's zenith angle in 64 texels. 40 of them are linear from
-/// -0.42 (the sun 25 degrees below the horizon, where its light does not reach the air) to 0. Above, the rest follow the
-/// square root of the cosine.
+/// -0.42 (the sun 25 degrees below the horizon, where its light does not reach the air) to 0. Above, the rest follow
+/// the square root of the cosine.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SunAxis;
 

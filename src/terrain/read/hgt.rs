@@ -1,4 +1,5 @@
-//! SRTM `.hgt` files: 16-bit big-endian heights of one square degree, whose name gives their location [USGS, "SRTM Topo"].
+//! SRTM `.hgt` files: 16-bit big-endian heights of one square degree, whose name gives their location
+//! [USGS, "SRTM Topo"].
 
 use glam::DVec2;
 

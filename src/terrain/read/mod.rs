@@ -70,8 +70,8 @@ pub struct ImageScale {
 /// header alone allocates nothing.
 ///
 /// # Errors
-/// See [`TerrainError`]: a file that cannot be read, has an unknown format, is broken, has no data, has no known coordinate
-/// system, or has fewer than two rows or columns. No input makes this function panic.
+/// See [`TerrainError`]: a file that cannot be read, has an unknown format, is broken, has no data, has no known
+/// coordinate system, or has fewer than two rows or columns. No input makes this function panic.
 pub fn read_terrain(path: &Path, options: &ReadOptions) -> Result<(Terrain, Vec<Warning>), TerrainError> {
     let io = |source| TerrainError::Io { path: path.to_owned(), source };
     let mut file = File::open(path).map_err(io)?;
@@ -82,8 +82,8 @@ pub fn read_terrain(path: &Path, options: &ReadOptions) -> Result<(Terrain, Vec<
     Source { path, length, bytes: None, options }.read(&start)
 }
 
-/// Reads a terrain from the bytes of a file, as [`read_terrain`] reads the file itself. `name` is the name of the file: it
-/// is used in messages, and it gives the location of an `.hgt` file.
+/// Reads a terrain from the bytes of a file, as [`read_terrain`] reads the file itself. `name` is the name of the file:
+/// it is used in messages, and it gives the location of an `.hgt` file.
 ///
 /// # Errors
 /// Those of [`read_terrain`].
