@@ -25,10 +25,10 @@ pub struct Job {
 }
 
 impl Job {
-    /// Starts to build the scene of `request`.
-    pub fn start(request: &CanopyScene) -> Self {
+    /// Starts to build the scene of `request`, for a device that holds at most `most_trees` trees.
+    pub fn start(request: &CanopyScene, most_trees: Option<usize>) -> Self {
         let request = request.clone();
-        Self::run(move |progress| build(&request, progress))
+        Self::run(move |progress| build(&request, most_trees, progress))
     }
 
     fn run(work: impl FnOnce(&mut Reporter) -> Result<Stage, StageError> + Send + 'static) -> Self {
@@ -54,8 +54,8 @@ impl Job {
     }
 }
 
-fn build(request: &CanopyScene, progress: &mut Reporter) -> Result<Stage, StageError> {
-    Stage::build(&request.overrides.applied(request.source.read()?), progress)
+fn build(request: &CanopyScene, most_trees: Option<usize>, progress: &mut Reporter) -> Result<Stage, StageError> {
+    Stage::build_within(&request.overrides.applied(request.source.read()?), most_trees, progress)
 }
 
 /// Reports the progress of the build to its [`Job`].
@@ -117,7 +117,7 @@ mod tests {
     fn a_build_is_cancelled_when_its_job_is_dropped() -> Result<(), Box<dyn std::error::Error>> {
         let (sender, outcome) = channel();
         let job = Job::run(move |progress| {
-            sender.send(build(&many(), progress).map(drop)).ok();
+            sender.send(build(&many(), None, progress).map(drop)).ok();
             Err(StageError::Cancelled)
         });
         let at_plants = |event: &BuildEvent| matches!(event, BuildEvent::Begin(step, _) if step == "Plants");
