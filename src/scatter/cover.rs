@@ -440,3 +440,15 @@ impl BandGrid<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_with_too_few_texels_is_open_ground_where_they_are_missing() {
+        let map = CoverMap { origin: DVec2::ZERO, texel: 1.0, columns: 2, rows: 2, cover: vec![255] };
+        assert_eq!((map.at(DVec2::new(0.5, 0.5)), map.at(DVec2::new(1.5, 1.5))), (1.0, 0.0));
+        assert_eq!((map.smoothed(), map.widened(10.0)), (map.clone(), map.clone()));
+    }
+}
