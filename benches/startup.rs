@@ -18,7 +18,7 @@ use bevy::ecs::{
     query::{Or, With},
 };
 use canopy::{
-    app::{Pictures, RenderOptions, RenderPlan, Renderer, Still, View},
+    app::{Output, RenderOptions, RenderPlan, Renderer, Still, View},
     assets::Stage,
     progress::Progress,
     render::components::{Forest, Ground},
@@ -167,9 +167,10 @@ fn turn(arguments: &Arguments) -> anyhow::Result<()> {
 fn first_view(arguments: &Arguments, scene: &Scene, stage: &Stage) -> anyhow::Result<Viewpoint> {
     let options = RenderOptions {
         scene: arguments.scene.as_path().into(),
-        pictures: Pictures::Stills(vec![Still { out: "picture.png".into(), at: None }]),
+        output: Output::Stills(vec![Still { out: "picture.png".into(), at: None }]),
         view: View::Scene,
         size: arguments.size,
+        resume: false,
         overrides: Overrides::default(),
         adapter: None,
         quiet: true,

@@ -1,11 +1,14 @@
 //! The one integration binary: every room's tests, the shaders, the pictures and what the program must withstand.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
+
 mod app;
 mod bake;
 mod cli;
 mod front_door;
 mod grow;
 mod implicit;
+mod interrupts;
 mod layering;
 mod library;
 mod light;

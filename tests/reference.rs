@@ -2,13 +2,14 @@
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use canopy::light::moon::MoonSetting;
 use canopy::light::{Atmosphere, AtmosphereParams, LightSettings, LightState, Observer, SkyView, SunPosition};
 use canopy::plant::grow::{GrowParameters, grow};
 use canopy::plant::{Gloss, PartKind, Plant, PlantMaterial, PlantMesh, PlantPart};
 use canopy::reference::{
-    Camera, Development, Disc, Environment, Film, Fog, Ground, GroundColor, GroundShape, Instance, Light, Normals,
+    Camera, Disc, DisplayTransform, Environment, Film, Fog, Ground, GroundColor, GroundShape, Instance, Light, Normals,
     PathTracer, ReferenceError, ReferenceScene, Shot, SurfaceSample, TraceSettings, WorldRay,
 };
 use canopy::scene::Viewpoint;
@@ -485,6 +486,24 @@ fn the_same_bytes_with_any_threads_and_however_interrupted() {
 }
 
 #[test]
+fn a_trace_that_is_stopped_in_a_pass_drops_that_pass_alone() {
+    let scene = grove(&tree(), DVec3::ZERO);
+    let tracer = PathTracer::new(&scene, &sunny(), TraceSettings::default()).unwrap();
+    // Six tiles of 16 x 16 pixels, so that 15 questions are two passes and half of the third.
+    let shot = grove_shot(DVec3::ZERO, (37, 23));
+    let go_on = &mut |_: &Film| ControlFlow::Continue(());
+    for (questions, samples) in [(0, 0), (1, 0), (6, 1), (15, 2)] {
+        let asked = AtomicUsize::new(0);
+        let stop = || asked.fetch_add(1, Ordering::Relaxed) >= questions;
+        let mut part = Film::new(&shot).unwrap();
+        tracer.render_unless(&shot, &mut part, 4, &stop, go_on).unwrap();
+        assert_eq!(part.samples(), samples, "after {questions} questions");
+        tracer.render(&shot, &mut part, 4, go_on).unwrap();
+        assert!(part == film(&tracer, &shot, 4), "after {questions} questions");
+    }
+}
+
+#[test]
 fn checkpoints_that_are_stale_or_damaged_are_refused() {
     let (oak, other) = (tree(), leaves(&[1.0], 1.0, 0.5, 0.5));
     let scene = grove(&oak, DVec3::ZERO);
@@ -584,7 +603,7 @@ fn strange_scenes_give_finite_pictures_or_errors() {
         for position in [DVec3::new(0.2, 0.3, 3.0), DVec3::ZERO, DVec3::new(0.0, -5.0, 0.0), DVec3::splat(1e9)] {
             let film = film(&tracer, &shot(position, 0.0, 0.0, (8, 8)), 4);
             assert!(film.radiance().iter().all(|pixel| pixel.is_finite() && pixel.min_element() >= 0.0));
-            assert_eq!(film.develop(&Development::of(&daylight_once(), None)).len(), 3 * 64);
+            assert_eq!(film.display(&DisplayTransform::of(&daylight_once(), None)).len(), 3 * 64);
         }
         assert!(tracer.vertex_radiance(1, 0, &[0, 3, 4], 4).unwrap().iter().flatten().all(|value| value.is_finite()));
         assert!(tracer.vertex_radiance(1, 0, &[5], 4).is_err());

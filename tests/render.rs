@@ -9,7 +9,7 @@ mod plugins;
 mod shadows;
 mod world;
 
-use canopy::app::{Picture, Renderer};
+use canopy::app::{RenderedImage, Renderer};
 use canopy::assets::Stage;
 use canopy::scene::Viewpoint;
 
@@ -40,7 +40,7 @@ fn showing(stage: &Stage) -> Renderer {
 }
 
 #[track_caller]
-fn draw(renderer: &mut Renderer, stage: &Stage, view: &Viewpoint, at: &str) -> Picture {
+fn draw(renderer: &mut Renderer, stage: &Stage, view: &Viewpoint, at: &str) -> RenderedImage {
     match renderer.draw(stage, view, instant(at)) {
         Ok(picture) => picture,
         Err(error) => panic!("{error}"),
@@ -49,7 +49,7 @@ fn draw(renderer: &mut Renderer, stage: &Stage, view: &Viewpoint, at: &str) -> P
 
 /// Another frame of what is there.
 #[track_caller]
-fn again(renderer: &mut Renderer) -> Picture {
+fn again(renderer: &mut Renderer) -> RenderedImage {
     match renderer.update().and_then(|()| renderer.read()) {
         Ok(picture) => picture,
         Err(error) => panic!("{error}"),

@@ -77,14 +77,21 @@ impl CanopyOrigin {
 ///
 /// Its global translation, in the scene's frame (not moved by [`CanopyOrigin`]), is added to `origin`; it is drawn if
 /// its inherited visibility and its render layers let the camera see it. Rotation and scale have no effect.
-#[derive(Component, Clone, Debug)]
+///
+/// Reflection does not show the shared lists: nothing in them can be edited one by one, since they belong together and
+/// were packed for the device. A program replaces them as a whole.
+#[derive(Component, Clone, Debug, Reflect)]
+#[reflect(Component, Debug, from_reflect = false)]
 #[require(Transform, Visibility)]
 pub struct Forest {
     /// The trees and their positions.
+    #[reflect(ignore, clone)]
     pub stand: Arc<PackedStand>,
     /// The plants, indexed by the trees' variant; at most 1,024.
+    #[reflect(ignore, clone)]
     pub plants: Arc<Vec<BakedPlant>>,
     /// How the sun lights each plant; [`SunLight::LeafShader`] beyond the end of the list.
+    #[reflect(ignore, clone)]
     pub suns: Arc<[SunLight]>,
     /// Scene position in metres of the stand's own origin.
     pub origin: DVec3,
@@ -97,12 +104,17 @@ pub struct Forest {
 /// The ground under everything. Only one is drawn at a time: the first visible one.
 ///
 /// As for a [`Forest`], its global translation, inherited visibility and render layers take effect.
-#[derive(Component, Clone, Debug)]
+///
+/// Reflection does not show the shared maps, which a program replaces as a whole.
+#[derive(Component, Clone, Debug, Reflect)]
+#[reflect(Component, Debug, from_reflect = false)]
 #[require(Transform, Visibility)]
 pub struct Ground {
     /// Heights; scene metres, origin at the terrain's centre.
+    #[reflect(ignore, clone)]
     pub terrain: Arc<Terrain>,
     /// Canopy cover, if a forest stands on it.
+    #[reflect(ignore, clone)]
     pub cover: Option<Arc<CoverMap>>,
     /// Maximum distance in pixels between the drawn and the true surface, 0.25 to 32. Lower: more triangles.
     pub error_pixels: f64,
@@ -162,6 +174,7 @@ impl Plugin for ComponentsPlugin {
             ExtractComponentPlugin::<ViewOptions>::default(),
         ))
         .register_type::<(CanopyCamera, CanopyOrigin, SunShadowSettings, ViewOptions, CastsCanopyShadow)>()
+        .register_type::<(Forest, Ground)>()
         .init_resource::<CanopyOrigin>();
     }
 }

@@ -74,8 +74,9 @@ pub fn extract_scene(
     };
     scene.forests.clear();
     for (entity, forest, placed) in forests.iter().filter(|(.., placed)| seen(placed)) {
-        let origin = forest.origin + translation(placed.0);
-        scene.forests.push((entity, Forest { origin, ..forest.clone() }));
+        let mut forest = Forest { origin: forest.origin + translation(placed.0), ..forest.clone() };
+        forest.levels.sanitize();
+        scene.forests.push((entity, forest));
     }
     scene.forests.sort_by_key(|(entity, _)| *entity);
     let visible = || grounds.iter().filter(|(.., placed)| seen(placed));

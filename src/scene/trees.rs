@@ -1,6 +1,6 @@
 //! The trees of a scene: scattered by rule, read from an inventory, or none.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use glam::DVec2;
@@ -23,8 +23,11 @@ pub enum Trees {
     Inventory(InventoryTrees),
 }
 
-/// Placement rules.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+/// Placement rules for all species of a scene.
+///
+/// [`PlacementRules`](crate::scatter::PlacementRules) are the same for known ground and plants: angles in radians, the
+/// area cut to the terrain, and the scene's seed and species.
+#[derive(Clone, Debug, PartialEq, Deserialize, bevy::reflect::Reflect)]
 #[serde(deny_unknown_fields, default)]
 pub struct ScatteredTrees {
     /// Stems per hectare of ground where trees stand (clearings, cliffs and the like not counted), 0.01 to 100000.
@@ -39,8 +42,8 @@ pub struct ScatteredTrees {
     pub slope_limit: f64,
     /// Range of wooded ground heights in metres above the terrain's datum. Default: everywhere.
     pub elevation: Option<(f64, f64)>,
-    /// The wooded part of the terrain, `(west: ..., south: ..., east: ..., north: ...)` in metres from its centre, east and
-    /// north positive. Default: all of it.
+    /// The wooded part of the terrain, `(west: ..., south: ..., east: ..., north: ...)` in metres from its centre, east
+    /// and north positive. Default: all of it.
     pub area: Option<Area>,
     /// Treeless patches where smooth noise is high: `(wavelength: 400, share: 0.1, edge: 0.15)`. Default: none.
     pub clearings: Option<ClearingNoise>,
@@ -62,7 +65,7 @@ impl Default for ScatteredTrees {
 
 /// Trees from a CSV file with a header line. Columns are found by name: `x` and `y` in metres (required), `dbh`,
 /// `height` and `species`; a unit in a column's name (`dbh_cm`, `height_m`) overrides the one stated here.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, bevy::reflect::Reflect)]
 #[serde(deny_unknown_fields)]
 pub struct InventoryTrees {
     /// The file, relative to the scene file. Required.
@@ -93,7 +96,7 @@ pub struct InventoryTrees {
 }
 
 /// What an inventory's coordinates are measured from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, bevy::reflect::Reflect)]
 pub enum Anchor {
     /// From the terrain's centre. Older scene files call it `Centre`.
     #[default]
@@ -229,7 +232,7 @@ impl InventoryTrees {
         if let Some(height) = self.default_height {
             check.number("trees.default_height", height, 0.1..=150.0, "m");
         }
-        let known: Vec<&str> = species.iter().map(|one| one.name.as_str()).collect();
+        let known = Known::new(species);
         for (theirs, ours) in &self.species {
             unknown_species(&format!("trees.species.{theirs}"), ours, &known, check);
         }
@@ -239,12 +242,37 @@ impl InventoryTrees {
     }
 }
 
-fn unknown_species(field: &str, name: &str, known: &[&str], check: &mut Check) {
-    if known.contains(&name) {
+/// The names of a scene's species.
+struct Known<'a> {
+    all: HashSet<&'a str>,
+    /// The first of them, for suggestions: thousands of names are compared with few.
+    first: Vec<&'a str>,
+    /// What a message says of them.
+    list: String,
+}
+
+impl<'a> Known<'a> {
+    /// Names that a message lists.
+    const LISTED: usize = 20;
+    /// Names that a suggestion is chosen from.
+    const COMPARED: usize = 200;
+
+    fn new(species: &'a [Species]) -> Self {
+        let names = || species.iter().map(|one| one.name.as_str());
+        let mut list = names().take(Self::LISTED).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+        if species.len() > Self::LISTED {
+            list.push_str(&format!(" and {} more", species.len() - Self::LISTED));
+        }
+        Self { all: names().collect(), first: names().take(Self::COMPARED).collect(), list }
+    }
+}
+
+fn unknown_species(field: &str, name: &str, known: &Known, check: &mut Check) {
+    if known.all.contains(name) {
         return;
     }
-    let list = known.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
-    let remedy = match nearest(name, known) {
+    let list = &known.list;
+    let remedy = match nearest(name, &known.first) {
         Some(meant) => format!("did you mean `{meant}`? The scene's species are {list}"),
         None => format!("the scene's species are {list}"),
     };

@@ -43,9 +43,11 @@ use session::Session;
 pub fn fly(options: &FlyOptions, progress: &mut dyn Progress) -> Result<(), AppError> {
     display::check()?;
     let settings = adapter::settings(options.adapter.as_deref())?;
-    adapter::check_size(&settings, options.size)?;
+    let most_trees = adapter::check_size(&settings, options.size)?;
     let scene = options.overrides.applied(options.scene.read()?);
-    let stage = Stage::build(&scene, progress)?;
+    // A start off the path is found before the long work.
+    tour::Tour::new(&scene, options.view)?;
+    let stage = Stage::build_within(&scene, most_trees, progress)?;
     let session = Session::new(stage, options)?;
     let mut app = display::open(|| build(session, options, settings))?;
     match app.run() {

@@ -35,7 +35,7 @@ use crate::{
             representation::{ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight},
             textures::TextureCache,
             transfer::transfer_layout,
-            uniforms::{PartUniform, part_uniform, scattered_tint},
+            uniforms::{PartUniform, indirect_light_color, part_uniform},
             vertex::PlantVertex,
         },
         gpu::{self, Gpu},
@@ -324,7 +324,7 @@ impl GpuLevel for GpuModels {
             if Arc::ptr_eq(&old.lighting, &new.lighting) {
                 continue;
             }
-            let tint = scattered_tint(&new.plant.leaf_colors());
+            let tint = indirect_light_color(&new.plant.leaf_colors());
             let sun = relight.suns.get(index).copied().unwrap_or_default();
             let Some(parts) = self.parts.get_mut(index) else { continue };
             for (number, (gpu_part, part)) in parts.iter_mut().zip(&new.plant.parts).enumerate() {
@@ -349,7 +349,7 @@ fn upload_parts(
     upload: &mut ForestUpload,
 ) -> Vec<GpuPart> {
     let gpu = upload.gpu;
-    let tint = scattered_tint(&plant.plant.leaf_colors());
+    let tint = indirect_light_color(&plant.plant.leaf_colors());
     let proxies = plant.shadow_proxy();
     if proxies.is_none() {
         error_once!(
