@@ -31,7 +31,7 @@ pub use color::{LUMINANCE_WEIGHTS, linear_to_srgb, luminance, srgb_to_linear};
 pub use discrepancy::star_discrepancy;
 pub use error::MathError;
 pub use interpolation::smoothstep;
-pub use mip::MipChain;
+pub use mip::{MipChain, MipView};
 pub use quadrature::SphereQuadrature;
 pub use radical_inverse::{RadicalInverse, radical_inverse};
 pub use sequence::{HaltonSequence, halton, hammersley};
