@@ -470,7 +470,9 @@ fn several_writers_leave_one_whole_file() {
             scope.spawn(|| bake_plant(Arc::clone(&plant), &small_settings(), Some(&cache)));
         }
     });
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    // The plant, and the texture of its leaves.
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
+    assert_eq!((files_of(&cache, "bake").len(), files_of(&cache, "texture").len()), (1, 1));
     let (_, source) = bake_plant(plant, &small_settings(), Some(&cache));
     assert!(matches!(source, BakeSource::Cache));
 }
