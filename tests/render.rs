@@ -2,6 +2,7 @@
 
 mod foliage;
 mod levels;
+mod light_updates;
 mod pictures;
 mod plate;
 mod plugins;
