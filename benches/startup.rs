@@ -51,6 +51,12 @@ struct Arguments {
     /// Instead: times the frames around the appearance of a forest of the plants in these glTF files.
     #[arg(long, num_args = 1..)]
     appear: Vec<PathBuf>,
+    /// Trees per hectare of that forest.
+    #[arg(long, default_value_t = 100.0)]
+    stems: f64,
+    /// Draw that forest without shadow maps. They are drawn for what appears, and for nothing else.
+    #[arg(long)]
+    no_shadows: bool,
     /// One turn in this process: what the other processes of a run are.
     #[arg(long, hide = true)]
     turn: bool,
@@ -70,7 +76,7 @@ fn main() -> anyhow::Result<()> {
         return turn(&arguments);
     }
     if !arguments.appear.is_empty() {
-        return appear::run(&arguments.appear, arguments.size, arguments.turns);
+        return appear::run(&arguments);
     }
     let mut turns = Vec::new();
     for warm in (0..=arguments.turns).map(|index| index > 0) {

@@ -1,8 +1,7 @@
 //! How long are the frames around the one in which a forest appears?
 //!
 //! The plants come from the cache. The ground is drawn for some frames, then the forest is spawned, drawn, and despawned,
-//! several times: the first time brings its pipelines too. A frame's time includes the device. Shadow maps are off: they
-//! are drawn for what appears and for nothing else, which takes a software driver seconds.
+//! several times: the first time brings its pipelines too. A frame's time includes the device.
 
 use std::{path::PathBuf, time::Instant};
 
@@ -16,19 +15,21 @@ use canopy::{
     scene::{GltfPlants, GroundNoise, Pose, ScatteredTrees, Scene, Species},
 };
 
+use super::Arguments;
+
 /// Frames before the forest appears, and after.
 const NEIGHBOURS: usize = 4;
 
-/// Times the frames around the appearance of a forest of the plants in `files`, `turns` times.
-pub fn run(files: &[PathBuf], size: (u32, u32), turns: usize) -> anyhow::Result<()> {
+/// Times the frames around the appearance of a forest.
+pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let name = |path: &PathBuf| path.file_stem().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let species = |path: &PathBuf| {
         let plants = GltfPlants { files: vec![path.clone()], foliage: Vec::new(), wood: Vec::new() };
         Species::new(name(path), plants)
     };
     let scene = Scene {
-        species: files.iter().map(species).collect(),
-        trees: ScatteredTrees { stems_per_hectare: 20.0, ..ScatteredTrees::default() }.into(),
+        species: arguments.appear.iter().map(species).collect(),
+        trees: ScatteredTrees { stems_per_hectare: arguments.stems, ..ScatteredTrees::default() }.into(),
         ..Scene::new(GroundNoise { size: 400.0, ..GroundNoise::default() })
     };
     // The first time fills the cache.
@@ -36,16 +37,17 @@ pub fn run(files: &[PathBuf], size: (u32, u32), turns: usize) -> anyhow::Result<
     let started = Instant::now();
     let stage = Stage::build(&scene, &mut Silent)?;
     println!("scene from the cache: {:.2} s", started.elapsed().as_secs_f64());
-    let mut renderer = Renderer::new(size, None, 1)?;
+    let mut renderer = Renderer::new(arguments.size, None, 1)?;
     renderer.app().world_mut().spawn(stage.ground());
-    renderer.set_shadow(SunShadowSettings { cascades: 0, ..stage.shadow() });
+    let cascades = if arguments.no_shadows { 0 } else { stage.shadow().cascades };
+    renderer.set_shadow(SunShadowSettings { cascades, ..stage.shadow() });
     renderer.set_instant(&stage, stage.scene.place.time.utc());
     renderer.set_view(
         &Pose { position: (0.0, 20.0, 60.0), yaw: 0.0, pitch: -10.0 }.viewpoint(stage.terrain.height(0.0, 60.0), 50.0),
     );
     frames(&mut renderer)?;
     println!("| time | ground alone | the forest appears | and stays |\n|---|---|--:|---|");
-    for turn in 1..=turns {
+    for turn in 1..=arguments.turns {
         let before = frames(&mut renderer)?;
         let forest = stage.forest().context("the scene has no trees")?;
         renderer.app().world_mut().spawn(forest);
