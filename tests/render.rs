@@ -1,6 +1,7 @@
 //! Images: small scenes drawn without a window, on whatever graphics driver there is (a software one will do).
 
 mod foliage;
+mod forests;
 mod levels;
 mod light_updates;
 mod pictures;
