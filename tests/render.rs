@@ -1,7 +1,9 @@
 //! Images: small scenes drawn without a window, on whatever graphics driver there is (a software one will do).
 
 mod foliage;
+mod forests;
 mod levels;
+mod light_updates;
 mod memory;
 mod pictures;
 mod plate;

@@ -42,7 +42,7 @@ use crate::{
     plugin::CanopyPlugins,
     progress::Progress,
     render::{
-        components::{CanopyCamera, SunShadowSettings},
+        components::{CanopyCamera, LightUpdates, SunShadowSettings},
         readback::read_rgb,
         report::{FrameReport, PassOutcome},
         shaders::CanopyShaders,
@@ -181,7 +181,7 @@ impl Renderer {
                 .disable::<TerminalCtrlCHandlerPlugin>()
                 .disable::<PipelinedRenderingPlugin>(),
         );
-        app.add_plugins(CanopyPlugins);
+        app.add_plugins(CanopyPlugins).insert_resource(LightUpdates::Blocking);
         while app.plugins_state() == PluginsState::Adding {
             bevy::tasks::tick_global_task_pools_on_main_thread();
         }

@@ -29,6 +29,12 @@ impl MipChain {
         })
     }
 
+    /// All levels, for an upload.
+    pub fn view(&self) -> MipView<'_> {
+        let levels = self.levels.iter().map(Vec::as_slice).collect();
+        MipView { width: self.width, height: self.height, levels }
+    }
+
     /// All levels in one allocation, full size first, as a GPU upload expects them.
     pub fn concat(&self) -> Vec<u8> {
         self.levels.concat()
@@ -44,4 +50,15 @@ impl MipChain {
         let passing = texels.chunks_exact(4).filter(|texel| f32::from(texel[3]) / 255.0 >= threshold).count();
         passing as f32 / (texels.len() / 4) as f32
     }
+}
+
+/// A texture with its mip levels, RGBA8, borrowed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MipView<'a> {
+    /// Width of level 0 in texels.
+    pub width: u32,
+    /// Height of level 0 in texels.
+    pub height: u32,
+    /// The levels as in a [`MipChain`].
+    pub levels: Vec<&'a [u8]>,
 }

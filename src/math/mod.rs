@@ -34,7 +34,7 @@ pub use compute_once::compute_once;
 pub use discrepancy::star_discrepancy;
 pub use error::MathError;
 pub use interpolation::smoothstep;
-pub use mip::MipChain;
+pub use mip::{MipChain, MipView};
 pub use quadrature::SphereQuadrature;
 pub use radical_inverse::{RadicalInverse, radical_inverse};
 pub use sequence::{HaltonSequence, halton, hammersley};

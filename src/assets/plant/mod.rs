@@ -20,7 +20,9 @@ pub use loader::PlantLoader;
 
 use super::StageError;
 use crate::{
-    bake::{BakeSettings, BakeSource, BakedPlant, bake_plant, cache::Cache, lighting::SunLight},
+    bake::{
+        BakeSettings, BakeSource, BakedPlant, bake_plant, cache::Cache, lighting::SunLight, textures::filter_together,
+    },
     plant::{
         Gloss, LeafKind, Plant,
         gltf::GltfOptions,
@@ -169,6 +171,7 @@ impl PlantAsset {
         wanted: &(dyn Fn() -> bool + Sync),
     ) -> Self {
         let cache = Cache::of_user();
+        let textures = wanted().then(|| filter_together(plants.iter().map(|(plant, _)| plant), cache.as_ref()));
         let baked: Vec<(BakedPlant, Vec<String>)> = plants
             .into_par_iter()
             .filter_map(|(mut plant, mut warnings)| {
@@ -184,6 +187,7 @@ impl PlantAsset {
                 Some((baked, warnings))
             })
             .collect();
+        drop(textures);
         let (individuals, warnings): (Vec<_>, Vec<_>) = baked.into_iter().unzip();
         Self { name, individuals, sun: settings.sun, growth: Growth::default(), warnings: warnings.concat() }
     }

@@ -34,7 +34,7 @@ use bevy::{
 };
 use tracing::{error, info, warn};
 
-use super::{Sun, sets::CanopySystems};
+use super::{Sun, SunPlugin, report_missing, sets::CanopySystems};
 use crate::{
     assets::{Stage, StageError, most_trees},
     scene::{Overrides, SceneSource},
@@ -158,6 +158,11 @@ impl Plugin for ScenePlugin {
             .register_type::<SceneProgress>()
             .add_systems(First, (begin, follow).chain().in_set(CanopySystems::Load))
             .add_observer(remove_scene);
+    }
+
+    fn finish(&self, app: &mut App) {
+        let sun = app.is_plugin_added::<SunPlugin>();
+        report_missing(app, "ScenePlugin", &[(sun, "SunPlugin", "a scene has no light")]);
     }
 }
 
