@@ -90,6 +90,9 @@ pub enum AppError {
         /// The device's limit.
         limit: u32,
     },
+    /// The user interrupted the work: what was finished, and how to go on.
+    #[error("{0}")]
+    Interrupted(String),
     /// Rendering failed.
     #[error("rendering failed: {0}")]
     Render(String),

@@ -33,6 +33,8 @@ pub enum Command {
     Light,
     /// Return to the start of the flight, position and time.
     Home,
+    /// Read the scene file again.
+    Reload,
     /// Move the clock by this many minutes.
     Minutes(i64),
     /// Move the calendar by this many days.
@@ -73,7 +75,7 @@ pub enum PanelInput {
 }
 
 /// All keys and what they do, as the help shows them.
-pub const HELP: [(&str, &str); 20] = [
+pub const HELP: [(&str, &str); 21] = [
     ("W A S D", "fly forward, left, back, right"),
     ("E  Q", "up, down"),
     ("Shift", "five times faster"),
@@ -87,6 +89,7 @@ pub const HELP: [(&str, &str); 20] = [
     ("Page Up, Down", "one day forward, back; with Shift one month"),
     ("+  -", "clock speed: stopped, 1x, 60x, 600x, 3600x"),
     ("Home", "return to the start, position and time"),
+    ("R", "load the changed scene file; camera and clock stay"),
     ("U", "allow flight below the ground, or not"),
     ("T", "tint trees by level of detail"),
     ("L", "light panel: adjust the lighting of the leaves with the arrows"),
@@ -138,6 +141,7 @@ pub fn command(code: KeyCode, key: &Key, shift: bool, repeat: bool) -> Option<Co
             "h" => Command::Help,
             "o" => Command::Overlay,
             "l" => Command::Light,
+            "r" => Command::Reload,
             "," => Command::Minutes(-60),
             "." => Command::Minutes(60),
             "[" => Command::Minutes(-10),

@@ -8,15 +8,14 @@ use bevy::{
         change_detection::DetectChangesMut,
         message::{MessageReader, MessageWriter},
         query::With,
-        system::{Commands, Local, Res, ResMut, Single},
+        system::{Local, Res, ResMut, Single},
     },
     input::{
         ButtonInput, ButtonState,
-        keyboard::{KeyCode, KeyboardInput},
+        keyboard::{Key, KeyCode, KeyboardInput},
         mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll, MouseButton, MouseScrollUnit},
     },
     prelude::Transform,
-    render::view::Msaa,
     time::{Real, Time},
     window::{CursorGrabMode, CursorOptions, PrimaryWindow, WindowFocused},
 };
@@ -25,28 +24,17 @@ use bevy_egui::input::EguiWantsInput;
 use super::{
     controls::{self, Command},
     light::LightPanel,
+    loading::{self, Request, Terminal},
     session::Session,
 };
 use crate::{
     app::camera,
-    components::Sun,
+    components::{CanopyScene, Sun},
     render::components::{CanopyCamera, CanopyOrigin, ViewOptions},
 };
 
 /// Pixels of touchpad scrolling that equal one notch of a wheel.
 const PIXELS_PER_NOTCH: f64 = 100.0;
-
-/// Spawns the stage and the camera.
-pub fn set_up(mut commands: Commands, session: Res<Session>) {
-    let stage = &session.stage;
-    stage.show(&mut commands);
-    commands.spawn((stage.sun(session.clock.now().to_utc()), stage.shadow()));
-    commands.spawn((
-        CanopyCamera,
-        Msaa::from_samples(stage.scene.quality.msaa),
-        camera::projection(session.view().field_of_view),
-    ));
-}
 
 /// Captures the mouse on a click, and releases it when the window loses the focus.
 pub fn capture_mouse(
@@ -73,12 +61,15 @@ fn set_captured(cursor: &mut CursorOptions, captured: bool) {
     cursor.visible = !captured;
 }
 
-/// Carries out the commands of the pressed keys.
+/// Carries out the commands of the pressed keys. Before the flight there is one: to quit.
 pub fn handle_keys(
     mut keys: MessageReader<KeyboardInput>,
     held: Res<ButtonInput<KeyCode>>,
-    mut session: ResMut<Session>,
-    mut panel: ResMut<LightPanel>,
+    mut session: Option<ResMut<Session>>,
+    mut panel: Option<ResMut<LightPanel>>,
+    request: Res<Request>,
+    mut terminal: ResMut<Terminal>,
+    mut scene: Single<&mut CanopyScene>,
     mut cursor: Single<&mut CursorOptions, With<PrimaryWindow>>,
     mut exit: MessageWriter<AppExit>,
     mut shift: Local<bool>,
@@ -93,11 +84,17 @@ pub fn handle_keys(
         if !pressed {
             continue;
         }
+        let (Some(session), Some(panel)) = (&mut session, &mut panel) else {
+            if key.logical_key == Key::Escape {
+                exit.write(AppExit::Success);
+            }
+            continue;
+        };
         if panel.open
             && let Some(input) = controls::panel_input(&key.logical_key, *shift, key.repeat)
         {
             if let Some(text) = panel.handle(input) {
-                print(&text, &mut session);
+                print(&text, session);
             }
             continue;
         }
@@ -113,6 +110,7 @@ pub fn handle_keys(
             Command::Leave => {
                 exit.write(AppExit::Success);
             }
+            Command::Reload => loading::reload(&request, session, &mut terminal, &mut scene),
             _ => session.carry_out(command),
         }
     }
@@ -165,5 +163,8 @@ pub fn follow(
     transform.set_if_neq(new_transform);
     options.set_if_neq(ViewOptions { tint_levels: session.tinted });
     // The sun's refresh policy decides how often the light is computed again.
-    sun.set_if_neq(session.stage.sun(session.clock.now().to_utc()));
+    let instant = session.clock.now().to_utc();
+    if sun.instant != instant {
+        sun.instant = instant;
+    }
 }

@@ -17,7 +17,7 @@ use bevy::ecs::{
     system::{Query, ResMut},
 };
 
-use super::{controls::PanelInput, session::Session};
+use super::controls::PanelInput;
 use crate::{
     assets::{Stage, plants},
     bake::{
@@ -228,13 +228,12 @@ fn snippet(name: &str, lighting: &Lighting) -> String {
 }
 
 /// Applies finished bakes to the forest.
-pub fn apply_bakes(mut panel: ResMut<LightPanel>, mut session: ResMut<Session>, mut forests: Query<&mut Forest>) {
-    let Some(plants) = panel.take_bakes(&session.stage.plants) else { return };
-    let plants = Arc::new(plants);
+pub fn apply_bakes(mut panel: ResMut<LightPanel>, mut forests: Query<&mut Forest>) {
     for mut forest in &mut forests {
-        forest.plants = plants.clone();
+        if let Some(plants) = panel.take_bakes(&forest.plants) {
+            forest.plants = Arc::new(plants);
+        }
     }
-    session.stage.plants = plants;
 }
 
 #[cfg(test)]

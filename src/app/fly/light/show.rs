@@ -7,12 +7,11 @@ use super::{
     baker::{PREVIEW_SHARE, Progress},
     tuning::Line,
 };
-use crate::app::fly::overlay::{NAME, SMALL, small};
+use crate::app::fly::overlay::{NAME, SMALL, WARNING, small};
 
 /// Width of the panel in points; its longest line needs it.
 const WIDTH: f32 = 330.0;
 const SELECTED: Color32 = Color32::from_rgb(255, 214, 120);
-const WARNING: Color32 = Color32::from_rgb(255, 150, 110);
 
 /// Keys of the panel, shown in its last lines.
 const KEYS: [(&str, &str); 5] = [
