@@ -170,6 +170,7 @@ fn first_view(arguments: &Arguments, scene: &Scene, stage: &Stage) -> anyhow::Re
         pictures: Pictures::Stills(vec![Still { out: "picture.png".into(), at: None }]),
         view: View::Scene,
         size: arguments.size,
+        resume: false,
         overrides: Overrides::default(),
         adapter: None,
         quiet: true,

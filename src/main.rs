@@ -45,6 +45,7 @@ fn fly_through(options: &canopy::app::FlyOptions) -> anyhow::Result<()> {
 }
 
 fn render_pictures(options: &canopy::app::RenderOptions) -> anyhow::Result<()> {
+    canopy::app::listen_to_interrupts()?;
     let mut bars = Bars::new(options.quiet);
     let report = canopy::app::render(options, &mut bars)?;
     drop(bars);
@@ -56,6 +57,7 @@ fn render_pictures(options: &canopy::app::RenderOptions) -> anyhow::Result<()> {
 }
 
 fn trace_reference(options: &canopy::app::ReferenceOptions) -> anyhow::Result<()> {
+    canopy::app::listen_to_interrupts()?;
     let mut bars = Bars::new(options.quiet);
     let file = canopy::app::reference(options, &mut bars)?;
     drop(bars);

@@ -6,6 +6,7 @@ mod cli;
 mod front_door;
 mod grow;
 mod implicit;
+mod interrupts;
 mod layering;
 mod library;
 mod light;

@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use canopy::light::moon::MoonSetting;
 use canopy::light::{Atmosphere, AtmosphereParams, LightSettings, LightState, Observer, SkyView, SunPosition};
@@ -482,6 +483,24 @@ fn the_same_bytes_with_any_threads_and_however_interrupted() {
     let mut resumed = Film::load_checkpoint(&file, &key).unwrap().unwrap();
     tracer.render(&shot, &mut resumed, 6, &mut |_| ControlFlow::Continue(())).unwrap();
     assert!(resumed == once);
+}
+
+#[test]
+fn a_trace_that_is_stopped_in_a_pass_drops_that_pass_alone() {
+    let scene = grove(&tree(), DVec3::ZERO);
+    let tracer = PathTracer::new(&scene, &sunny(), TraceSettings::default()).unwrap();
+    // Six tiles of 16 x 16 pixels, so that 15 questions are two passes and half of the third.
+    let shot = grove_shot(DVec3::ZERO, (37, 23));
+    let go_on = &mut |_: &Film| ControlFlow::Continue(());
+    for (questions, samples) in [(0, 0), (1, 0), (6, 1), (15, 2)] {
+        let asked = AtomicUsize::new(0);
+        let stop = || asked.fetch_add(1, Ordering::Relaxed) >= questions;
+        let mut part = Film::new(&shot).unwrap();
+        tracer.render_unless(&shot, &mut part, 4, &stop, go_on).unwrap();
+        assert_eq!(part.samples(), samples, "after {questions} questions");
+        tracer.render(&shot, &mut part, 4, go_on).unwrap();
+        assert!(part == film(&tracer, &shot, 4), "after {questions} questions");
+    }
 }
 
 #[test]

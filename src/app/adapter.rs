@@ -6,6 +6,7 @@ use bevy::{
 };
 
 use super::error::AppError;
+use crate::assets::most_trees;
 
 /// Of these only errors are worth the user's while: that a driver is slow, lacks bindless textures, or that a display
 /// does not know its size in millimetres, is none.
@@ -102,23 +103,24 @@ pub fn settings(wanted: Option<&str>) -> Result<WgpuSettings, AppError> {
     })
 }
 
-/// Rejects a window or image of `(width, height)` pixels that is too large for the adapter of `settings`.
+/// Rejects a window or image of `(width, height)` pixels that is too large for the adapter of `settings`. Returns the
+/// most trees that the adapter holds; `None` if it is not found again.
 ///
 /// # Errors
 /// [`AppError::TooLarge`].
-pub fn check_size(settings: &WgpuSettings, (width, height): (u32, u32)) -> Result<(), AppError> {
+pub fn check_size(settings: &WgpuSettings, (width, height): (u32, u32)) -> Result<Option<usize>, AppError> {
     let backends = settings.backends.unwrap_or(Backends::all());
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = backends;
     let adapters = block_on(wgpu::Instance::new(descriptor).enumerate_adapters(backends));
     let named = |name: String| settings.adapter_name.as_ref().is_none_or(|wanted| *wanted == name);
     let chosen = adapters.iter().find(|adapter| named(adapter.get_info().name));
-    match chosen.map(|adapter| adapter.limits().max_texture_dimension_2d) {
-        Some(limit) if width > limit || height > limit || width == 0 || height == 0 => {
-            Err(AppError::TooLarge { width, height, limit })
-        }
-        _ => Ok(()),
+    let Some(limits) = chosen.map(wgpu::Adapter::limits) else { return Ok(None) };
+    let limit = limits.max_texture_dimension_2d;
+    if width > limit || height > limit || width == 0 || height == 0 {
+        return Err(AppError::TooLarge { width, height, limit });
     }
+    Ok(Some(most_trees(&limits)))
 }
 
 #[cfg(test)]

@@ -1,14 +1,12 @@
 //! Renders images without a window: the frames of a plan, one after the other, each a function of its own arguments.
 
 use std::{
-    collections::BTreeSet,
-    path::{Path, PathBuf},
     sync::{Arc, Mutex},
     time::{Duration, Instant},
 };
 
 use bevy::{
-    app::{App, PluginGroup, PluginsState},
+    app::{App, PluginGroup, PluginsState, TerminalCtrlCHandlerPlugin},
     asset::{Assets, Handle, RenderAssetUsages},
     camera::{Camera, RenderTarget},
     ecs::entity::Entity,
@@ -34,11 +32,13 @@ use bevy::{
 use chrono::{DateTime, Utc};
 
 use super::{
-    RenderOptions, RenderPlan, RenderReport, adapter, camera, error::AppError, notes::notes, picture::Picture,
+    Frame, RenderOptions, RenderPlan, RenderReport, adapter, camera, error::AppError, interrupt, notes::notes,
+    picture::Picture,
 };
 use crate::{
     assets::Stage,
     components::{Sun, SunRefresh},
+    files,
     plugin::CanopyPlugins,
     progress::Progress,
     render::{
@@ -54,15 +54,30 @@ use crate::{
 ///
 /// # Errors
 /// [`AppError`]; images that were finished before it stay, and no file is left half-written.
+/// [`AppError::Interrupted`] soon after `progress` [is cancelled](Progress::is_cancelled): after the current image.
 pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<RenderReport, AppError> {
     // The scene's own errors come first, then the device's: both are found before the long work, and before anything is
     // left behind.
     let scene = options.overrides.applied(options.scene.read()?);
     let settings = adapter::settings(options.adapter.as_deref())?;
-    adapter::check_size(&settings, options.size)?;
-    let stage = Stage::build(&scene, progress)?;
+    let most_trees = adapter::check_size(&settings, options.size)?;
+    RenderPlan::check(options, &scene)?;
+    check_writable(options)?;
+    let stage = Stage::build_within(&scene, most_trees, progress).map_err(interrupt::building)?;
     let plan = RenderPlan::new(options, &stage.scene, &|x, z| stage.terrain.height(x, z))?;
-    check_writable(&plan)?;
+    let mut report = RenderReport::default();
+    let finished = |frame: &Frame| {
+        options.resume && Picture::is_stored(&frame.file, options.size, &notes(&stage, &frame.view, frame.instant))
+    };
+    let wanted: Vec<bool> = plan.frames.iter().map(|frame| !finished(frame)).collect();
+    let kept = wanted.iter().filter(|wanted| !*wanted).count();
+    if kept > 0 {
+        progress.note(&format!("{kept} of {} images are finished already", plan.frames.len()));
+    }
+    if kept == plan.frames.len() {
+        report.files = plan.frames.into_iter().map(|frame| frame.file).collect();
+        return Ok(report);
+    }
     let started = Instant::now();
     progress.begin("Renderer", 0);
     let mut renderer = Renderer::with_settings(settings, options.size, stage.scene.quality.msaa)?;
@@ -70,9 +85,16 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
     renderer.show(&stage);
     progress.end();
     progress.note(&format!("renderer: {:.2} s", started.elapsed().as_secs_f64()));
-    let mut report = RenderReport::default();
     progress.begin("Images", plan.frames.len() as u64);
-    for frame in &plan.frames {
+    for (frame, wanted) in plan.frames.iter().zip(wanted) {
+        if !wanted {
+            report.files.push(frame.file.clone());
+            progress.advance(1);
+            continue;
+        }
+        if progress.is_cancelled() {
+            return Err(interrupted(&report, plan.frames.len()));
+        }
         let started = Instant::now();
         let picture = renderer.draw(&stage, &frame.view, frame.instant)?;
         let drawn = started.elapsed().as_secs_f64();
@@ -93,19 +115,25 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
     Ok(report)
 }
 
-/// Checks before the first image is rendered whether all of them can be written; creates missing folders.
-fn check_writable(plan: &RenderPlan) -> Result<(), AppError> {
-    let folder = |file: &Path| match file.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
-        _ => PathBuf::from("."),
-    };
-    let folders: BTreeSet<PathBuf> = plan.frames.iter().map(|frame| folder(&frame.file)).collect();
-    for folder in &folders {
-        let failed = |source| AppError::Write { path: folder.clone(), source };
-        std::fs::create_dir_all(folder).map_err(failed)?;
-        tempfile::Builder::new().prefix(".canopy-").tempfile_in(folder).map_err(failed)?;
+/// Checks whether the images can be written.
+fn check_writable(options: &RenderOptions) -> Result<(), AppError> {
+    for file in RenderPlan::first_files(&options.pictures) {
+        files::check_writable(&file).map_err(|source| AppError::Write { path: file, source })?;
     }
     Ok(())
+}
+
+/// The error of a render that the user interrupted after the images of `report`, of `total`.
+fn interrupted(report: &RenderReport, total: usize) -> AppError {
+    let count = report.files.len();
+    let so_far = match (report.files.first(), report.files.last()) {
+        (Some(first), Some(last)) if count > 1 => {
+            format!("{count} of {total} images are finished, {} to {}", first.display(), last.display())
+        }
+        (Some(only), _) => format!("1 of {total} images is finished, {}", only.display()),
+        _ => format!("none of {total} images is finished"),
+    };
+    AppError::Interrupted(format!("{so_far}; run the same command with --resume to render the others"))
 }
 
 /// Time limit for shaders and pipelines; far more than they need on the slowest machine.
@@ -148,6 +176,8 @@ impl Renderer {
                 })
                 .set(LogPlugin { level: Level::WARN, filter: adapter::LOG_FILTER.to_owned(), ..LogPlugin::default() })
                 .disable::<WinitPlugin>()
+                // The program has its own handler; others keep theirs.
+                .disable::<TerminalCtrlCHandlerPlugin>()
                 .disable::<PipelinedRenderingPlugin>(),
         );
         app.add_plugins(CanopyPlugins);

@@ -1,6 +1,6 @@
 //! Rendered images on disk: PNG, with the settings that reproduce it in its text chunks.
 
-use std::{io::Write, path::Path};
+use std::{fs::File, io::BufReader, io::Write, path::Path};
 
 use super::error::AppError;
 use crate::files::write_whole;
@@ -26,6 +26,17 @@ impl Picture {
     pub fn save(&self, path: &Path, notes: &[(&str, String)]) -> Result<(), AppError> {
         write_whole(path, |writer| self.encode(writer, notes).map_err(std::io::Error::other))
             .map_err(|source| AppError::Write { path: path.to_owned(), source })
+    }
+
+    /// Whether `path` is a finished image of this size (width and height in pixels) with exactly these notes.
+    pub fn is_stored(path: &Path, size: (u32, u32), notes: &[(&str, String)]) -> bool {
+        let ordinary = std::fs::metadata(path).is_ok_and(|found| found.is_file());
+        let Some(file) = ordinary.then(|| File::open(path).ok()).flatten() else { return false };
+        let Ok(reader) = png::Decoder::new(BufReader::new(file)).read_info() else { return false };
+        let info = reader.info();
+        let stored = info.utf8_text.iter().map(|chunk| (chunk.keyword.as_str(), chunk.get_text().ok()));
+        let wanted = notes.iter().map(|(keyword, text)| (*keyword, Some(text.clone())));
+        (info.width, info.height) == size && stored.eq(wanted)
     }
 
     fn encode(&self, writer: impl Write, notes: &[(&str, String)]) -> Result<(), png::EncodingError> {

@@ -66,6 +66,44 @@ pub enum PlanError {
 }
 
 impl RenderPlan {
+    /// Checks `options` against `scene`, without planning the frames.
+    ///
+    /// # Errors
+    /// Those of [`RenderPlan::new`].
+    pub fn check(options: &RenderOptions, scene: &Scene) -> Result<(), PlanError> {
+        Flight::new(options.view, scene)?;
+        match &options.pictures {
+            Pictures::Stills(stills) => {
+                for (number, still) in stills.iter().enumerate() {
+                    if !is_png(&still.out) {
+                        return Err(PlanError::NoPng(still.out.clone()));
+                    }
+                    if stills.iter().take(number).any(|before| before.out == still.out) {
+                        return Err(PlanError::SameFile(still.out.clone()));
+                    }
+                }
+                if stills.is_empty() { Err(PlanError::Nothing) } else { Ok(()) }
+            }
+            Pictures::Sequence { frames, fps, .. } => {
+                if *frames > MOST_FRAMES {
+                    return Err(PlanError::TooMany(*frames));
+                }
+                if let Some(rate) = fps.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
+                    return Err(PlanError::BadRate(rate));
+                }
+                if *frames == 0 { Err(PlanError::Nothing) } else { Ok(()) }
+            }
+        }
+    }
+
+    /// At least one file of each folder that `pictures` are written to.
+    pub(super) fn first_files(pictures: &Pictures) -> Vec<PathBuf> {
+        match pictures {
+            Pictures::Stills(stills) => stills.iter().map(|still| still.out.clone()).collect(),
+            Pictures::Sequence { out, frames, .. } => vec![numbered(out, 0, *frames)],
+        }
+    }
+
     /// Plans `options` for `scene`. `ground` gives the terrain's height in metres at local `(x, z)`; heights in poses
     /// count from it.
     ///
@@ -77,6 +115,7 @@ impl RenderPlan {
     /// [`PlanError`]: a path that the scene lacks, a time off the path, no frames or too many, a rate that is not
     /// positive, or a file name that does not end in `.png`.
     pub fn new(options: &RenderOptions, scene: &Scene, ground: &dyn Fn(f64, f64) -> f64) -> Result<Self, PlanError> {
+        Self::check(options, scene)?;
         let camera = Flight::new(options.view, scene)?;
         let viewpoint = |pose: Pose| {
             let (x, _, z) = pose.position;
@@ -85,24 +124,10 @@ impl RenderPlan {
         let frames = match &options.pictures {
             Pictures::Stills(stills) => {
                 let view = viewpoint(camera.still());
-                for (number, still) in stills.iter().enumerate() {
-                    if !is_png(&still.out) {
-                        return Err(PlanError::NoPng(still.out.clone()));
-                    }
-                    if stills.iter().take(number).any(|before| before.out == still.out) {
-                        return Err(PlanError::SameFile(still.out.clone()));
-                    }
-                }
                 let instant = |at: Option<LocalTime>| at.unwrap_or(scene.place.time).utc();
                 stills.iter().map(|still| Frame { file: still.out.clone(), view, instant: instant(still.at) }).collect()
             }
             Pictures::Sequence { out, frames, fps, clock } => {
-                if *frames > MOST_FRAMES {
-                    return Err(PlanError::TooMany(*frames));
-                }
-                if let Some(rate) = fps.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
-                    return Err(PlanError::BadRate(rate));
-                }
                 let step = match clock {
                     Clock::Lapse { .. } => fps.map(|rate| 1.0 / rate),
                     Clock::Standing(_) => Some(1.0 / fps.unwrap_or(DEFAULT_FPS)),
@@ -115,7 +140,7 @@ impl RenderPlan {
                 (0..*frames).map(frame).collect::<Vec<_>>()
             }
         };
-        if frames.is_empty() { Err(PlanError::Nothing) } else { Ok(Self { frames }) }
+        Ok(Self { frames })
     }
 }
 
@@ -214,6 +239,7 @@ mod tests {
             pictures,
             view,
             size: (64, 36),
+            resume: false,
             overrides: Overrides::default(),
             adapter: None,
             quiet: true,

@@ -8,10 +8,11 @@ use glam::DVec3;
 
 use super::{
     Frame, LightGroup, Pictures, PlanError, ReferenceOptions, RenderOptions, RenderPlan, Still, camera::NEAR,
-    error::AppError, notes::notes, picture::Picture, tone::tone_table,
+    error::AppError, interrupt, notes::notes, picture::Picture, tone::tone_table,
 };
 use crate::{
     assets::Stage,
+    files,
     light::{Atmosphere, AtmosphereParams, LightState},
     progress::Progress,
     reference::{
@@ -25,14 +26,19 @@ const KEEP_EVERY: Duration = Duration::from_secs(30);
 
 /// Traces the image of `options`, as OpenEXR or PNG by the ending of its name; returns the file.
 ///
-/// The film is saved every 30 s, in a file next to the image that ends in `.checkpoint`. With `resume` a film of the
+/// The film is saved every 30 s and when the work is interrupted, in a file next to the image that ends in
+/// `.checkpoint`. With `resume` a film of the
 /// same scene, light and camera continues from there, and the file stays when the image is done, so that more samples
 /// can be added. Without it the trace starts from the beginning, and the file is deleted at the end.
 ///
 /// # Errors
-/// [`AppError`]; an existing image stays as it is.
+/// [`AppError`]; an existing image stays as it is. [`AppError::Interrupted`] soon after a signal, and after the current
+/// sample when `progress` [is cancelled](Progress::is_cancelled).
 pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Result<PathBuf, AppError> {
-    let stage = Stage::build(&options.overrides.applied(options.scene.read()?), progress)?;
+    let written = options.overrides.applied(options.scene.read()?);
+    RenderPlan::check(&as_still(options), &written)?;
+    files::check_writable(&options.out).map_err(|source| AppError::Write { path: options.out.clone(), source })?;
+    let stage = Stage::build(&written, progress).map_err(interrupt::building)?;
     let frame = frame(options, &stage)?;
     let sun = stage.sun(frame.instant);
     let atmosphere = Atmosphere::new(AtmosphereParams::with_visibility_km(sun.visibility_km))?;
@@ -62,9 +68,14 @@ pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Res
 
     progress.begin("Samples", options.samples.into());
     progress.advance(film.samples().min(options.samples).into());
-    let (mut last, mut failure) = (Instant::now(), None);
-    tracer.render(&shot, &mut film, options.samples, &mut |film: &Film| {
+    let (started, earlier) = (Instant::now(), film.samples());
+    let (mut last, mut failure) = (started, None);
+    let stop = || interrupt::received().is_some();
+    tracer.render_unless(&shot, &mut film, options.samples, &stop, &mut |film: &Film| {
         progress.advance(1);
+        if film.samples() == earlier + 1 {
+            progress.note(&format!("first sample per pixel: {:.2} s", started.elapsed().as_secs_f64()));
+        }
         if last.elapsed() >= KEEP_EVERY {
             last = Instant::now();
             if let Err(error) = film.save_checkpoint(&kept, &fingerprint) {
@@ -72,11 +83,17 @@ pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Res
                 return ControlFlow::Break(());
             }
         }
-        ControlFlow::Continue(())
+        if progress.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
     progress.end();
     if let Some(error) = failure {
         return Err(error.into());
+    }
+    if film.samples() < options.samples {
+        if film.samples() > 0 {
+            film.save_checkpoint(&kept, &fingerprint)?;
+        }
+        return Err(interrupted(film.samples(), options, &kept));
     }
     if options.resume {
         film.save_checkpoint(&kept, &fingerprint)?;
@@ -91,20 +108,36 @@ pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Res
     Ok(options.out.clone())
 }
 
+/// The error of a trace that the user interrupted after `samples` samples, which are kept in `checkpoint`.
+fn interrupted(samples: u32, options: &ReferenceOptions, checkpoint: &Path) -> AppError {
+    let total = options.samples;
+    AppError::Interrupted(match samples {
+        0 => format!("none of {total} samples is finished; run the command again"),
+        _ => format!(
+            "{samples} of {total} samples are finished and saved in {}; run the same command with --resume to continue",
+            checkpoint.display()
+        ),
+    })
+}
+
 /// Camera and instant, the same as `canopy render` has for a still.
 fn frame(options: &ReferenceOptions, stage: &Stage) -> Result<Frame, AppError> {
-    let still = RenderOptions {
+    let plan = RenderPlan::new(&as_still(options), &stage.scene, &|x, z| stage.terrain.height(x, z))?;
+    plan.frames.into_iter().next().ok_or(AppError::Plan(PlanError::Nothing))
+}
+
+fn as_still(options: &ReferenceOptions) -> RenderOptions {
+    RenderOptions {
         scene: options.scene.clone(),
         pictures: Pictures::Stills(vec![Still { out: options.out.with_extension("png"), at: options.at }]),
         view: options.view,
         size: options.size,
+        resume: false,
         overrides: options.overrides.clone(),
         adapter: None,
         quiet: options.quiet,
         explain: false,
-    };
-    let plan = RenderPlan::new(&still, &stage.scene, &|x, z| stage.terrain.height(x, z))?;
-    plan.frames.into_iter().next().ok_or(AppError::Plan(PlanError::Nothing))
+    }
 }
 
 fn scene(stage: &Stage) -> Result<ReferenceScene, AppError> {

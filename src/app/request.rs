@@ -40,6 +40,9 @@ pub struct RenderOptions {
     pub view: View,
     /// Size of an image in pixels, each at least 1; the device may have a lower limit.
     pub size: (u32, u32),
+    /// Whether to keep images that an earlier render of the same request has finished: files of the same size and with
+    /// the same notes. The scene must be the same too.
+    pub resume: bool,
     /// Values that replace those of the scene.
     pub overrides: Overrides,
     /// Part of the name of the graphics adapter to use; `None` lets the driver choose.
@@ -150,7 +153,7 @@ pub enum View {
 /// The result of a headless render.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RenderReport {
-    /// The files written, in order.
+    /// The images, in order: those written, and with [`RenderOptions::resume`] those that were finished before.
     pub files: Vec<PathBuf>,
     /// With [`RenderOptions::explain`]: which passes ran, which were skipped, and why, one line each.
     pub explanation: Vec<String>,

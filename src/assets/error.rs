@@ -52,6 +52,25 @@ pub enum StageError {
         /// The inventory.
         path: PathBuf,
     },
+    /// An inventory without any tree on the terrain.
+    #[error(
+        "{}: none of its {count} trees stands on the terrain: they are at {:.0} to {:.0} m east and {:.0} to {:.0} m \
+         north of the terrain's centre, and the terrain is {:.0} m x {:.0} m; correct the inventory's `anchor` or its \
+         coordinates (see `canopy info`), or take the terrain of this place",
+        path.display(), east.0, east.1, north.0, north.1, terrain[0], terrain[1]
+    )]
+    InventoryOutside {
+        /// The inventory.
+        path: PathBuf,
+        /// Its trees.
+        count: usize,
+        /// Least and greatest distance of a tree from the terrain's centre, metres east.
+        east: (f64, f64),
+        /// The same in metres north.
+        north: (f64, f64),
+        /// Size of the terrain from west to east and from north to south, metres.
+        terrain: [f64; 2],
+    },
     /// Too many plants for one forest.
     #[error(
         "the scene's species have {count} individuals in total, but a forest holds at most {limit}; lower `individuals`"
@@ -75,11 +94,11 @@ pub enum StageError {
     },
     /// More trees than the device's largest buffer holds.
     #[error(
-        "the scene has {count} trees, but this device holds at most {limit}; lower the stems per hectare, take a \
+        "the scene asks for {count} trees, but this device holds at most {limit}; lower the stems per hectare, take a \
          smaller area or inventory, or choose another device (canopy: --adapter, see --list-adapters)"
     )]
     TooManyTrees {
-        /// Trees of the stand.
+        /// Trees of the stand; before it is built, an estimate.
         count: usize,
         /// Maximum number that the device holds.
         limit: usize,

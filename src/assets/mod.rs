@@ -27,6 +27,7 @@ pub(crate) mod threads;
 mod together;
 pub(crate) mod trees;
 
+pub use crate::render::forest::most_trees;
 pub use error::StageError;
 pub use plant::{Growth, PlantAsset, PlantLoader, PlantSettings};
 pub use plugin::CanopyAssetPlugin;

@@ -6,19 +6,24 @@ use bevy::render::renderer::RenderDevice;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{StageError, ground, plants, together, trees};
+use super::{StageError, ground, plants, together, trees::StandPlan};
 use crate::{
     bake::{BakeSource, BakedPlant, bake_plant, cache::Cache, lighting::SunLight},
     light::sun::Observer,
     progress::Progress,
-    render::components::{Forest, Ground, SunShadowSettings},
-    scatter::{CoverMap, PackedStand, PackedTree, PlantSize, cover_map, packed::DEFAULT_CELL_SIZE},
+    render::{
+        components::{Forest, Ground, SunShadowSettings},
+        forest::most_trees,
+    },
+    scatter::{CoverMap, PackedStand, PlantSize, ScatterError, bounded_cover_map, packed::DEFAULT_CELL_SIZE},
     scene::{self, Lighting, Quality, Scene},
     terrain::Terrain,
 };
 
-/// Metres per texel of the cover map.
+/// Metres per texel of the cover map of a forest up to some 32 km wide.
 pub(crate) const COVER_TEXEL: f64 = 8.0;
+/// The most texels of a cover map: those of wider forests are larger.
+pub(crate) const MOST_COVER_TEXELS: u32 = 1 << 24;
 /// Crown radius as a fraction of the larger half width of a plant.
 const CROWN_SHARE: f32 = 0.8;
 /// Extent of a plant without any surface, metres.
@@ -51,6 +56,19 @@ impl Stage {
     /// [`StageError`] for anything in the scene or its files that cannot be used; [`StageError::Cancelled`] soon after
     /// `progress` [is cancelled](Progress::is_cancelled); during the bakes, after the current few plants.
     pub fn build(scene: &Scene, progress: &mut dyn Progress) -> Result<Self, StageError> {
+        Self::build_within(scene, None, progress)
+    }
+
+    /// As [`build`](Self::build), for a device that holds at most `most_trees` trees (see [`most_trees`](crate::assets::most_trees)): a scene that
+    /// asks for more is refused before the long work.
+    ///
+    /// # Errors
+    /// Those of [`build`](Self::build), and [`StageError::TooManyTrees`].
+    pub fn build_within(
+        scene: &Scene,
+        most_trees: Option<usize>,
+        progress: &mut dyn Progress,
+    ) -> Result<Self, StageError> {
         scene.validate()?;
         let started = Instant::now();
         progress.begin("Terrain", 0);
@@ -60,6 +78,10 @@ impl Stage {
         let observer = observer(scene, &terrain)?;
         check_wanted(progress)?;
 
+        let planned = StandPlan::new(scene, &terrain)?;
+        planned.check(most_trees)?;
+        check_wanted(progress)?;
+
         let has_trees = !matches!(scene.trees, scene::Trees::None);
         let mut species = if has_trees { plants::plan(scene)? } else { plants::PlantPlan::default() };
         let plants = bake(&species, &scene.quality, progress)?;
@@ -67,21 +89,27 @@ impl Stage {
         let started = Instant::now();
         progress.begin("Trees", 0);
         let sizes: Vec<PlantSize> = plants.iter().map(BakedPlant::size).collect();
-        let mut stand = trees::build_stand(scene, &species, &sizes, &terrain, progress)?;
+        let mut stand = planned.build(&species, &sizes, progress)?;
         progress.end();
         check_wanted(progress)?;
         let plants = together::light_together(scene, &mut species, plants, &mut stand, progress)?;
         let sizes: Vec<PlantSize> = plants.iter().map(BakedPlant::size).collect();
         let packed = PackedStand::new(&stand, DEFAULT_CELL_SIZE, &sizes)?;
-        let cover = if stand.trees.is_empty() {
-            None
-        } else {
-            let crowns: Vec<PlantSize> = plants.iter().map(crown).collect();
-            Some(Arc::new(cover_map(&packed, &crowns, COVER_TEXEL, None)?.smoothed()))
-        };
+        let cover = if stand.trees.is_empty() { None } else { Some(Arc::new(cover(&packed, &plants)?)) };
         progress.note(&format!("{} trees: {:.2} s", stand.trees.len(), started.elapsed().as_secs_f64()));
-        if has_trees && stand.trees.is_empty() {
-            progress.warn("the scene's rules leave no place for any tree: only the ground is drawn");
+        if stand.trees.is_empty() {
+            match &scene.trees {
+                scene::Trees::None => {}
+                scene::Trees::Scattered(_) => {
+                    progress.warn("the scene's rules leave no place for any tree: only the ground is drawn");
+                }
+                scene::Trees::Inventory(inventory) => {
+                    progress.warn(&format!(
+                        "{}: there are no trees in it: only the ground is drawn",
+                        inventory.path.display()
+                    ));
+                }
+            }
         }
         let sun = |(species, variants): (&scene::Species, &Range<u16>)| {
             std::iter::repeat_n(species.lighting.as_ref().map_or(SunLight::default(), Lighting::sun), variants.len())
@@ -151,9 +179,7 @@ fn shadow(quality: &Quality) -> SunShadowSettings {
 /// # Errors
 /// [`StageError::TooManyTrees`].
 pub(crate) fn check_trees(count: usize, device: &RenderDevice) -> Result<(), StageError> {
-    let limits = device.limits();
-    let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-    let limit = usize::try_from(bytes).unwrap_or(usize::MAX) / size_of::<PackedTree>();
+    let limit = most_trees(&device.limits());
     if count > limit { Err(StageError::TooManyTrees { count, limit }) } else { Ok(()) }
 }
 
@@ -177,8 +203,17 @@ pub(crate) fn observer(scene: &Scene, terrain: &Terrain) -> Result<Observer, Sta
     Ok(Observer::new(latitude, longitude, height)?)
 }
 
+/// The canopy cover of a stand of `plants`.
+///
+/// # Errors
+/// Those of [`bounded_cover_map`].
+pub(crate) fn cover(stand: &PackedStand, plants: &[BakedPlant]) -> Result<CoverMap, ScatterError> {
+    let crowns: Vec<PlantSize> = plants.iter().map(crown).collect();
+    Ok(bounded_cover_map(stand, &crowns, COVER_TEXEL, MOST_COVER_TEXELS)?.smoothed())
+}
+
 /// The disc of ground that the plant's crown covers, which is smaller than one that contains every twig.
-pub(crate) fn crown(plant: &BakedPlant) -> PlantSize {
+fn crown(plant: &BakedPlant) -> PlantSize {
     let (half_width, height) = plant.plant.bounds().map_or((NO_PLANT.radius, NO_PLANT.height), |bounds| {
         let size = bounds.size();
         ((0.5 * size.x.max(size.z)).max(0.01), bounds.max.y.max(0.01))

@@ -1,4 +1,9 @@
 //! The stand of a scene: scattered by rule or read from an inventory.
+//!
+//! [`StandPlan`] comes before the plants are baked: an inventory is read and placed, and the trees are counted or
+//! estimated, so that what cannot be built is refused in the first second.
+
+use std::ops::Range;
 
 use glam::{DVec2, DVec3};
 
@@ -28,10 +33,81 @@ impl Ground for Terrain {
     }
 }
 
+/// Points that the number of scattered trees is estimated from. It is met to about one part in a hundred.
+const SAMPLES: f64 = 16_384.0;
+
+/// What is known of a scene's stand before its plants.
+pub struct StandPlan<'a> {
+    scene: &'a Scene,
+    terrain: &'a Terrain,
+    source: Source<'a>,
+    /// Trees that the scene asks for: of an inventory those on the terrain, of rules an estimate.
+    count: f64,
+}
+
+enum Source<'a> {
+    None,
+    Rules(&'a ScatteredTrees),
+    Inventory(&'a InventoryTrees, Inventory),
+}
+
+impl<'a> StandPlan<'a> {
+    /// Reads the inventory of `scene`, or estimates what its rules ask for on `terrain`.
+    ///
+    /// # Errors
+    /// [`StageError`] for rules that cannot be fulfilled, inventories that cannot be read, and
+    /// [`StageError::InventoryOutside`].
+    pub fn new(scene: &'a Scene, terrain: &'a Terrain) -> Result<Self, StageError> {
+        let (source, count) = match &scene.trees {
+            Trees::None => (Source::None, 0.0),
+            Trees::Scattered(rules) => (Source::Rules(rules), estimate(scene, rules, terrain)?),
+            Trees::Inventory(trees) => {
+                let options = InventoryOptions { dbh_unit: trees.dbh_unit, height_unit: trees.height_unit };
+                let inventory = read_inventory(&trees.path, options)?;
+                let count = count_inside(trees, &inventory, terrain)? as f64;
+                (Source::Inventory(trees, inventory), count)
+            }
+        };
+        Ok(Self { scene, terrain, source, count })
+    }
+
+    /// Refuses a scene that asks for more than `most` trees; `None` is no limit.
+    ///
+    /// # Errors
+    /// [`StageError::TooManyTrees`].
+    pub fn check(&self, most: Option<usize>) -> Result<(), StageError> {
+        match most {
+            Some(limit) if self.count > limit as f64 => {
+                Err(StageError::TooManyTrees { count: self.count.round() as usize, limit })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Builds the stand from plants of these sizes, by variant.
+    ///
+    /// # Errors
+    /// [`StageError`] for rules that cannot be fulfilled.
+    pub fn build(
+        &self,
+        plan: &PlantPlan,
+        sizes: &[PlantSize],
+        progress: &mut dyn Progress,
+    ) -> Result<Stand, StageError> {
+        match &self.source {
+            Source::None => Ok(Stand::default()),
+            Source::Rules(rules) => scatter(self.scene, rules, plan, sizes, self.terrain, progress),
+            Source::Inventory(trees, inventory) => {
+                from_inventory(self.scene, (trees, inventory), plan, sizes, self.terrain, progress)
+            }
+        }
+    }
+}
+
 /// Builds the stand of `scene` on `terrain`, from plants of these sizes, by variant.
 ///
 /// # Errors
-/// [`StageError`] for rules that cannot be fulfilled and inventories that cannot be read.
+/// Those of [`StandPlan`].
 pub fn build_stand(
     scene: &Scene,
     plan: &PlantPlan,
@@ -39,14 +115,50 @@ pub fn build_stand(
     terrain: &Terrain,
     progress: &mut dyn Progress,
 ) -> Result<Stand, StageError> {
-    match &scene.trees {
-        Trees::None => Ok(Stand::default()),
-        Trees::Scattered(rules) => scatter(scene, rules, plan, sizes, terrain, progress),
-        Trees::Inventory(inventory) => from_inventory(scene, inventory, plan, sizes, terrain, progress),
-    }
+    StandPlan::new(scene, terrain)?.build(plan, sizes, progress)
 }
 
-fn plant_heights(variants: &std::ops::Range<u16>, sizes: &[PlantSize]) -> Vec<f32> {
+/// The number of trees that `trees` ask for on `terrain`, from a sample.
+fn estimate(scene: &Scene, trees: &ScatteredTrees, terrain: &Terrain) -> Result<f64, StageError> {
+    // Where trees may stand does not depend on the plants: each species has one, of a height from which it can be scaled
+    // to all of its range.
+    let middle = |(low, high): (f64, f64)| (low * high).sqrt() as f32;
+    let plants = scene.species.iter().map(|species| (0..1, vec![middle(species.height)]));
+    let mut rules = rules(scene, trees, plants, terrain);
+    rules.validate()?;
+    let full = rules.full_count();
+    rules.stems_per_hectare *= (SAMPLES / full).min(1.0);
+    rules.min_distance_m = 0.0;
+    let report = place(&rules, terrain)?.report;
+    Ok(full * f64::from(report.placed) / report.candidates.max(1) as f64)
+}
+
+/// The number of an inventory's trees that stand on `terrain`.
+fn count_inside(trees: &InventoryTrees, inventory: &Inventory, terrain: &Terrain) -> Result<usize, StageError> {
+    let to_local = placement(trees, inventory, terrain)?;
+    let (mut low, mut high, mut count) = (DVec2::INFINITY, DVec2::NEG_INFINITY, 0);
+    for row in &inventory.rows {
+        let place = to_local(row.x, row.y);
+        let place = DVec2::new(place.x, place.z);
+        if place.is_finite() {
+            (low, high) = (low.min(place), high.max(place));
+            count += usize::from(terrain.contains(place.x, place.y));
+        }
+    }
+    if count == 0 && !inventory.rows.is_empty() {
+        let [west, south, east, north] = Area { min: low, max: high }.sides();
+        return Err(StageError::InventoryOutside {
+            path: trees.path.clone(),
+            count: inventory.rows.len(),
+            east: (west, east),
+            north: (south, north),
+            terrain: terrain.extent().to_array(),
+        });
+    }
+    Ok(count)
+}
+
+fn plant_heights(variants: &Range<u16>, sizes: &[PlantSize]) -> Vec<f32> {
     variants.clone().map(|variant| sizes.get(usize::from(variant)).map_or(1.0, |size| size.height)).collect()
 }
 
@@ -64,41 +176,8 @@ fn scatter(
     terrain: &Terrain,
     progress: &mut dyn Progress,
 ) -> Result<Stand, StageError> {
-    let extent = terrain.extent();
-    let area = trees.area.unwrap_or(Area::centered(DVec2::ZERO, extent));
-    let species = scene
-        .species
-        .iter()
-        .zip(&plan.variants)
-        .map(|(species, variants)| {
-            let heights = plant_heights(variants, sizes);
-            let (low, high) = (species.height.0 as f32, species.height.1 as f32);
-            SpeciesRule {
-                weight: species.weight,
-                height_range_m: species.elevation,
-                slope_limit: Some((species.slope_limit as f32).to_radians()),
-                trunk_radius_m: trunk_radius(species, &heights),
-                size: SizeRule::Height {
-                    mean_m: 0.5 * (low + high),
-                    // The bell ends at 2 sqrt(3) deviations from its mean: at the range's ends.
-                    deviation_m: 0.5 * (high - low) / (2.0 * 3f32.sqrt()) * 0.999,
-                    plant_heights_m: heights,
-                },
-                variants: variants.clone(),
-            }
-        })
-        .collect();
-    let rules = PlacementRules {
-        stems_per_hectare: trees.stems_per_hectare,
-        sequence: trees.sequence,
-        seed: scene.seed,
-        min_distance_m: trees.min_distance,
-        slope_limit: (trees.slope_limit as f32).to_radians(),
-        height_range_m: trees.elevation,
-        area,
-        clearings: trees.clearings,
-        species,
-    };
+    let plants = plan.variants.iter().map(|variants| (variants.clone(), plant_heights(variants, sizes)));
+    let rules = rules(scene, trees, plants, terrain);
     let placement = place(&rules, terrain)?;
     let report = &placement.report;
     if report.placed < report.wanted {
@@ -116,18 +195,58 @@ fn scatter(
     Ok(placement.stand)
 }
 
+/// The rules of `trees` for plants with these variants and heights in metres, by species.
+fn rules(
+    scene: &Scene,
+    trees: &ScatteredTrees,
+    plants: impl Iterator<Item = (Range<u16>, Vec<f32>)>,
+    terrain: &Terrain,
+) -> PlacementRules {
+    let area = trees.area.unwrap_or(Area::centered(DVec2::ZERO, terrain.extent()));
+    let species = scene
+        .species
+        .iter()
+        .zip(plants)
+        .map(|(species, (variants, heights))| {
+            let (low, high) = (species.height.0 as f32, species.height.1 as f32);
+            SpeciesRule {
+                weight: species.weight,
+                height_range_m: species.elevation,
+                slope_limit: Some((species.slope_limit as f32).to_radians()),
+                trunk_radius_m: trunk_radius(species, &heights),
+                size: SizeRule::Height {
+                    mean_m: 0.5 * (low + high),
+                    // The bell ends at 2 sqrt(3) deviations from its mean: at the range's ends.
+                    deviation_m: 0.5 * (high - low) / (2.0 * 3f32.sqrt()) * 0.999,
+                    plant_heights_m: heights,
+                },
+                variants,
+            }
+        })
+        .collect();
+    PlacementRules {
+        stems_per_hectare: trees.stems_per_hectare,
+        sequence: trees.sequence,
+        seed: scene.seed,
+        min_distance_m: trees.min_distance,
+        slope_limit: (trees.slope_limit as f32).to_radians(),
+        height_range_m: trees.elevation,
+        area,
+        clearings: trees.clearings,
+        species,
+    }
+}
+
 fn from_inventory(
     scene: &Scene,
-    trees: &InventoryTrees,
+    (trees, inventory): (&InventoryTrees, &Inventory),
     plan: &PlantPlan,
     sizes: &[PlantSize],
     terrain: &Terrain,
     progress: &mut dyn Progress,
 ) -> Result<Stand, StageError> {
-    let options = InventoryOptions { dbh_unit: trees.dbh_unit, height_unit: trees.height_unit };
-    let inventory = read_inventory(&trees.path, options)?;
     let table = species_table(scene, trees, plan, sizes);
-    let to_local = placement(trees, &inventory, terrain)?;
+    let to_local = placement(trees, inventory, terrain)?;
     let result = stand_from_inventory(&inventory.rows, to_local, terrain, &table, scene.seed)?;
     for line in result.warnings.to_string().lines() {
         progress.warn(&format!("{}: {line}", trees.path.display()));
@@ -172,7 +291,7 @@ fn species_table(
     plan: &PlantPlan,
     sizes: &[PlantSize],
 ) -> Vec<InventorySpecies> {
-    let entry = |name: &str, species: &Species, variants: &std::ops::Range<u16>| {
+    let entry = |name: &str, species: &Species, variants: &Range<u16>| {
         let heights = plant_heights(variants, sizes);
         InventorySpecies {
             name: name.to_owned(),

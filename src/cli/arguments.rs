@@ -136,7 +136,8 @@ pub struct Fly {
   A flight along the scene's path, written to flight/0000.png and so on:
     canopy render demo.ron --out flight --along 10s --frames 250 --fps 25
   A day from a fixed camera:
-    canopy render demo.ron --out day.png --frames 96 --from 2026-06-21T04:00-04:00 --to 2026-06-21T22:00-04:00")]
+    canopy render demo.ron --out day.png --frames 96 --from 2026-06-21T04:00-04:00 --to 2026-06-21T22:00-04:00
+Ctrl-C stops after the current image; the same command with --resume renders the others.")]
 pub struct Render {
     /// Scene file.
     pub scene: PathBuf,
@@ -164,6 +165,9 @@ pub struct Render {
     /// Last instant of a time-lapse.
     #[arg(long, value_name = "TIME", requires = "from")]
     pub to: Option<LocalTime>,
+    /// Keep the images that an earlier, interrupted run of the same command has finished; the scene must be unchanged.
+    #[arg(long)]
+    pub resume: bool,
 }
 
 /// Arguments of `canopy reference`.
@@ -171,7 +175,8 @@ pub struct Render {
 #[command(after_help = "Examples:
   canopy reference demo.ron --out truth.exr --spp 256 --size 640x360
   canopy reference demo.ron --out truth.png --at 2026-06-21T19:30-04:00 --camera 0,2,0,270,5 --spp 64 --resume
-A trace can be interrupted: its state is saved every 30 s next to the image, and --resume continues from there.")]
+A trace can be interrupted: its state is saved every 30 s and at Ctrl-C next to the image, and --resume continues from
+there.")]
 pub struct Reference {
     /// Scene file.
     pub scene: PathBuf,

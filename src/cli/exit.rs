@@ -1,7 +1,9 @@
-//! How the program ends: 0 for success, 1 for an error, 2 for wrong usage.
+//! How the program ends: 0 for success, 1 for an error, 2 for wrong usage, 130 and 143 for an interrupt.
 
 use std::io::Write;
 use std::process::ExitCode;
+
+use canopy::app::{AppError, Interrupt, interrupt_received};
 
 /// The outcome of a command.
 pub enum Outcome {
@@ -9,6 +11,8 @@ pub enum Outcome {
     Done,
     /// The arguments do not fit together.
     Usage(clap::Error),
+    /// The user interrupted it; the text says what was finished.
+    Interrupted(String),
     /// Something went wrong.
     Failed(anyhow::Error),
 }
@@ -17,7 +21,10 @@ impl From<anyhow::Result<()>> for Outcome {
     fn from(result: anyhow::Result<()>) -> Self {
         match result {
             Ok(()) => Self::Done,
-            Err(error) => Self::Failed(error),
+            Err(error) => match error.downcast_ref() {
+                Some(AppError::Interrupted(what)) => Self::Interrupted(what.clone()),
+                _ => Self::Failed(error),
+            },
         }
     }
 }
@@ -30,6 +37,15 @@ pub fn finish(outcome: Outcome) -> ExitCode {
             // A closed terminal does not change the outcome.
             let _ = error.print();
             ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
+        }
+        Outcome::Interrupted(what) => {
+            let interrupt = interrupt_received().unwrap_or(Interrupt::CtrlC);
+            let word = match interrupt {
+                Interrupt::CtrlC => "interrupted",
+                Interrupt::Terminate => "terminated",
+            };
+            let _ = writeln!(std::io::stderr(), "{word}: {what}");
+            ExitCode::from(interrupt.exit_code())
         }
         Outcome::Failed(error) => {
             let _ = writeln!(std::io::stderr(), "error: {error}");

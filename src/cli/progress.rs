@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use canopy::progress::Progress;
+use canopy::{app::interrupt_received, progress::Progress};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// A progress bar on the standard error output, one stage at a time. It disappears with its stage, and is never drawn
@@ -57,6 +57,10 @@ impl Progress for Bars {
         if !self.quiet {
             self.bar.suspend(|| eprint_line(message));
         }
+    }
+
+    fn is_cancelled(&self) -> bool {
+        interrupt_received().is_some()
     }
 }
 

@@ -42,6 +42,7 @@ pub fn render_options(render: Render, common: &Common) -> Result<RenderOptions, 
     Ok(RenderOptions {
         view: view(&render.view),
         size: render.size,
+        resume: render.resume,
         overrides: overrides(common),
         adapter: common.adapter.clone(),
         quiet: common.quiet,

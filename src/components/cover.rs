@@ -13,11 +13,15 @@ use bevy::ecs::{
 use glam::DVec2;
 
 use super::Terrain3d;
-use crate::{render::components::Ground, scatter::CoverMap};
+use crate::{
+    assets::stage::{COVER_TEXEL, MOST_COVER_TEXELS},
+    render::components::Ground,
+    scatter::CoverMap,
+};
 
-/// Maximum number of texels of a sum; 64 MiB. Beyond it the forests are too far apart for one map, and that of the
-/// largest forest is used.
-const MOST_TEXELS: f64 = 67_108_864.0;
+/// Largest texel of a sum in metres. Forests that would need a larger one are too far apart for one map, and that of
+/// the largest forest is used.
+const LARGEST_TEXEL: f64 = 16.0 * COVER_TEXEL;
 
 /// The canopy cover of a forest, and its terrain.
 #[derive(Component, Clone, Debug)]
@@ -57,25 +61,36 @@ pub fn cover_grounds(
     }
 }
 
-/// The sum of maps whose texels have one size and lie on one grid, at most 255 per texel. `None` for no maps; a single
-/// map is returned as it is.
+/// The sum of maps, at most 255 per texel, on the smallest texels that all of them have in common: their sizes differ by
+/// powers of two, and they begin at multiples of their size. `None` for no maps; a single map is returned as it is.
 fn sum(maps: &[&Arc<CoverMap>]) -> Option<Arc<CoverMap>> {
     let filled: Vec<&Arc<CoverMap>> = maps.iter().filter(|map| map.columns > 0 && map.rows > 0).copied().collect();
     let (first, others) = filled.split_first()?;
     if others.is_empty() {
         return Some(Arc::clone(first));
     }
-    let texel = first.texel;
-    let extent = |map: &CoverMap| texel * DVec2::new(f64::from(map.columns), f64::from(map.rows));
+    let extent = |map: &CoverMap| map.texel * DVec2::new(f64::from(map.columns), f64::from(map.rows));
     let min = filled.iter().fold(first.origin, |min, map| min.min(map.origin));
     let max = filled.iter().fold(first.origin, |max, map| max.max(map.origin + extent(map)));
-    let size = ((max - min) / texel).round();
-    if !(0.0..=MOST_TEXELS).contains(&(size.x * size.y)) {
+    let mut texel = filled.iter().fold(first.texel, |texel, map| texel.max(map.texel));
+    let frame = |texel: f64| {
+        let first = (min / texel).floor();
+        (first * texel, (max / texel).ceil() - first)
+    };
+    let is_large = |texel: f64| {
+        let (_, size) = frame(texel);
+        !(0.0..=f64::from(MOST_COVER_TEXELS)).contains(&(size.x * size.y))
+    };
+    while is_large(texel) && texel < LARGEST_TEXEL {
+        texel *= 2.0;
+    }
+    if is_large(texel) {
         return filled.iter().max_by_key(|map| map.cover.len()).map(|map| Arc::clone(map));
     }
+    let (min, size) = frame(texel);
     let (columns, rows) = (size.x as usize, size.y as usize);
     let mut cover = vec![0u8; columns * rows];
-    for map in &filled {
+    for map in filled.iter().map(|map| map.coarsened((texel / map.texel).round() as u32)) {
         let first = ((map.origin - min) / texel).round();
         let (column, row) = (first.x as usize, first.y as usize);
         for (line, from) in map.cover.chunks_exact(map.columns as usize).enumerate() {
@@ -106,6 +121,26 @@ mod tests {
         assert_eq!(both.cover, [10, 200, 0, 30, 45, 6, 0, 255, 7]);
         let twice = sum(&[&west, &west]).expect("a map");
         assert_eq!(twice.cover, [20, 255, 60, 80]);
+    }
+
+    #[test]
+    fn covers_of_different_texels_add_up_on_the_larger_ones() {
+        let fine = map((-8.0, 8.0), 2, &[10, 30, 40, 60]);
+        let coarse = Arc::new(CoverMap { origin: DVec2::ZERO, texel: 16.0, columns: 1, rows: 1, cover: vec![100] });
+        let both = sum(&[&fine, &coarse]).expect("a map");
+        assert_eq!((both.origin, both.texel, both.columns, both.rows), (DVec2::new(-16.0, 0.0), 16.0, 2, 2));
+        // Each coarse texel has one of the fine ones in its four.
+        assert_eq!(both.cover, [3, 108, 10, 15]);
+    }
+
+    #[test]
+    fn forests_far_apart_share_a_map_of_larger_texels() {
+        let here = map((0.0, 0.0), 2, &[200; 4]);
+        let there = map((80_000.0, 80_000.0), 2, &[200; 4]);
+        let both = sum(&[&here, &there]).expect("a map");
+        assert!(both.texel == 32.0 && both.cover.len() <= MOST_COVER_TEXELS as usize, "{}", both.texel);
+        assert_eq!(both.at(DVec2::ONE), 50.0 / 255.0);
+        assert_eq!(both.at(DVec2::splat(80_001.0)), 50.0 / 255.0);
     }
 
     #[test]

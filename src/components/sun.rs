@@ -250,6 +250,10 @@ impl Plugin for SunPlugin {
 fn run_clocks(time: Option<Res<Time>>, mut suns: Query<&mut Sun>) {
     let Some(time) = time else { return };
     for mut sun in &mut suns {
+        if !sun.rate.is_finite() {
+            error_once!("the clock of a Sun stands still: its rate is {}; give seconds per second", sun.rate);
+            continue;
+        }
         let step = seconds(sun.rate * time.delta_secs_f64());
         if !step.is_zero()
             && let Some(instant) = sun.instant.checked_add_signed(step)
@@ -335,6 +339,51 @@ mod tests {
             assert_eq!(seconds(rate).num_days().abs(), i64::MAX / 86_400_000_000_000, "{rate}");
         }
         assert_eq!(seconds(1.5), TimeDelta::milliseconds(1500));
+    }
+
+    #[test]
+    fn impossible_suns_have_no_light() -> Result<(), LightError> {
+        let atmosphere = Atmosphere::new(AtmosphereParams::default())?;
+        let sun = Sun::default();
+        assert!(sun.light(&atmosphere).is_ok());
+        let at = |change: &dyn Fn(&mut Observer)| {
+            let mut observer = sun.observer;
+            change(&mut observer);
+            Sun { observer, ..sun.clone() }
+        };
+        let late = DateTime::from_timestamp(253_370_764_800, 0).unwrap_or_default();
+        assert_eq!(late.to_rfc3339(), "9999-01-01T00:00:00+00:00");
+        let mut impossible = vec![
+            Sun { instant: late, ..sun.clone() },
+            Sun { instant: DateTime::<Utc>::MAX_UTC, ..sun.clone() },
+            Sun { instant: DateTime::<Utc>::MIN_UTC, ..sun.clone() },
+        ];
+        for wrong in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e9, -1e9] {
+            impossible.push(at(&|observer| observer.latitude_deg = wrong));
+            impossible.push(at(&|observer| observer.longitude_deg = wrong));
+            impossible.push(at(&|observer| observer.height_m = wrong));
+            impossible.push(at(&|observer| observer.pressure_mbar = wrong));
+            impossible.push(at(&|observer| observer.temperature_c = wrong));
+            impossible.push(Sun { compensation_ev: wrong as f32, ..sun.clone() });
+            assert!(Atmosphere::new(AtmosphereParams::with_visibility_km(wrong)).is_err(), "{wrong} km");
+        }
+        for sun in impossible {
+            assert!(sun.light(&atmosphere).is_err(), "{sun:?}");
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn a_clock_whose_rate_is_no_number_stands_still() {
+        let mut app = App::new();
+        app.insert_resource(Time::<()>::default()).add_systems(PreUpdate, run_clocks);
+        let start = Sun::default();
+        let suns = [f64::NAN, f64::INFINITY].map(|rate| app.world_mut().spawn(start.clone().running(rate)).id());
+        app.world_mut().resource_mut::<Time>().advance_by(std::time::Duration::from_secs(1));
+        app.update();
+        for sun in suns {
+            assert_eq!(app.world().get::<Sun>(sun).map(|sun| sun.instant), Some(start.instant));
+        }
     }
 
     #[test]

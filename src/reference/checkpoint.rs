@@ -8,7 +8,6 @@
 //! hash at the end that of all bytes before it. The file appears whole or not at all: it is written under another name,
 //! then renamed.
 
-use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -56,7 +55,7 @@ impl Film {
     /// [`ReferenceError::Read`], [`ReferenceError::Checkpoint`] for a file that is damaged, [`ReferenceError::Stale`]
     /// for one of another fingerprint.
     pub fn load_checkpoint(path: &Path, fingerprint: &[u8; 32]) -> Result<Option<Self>, ReferenceError> {
-        let bytes = match fs::read(path) {
+        let bytes = match files::read_ordinary(path) {
             Ok(bytes) => bytes,
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
             Err(source) => return Err(ReferenceError::Read { path: path.to_owned(), source }),

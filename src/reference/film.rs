@@ -109,6 +109,22 @@ impl PathTracer<'_> {
         until: u32,
         hear: &mut dyn FnMut(&Film) -> ControlFlow<()>,
     ) -> Result<(), ReferenceError> {
+        self.render_unless(shot, film, until, &|| false, hear)
+    }
+
+    /// As [`render`](Self::render), but `stop` is also asked during a pass, from any thread, before each
+    /// tile of 16 × 16 pixels. Once it is true, the work ends; the samples of the unfinished pass are dropped.
+    ///
+    /// # Errors
+    /// Those of [`render`](Self::render).
+    pub fn render_unless(
+        &self,
+        shot: &Shot,
+        film: &mut Film,
+        until: u32,
+        stop: &(dyn Fn() -> bool + Sync),
+        hear: &mut dyn FnMut(&Film) -> ControlFlow<()>,
+    ) -> Result<(), ReferenceError> {
         shot.camera.check()?;
         let (width, height) = shot.camera.size;
         if film.size != shot.camera.size {
@@ -128,11 +144,11 @@ impl PathTracer<'_> {
         };
         while film.samples < until {
             let sample = film.samples;
-            let passes: Vec<Vec<Vec3>> = (0..tiles)
-                .into_par_iter()
-                .map(|tile| pixels(tile).map(|(column, row)| self.sample(shot, column, row, sample)).collect())
-                .collect();
-            for (tile, values) in (0..tiles).zip(passes) {
+            let trace = |tile| pixels(tile).map(|(column, row)| self.sample(shot, column, row, sample)).collect();
+            let pass: Option<Vec<Vec<Vec3>>> =
+                (0..tiles).into_par_iter().map(|tile| (!stop()).then(|| trace(tile))).collect();
+            let Some(pass) = pass else { break };
+            for (tile, values) in (0..tiles).zip(pass) {
                 for ((column, row), value) in pixels(tile).zip(values) {
                     let at = row as usize * width as usize + column as usize;
                     film.sums[at] += value.as_dvec3();

@@ -34,6 +34,11 @@ pub struct CoverMap {
 }
 
 impl CoverMap {
+    /// The map of no trees.
+    fn empty(texel: f64) -> Self {
+        Self { origin: DVec2::ZERO, texel, columns: 0, rows: 0, cover: Vec::new() }
+    }
+
     /// Share of the ground under crowns at a point (X, Z), 0 to 1, of the texel it is in; 0 outside of the map.
     pub fn at(&self, point: DVec2) -> f32 {
         let location = ((point - self.origin) / self.texel).floor();
@@ -66,19 +71,52 @@ impl CoverMap {
                 |(r, wr): (Option<usize>, u32)| taps(column).map(|(c, wc)| wr * wc * value(c, r)).iter().sum::<u32>();
             taps(row).map(weighted).iter().sum()
         };
-        let rows_out = 0..rows + 2;
-        let cover = rows_out.flat_map(|row| (0..columns + 2).map(move |column| (column, row)));
+        let is_open = |row: Option<usize>| {
+            let line = row.and_then(|row| self.cover.get(row * columns..(row + 1) * columns));
+            line.is_none_or(|line| line.iter().all(|value| *value == 0))
+        };
+        let mut cover = vec![0; (columns + 2) * (rows + 2)];
+        cover.par_chunks_mut(columns + 2).enumerate().for_each(|(row, line)| {
+            // Few rows of a large map have trees.
+            if !taps(row).iter().all(|(row, _)| is_open(*row)) {
+                line.iter_mut().enumerate().for_each(|(column, to)| *to = ((sum(column, row) + 8) / 16) as u8);
+            }
+        });
         Self {
             origin: self.origin - self.texel,
             texel: self.texel,
             columns: self.columns + 2,
             rows: self.rows + 2,
-            cover: cover.map(|(column, row)| ((sum(column, row) + 8) / 16) as u8).collect(),
+            cover,
         }
     }
 }
 
 impl CoverMap {
+    /// The map with texels of `times` the size (1 or more), each the mean of those below it. They begin at multiples of
+    /// their size, as those of [`cover_map`] do.
+    pub fn coarsened(&self, times: u32) -> Self {
+        if times <= 1 || self.cover.is_empty() {
+            return self.clone();
+        }
+        let texel = self.texel * f64::from(times);
+        let origin = (self.origin / texel).floor() * texel;
+        let first = ((self.origin - origin) / self.texel).round();
+        let (left, top, times) = (first.x as usize, first.y as usize, times as usize);
+        let columns = (self.columns as usize + left).div_ceil(times);
+        let rows = (self.rows as usize + top).div_ceil(times);
+        let mut sums = vec![0u32; columns * rows];
+        for (row, line) in self.cover.chunks_exact(self.columns as usize).enumerate() {
+            let start = (row + top) / times * columns;
+            for (column, value) in line.iter().enumerate() {
+                sums[start + (column + left) / times] += u32::from(*value);
+            }
+        }
+        let area = (times * times) as f64;
+        let cover = sums.iter().map(|sum| (f64::from(*sum) / area).round() as u8).collect();
+        Self { origin, texel, columns: columns as u32, rows: rows as u32, cover }
+    }
+
     /// The map blurred by a pyramid-shaped kernel that falls to 0 at `radius` metres along either axis, with texels of
     /// the same size. The cover outside the map counts as 0, and the result is larger than the map by the kernel. It
     /// takes a few milliseconds for a million texels.
@@ -183,12 +221,65 @@ pub fn cover_map<S: Crowns>(
     texel: f64,
     extent: Option<Area>,
 ) -> Result<CoverMap, ScatterError> {
-    let bad_texel = |remedy: String| ScatterError::Size { what: "the texel of the cover map", value: texel, remedy };
-    if !(MIN_TEXEL_M..=f64::MAX).contains(&texel) {
-        return Err(bad_texel(format!("give finite metres, at least {MIN_TEXEL_M}")));
+    check_texel(texel)?;
+    let crowns = crowns_of(stand, bounds)?;
+    let Some(span) = extent.or_else(|| span(&crowns)) else { return Ok(CoverMap::empty(texel)) };
+    draw_within(&crowns, texel, &span)
+}
+
+fn bad_texel(texel: f64, remedy: String) -> ScatterError {
+    ScatterError::Size { what: "the texel of the cover map", value: texel, remedy }
+}
+
+fn check_texel(texel: f64) -> Result<(), ScatterError> {
+    if (MIN_TEXEL_M..=f64::MAX).contains(&texel) {
+        return Ok(());
     }
+    Err(bad_texel(texel, format!("give finite metres, at least {MIN_TEXEL_M}")))
+}
+
+fn draw_within(crowns: &[Crown], texel: f64, span: &Area) -> Result<CoverMap, ScatterError> {
+    let origin = (span.min / texel).floor() * texel;
+    let counts = ((span.max - origin) / texel).ceil().max(DVec2::ONE);
+    if !(0.0..=MAX_TEXELS).contains(&(counts.x * counts.y)) {
+        let least = (span.size().x * span.size().y / MAX_TEXELS).sqrt().max(span.size().max_element() / MAX_TEXELS);
+        let remedy = format!("the map would have more than {MAX_TEXELS} texels; give more than {least:.2} m");
+        return Err(bad_texel(texel, remedy));
+    }
+    Ok(draw(crowns, origin, texel, (counts.x as usize, counts.y as usize)))
+}
+
+/// As [`cover_map`] of all crowns, on texels of at least `texel` metres: of that size times the least power of two with
+/// which the map has at most `most` texels (1 to 2²⁶). So a stand may be as wide as it likes.
+///
+/// # Errors
+/// Those of [`cover_map`], except for a map that is too large.
+pub fn bounded_cover_map<S: Crowns>(
+    stand: &S,
+    bounds: &[PlantSize],
+    texel: f64,
+    most: u32,
+) -> Result<CoverMap, ScatterError> {
+    check_texel(texel)?;
+    let crowns = crowns_of(stand, bounds)?;
+    let Some(span) = span(&crowns) else { return Ok(CoverMap::empty(texel)) };
+    let most = f64::from(most).clamp(1.0, MAX_TEXELS);
+    let size = span.size();
+    let fits = |texel: f64| {
+        let counts = (size / texel).ceil() + 1.0;
+        counts.x * counts.y <= most.max(4.0)
+    };
+    let mut bounded = texel;
+    while bounded.is_finite() && !fits(bounded) {
+        bounded *= 2.0;
+    }
+    draw_within(&crowns, bounded, &span)
+}
+
+/// The crowns of a stand.
+fn crowns_of<S: Crowns>(stand: &S, bounds: &[PlantSize]) -> Result<Vec<Crown>, ScatterError> {
     check_bounds(bounds)?;
-    let crowns: Vec<Crown> = stand
+    stand
         .crowns()
         .enumerate()
         .map(|(tree, (center, variant, scale))| {
@@ -201,40 +292,36 @@ pub fn cover_map<S: Crowns>(
             }
             Ok(Crown { center, radius: f64::from(bound.radius * scale) })
         })
-        .collect::<Result<_, _>>()?;
-    let span = extent.or_else(|| {
-        crowns.iter().fold(None, |span: Option<Area>, crown| {
-            let (min, max) = (crown.center - crown.radius, crown.center + crown.radius);
-            Some(span.map_or(Area { min, max }, |span| Area { min: span.min.min(min), max: span.max.max(max) }))
-        })
-    });
-    let Some(span) = span else {
-        return Ok(CoverMap { origin: DVec2::ZERO, texel, columns: 0, rows: 0, cover: Vec::new() });
-    };
-    let origin = (span.min / texel).floor() * texel;
-    let counts = ((span.max - origin) / texel).ceil().max(DVec2::ONE);
-    if !(0.0..=MAX_TEXELS).contains(&(counts.x * counts.y)) {
-        let least = (span.size().x * span.size().y / MAX_TEXELS).sqrt().max(span.size().max_element() / MAX_TEXELS);
-        return Err(bad_texel(format!(
-            "the map would have more than {MAX_TEXELS} texels; give more than {least:.2} m"
-        )));
-    }
-    let (columns, rows) = (counts.x as usize, counts.y as usize);
+        .collect()
+}
 
-    let mut open = vec![1f32; columns * rows];
+/// The rectangle around all crowns; `None` without any.
+fn span(crowns: &[Crown]) -> Option<Area> {
+    crowns.iter().fold(None, |span: Option<Area>, crown| {
+        let (min, max) = (crown.center - crown.radius, crown.center + crown.radius);
+        Some(span.map_or(Area { min, max }, |span| Area { min: span.min.min(min), max: span.max.max(max) }))
+    })
+}
+
+/// The map of `crowns`. Only bands of rows that crowns touch cost more than their zeros.
+fn draw(crowns: &[Crown], origin: DVec2, texel: f64, (columns, rows): (usize, usize)) -> CoverMap {
+    let mut cover = vec![0u8; columns * rows];
     let largest = crowns.iter().fold(0f64, |largest, crown| largest.max(crown.radius));
     let discs = UnitDisc::ladder(largest / texel);
-    let bands = crowns_by_band(&crowns, origin, texel, rows);
-    open.par_chunks_mut(BAND * columns).enumerate().for_each(|(band, texels)| {
+    let bands = crowns_by_band(crowns, origin, texel, rows);
+    cover.par_chunks_mut(BAND * columns).zip(&bands).enumerate().for_each(|(band, (texels, crowns))| {
+        if crowns.is_empty() {
+            return;
+        }
         let grid =
             BandGrid { origin: origin + DVec2::new(0.0, (band * BAND) as f64 * texel), texel, columns, discs: &discs };
-        let mut shares = vec![0f32; columns];
-        for crown in &bands[band] {
-            grid.splat(*crown, texels, &mut shares);
+        let (mut open, mut shares) = (vec![1f32; texels.len()], vec![0f32; columns]);
+        for crown in crowns {
+            grid.splat(*crown, &mut open, &mut shares);
         }
+        texels.iter_mut().zip(open).for_each(|(to, open)| *to = ((1.0 - open) * 255.0).round() as u8);
     });
-    let cover = open.par_iter().map(|open| ((1.0 - open) * 255.0).round() as u8).collect();
-    Ok(CoverMap { origin, texel, columns: columns as u32, rows: rows as u32, cover })
+    CoverMap { origin, texel, columns: columns as u32, rows: rows as u32, cover }
 }
 
 /// The crowns that touch each band of rows, in order.

@@ -30,7 +30,7 @@ mod stand;
 pub mod stream;
 
 pub use allometry::Allometry;
-pub use cover::{CoverMap, cover_map};
+pub use cover::{CoverMap, bounded_cover_map, cover_map};
 pub use error::{BadValue, ScatterError};
 pub use inventory::{
     Coordinates, Inventory, InventoryOptions, InventoryTree, LengthUnit, parse_inventory, read_inventory,

@@ -109,6 +109,9 @@ impl Pose {
     }
 }
 
+/// Least time between two keys of a path in seconds: a millisecond, less what decimals lose.
+const LEAST_STEP: f64 = 0.000_999_9;
+
 impl Camera {
     pub(super) fn check(&self, check: &mut Check) {
         self.start.check("camera.start", check);
@@ -121,6 +124,18 @@ impl Camera {
             key.pose().check(&at, check);
             let finite = check.number(&format!("{at}.seconds"), key.seconds, 0.0..=86_400.0, "s");
             let before = number.checked_sub(1).and_then(|before| self.path.get(before));
+            let close =
+                |before: &&PathKey| finite && before.seconds < key.seconds && key.seconds - before.seconds < LEAST_STEP;
+            if let Some(before) = before.filter(close) {
+                check.problem(
+                    &format!("{at}.seconds"),
+                    format!(
+                        "is {} s, less than a millisecond after the key before it ({} s)",
+                        key.seconds, before.seconds
+                    ),
+                    "leave more time between the keys, or remove one",
+                );
+            }
             if let Some(before) = before.filter(|before| finite && before.seconds >= key.seconds) {
                 check.problem(
                     &format!("{at}.seconds"),

@@ -9,15 +9,16 @@ use super::locate::{Outline, Position};
 
 /// Gathers the problems of one scene.
 pub(super) struct Check<'a> {
-    /// Outline of the scene file's text; `None` for a scene that was built in code.
-    text: Option<Option<Outline<'a>>>,
-    problems: Vec<Problem>,
+    /// The scene file's text and its outline; `None` for a scene that was built in code.
+    text: Option<(&'a str, Option<Outline<'a>>)>,
+    /// With the byte offset of each value in the text.
+    problems: Vec<(usize, Problem)>,
 }
 
 impl<'a> Check<'a> {
     /// Checks a scene that was read from `text`: problems have positions.
     pub(super) fn of_text(text: &'a str) -> Self {
-        Self { text: Some(Outline::of(text)), problems: Vec::new() }
+        Self { text: Some((text, Outline::of(text))), problems: Vec::new() }
     }
 
     /// Checks a scene that was built in code: problems have no positions.
@@ -27,16 +28,11 @@ impl<'a> Check<'a> {
 
     /// Notes what is wrong with the value at `field`.
     pub(super) fn problem(&mut self, field: &str, message: impl Into<String>, remedy: impl Into<String>) {
-        let position = self
-            .text
-            .as_ref()
-            .map(|outline| outline.as_ref().map_or(Position { line: 1, column: 1 }, |outline| outline.value(field)));
-        self.problems.push(Problem {
-            position,
-            field: field.to_owned(),
-            message: message.into(),
-            remedy: remedy.into(),
-        });
+        let outline = self.text.as_ref().and_then(|(_, outline)| outline.as_ref());
+        let offset = outline.map_or(0, |outline| outline.offset(field));
+        let problem =
+            Problem { position: None, field: field.to_owned(), message: message.into(), remedy: remedy.into() };
+        self.problems.push((offset, problem));
     }
 
     /// A number that must be finite and in `range`; whether it is.
@@ -115,7 +111,16 @@ impl<'a> Check<'a> {
 
     /// The error that lists the problems in the file's order, if there are any.
     pub(super) fn finish(mut self, scene: String) -> Result<(), SceneError> {
-        self.problems.sort_by_key(|problem| problem.position);
-        if self.problems.is_empty() { Ok(()) } else { Err(SceneError::Invalid { scene, problems: self.problems }) }
+        if self.problems.is_empty() {
+            return Ok(());
+        }
+        self.problems.sort_by_key(|(offset, _)| *offset);
+        let (offsets, mut problems): (Vec<usize>, Vec<Problem>) = self.problems.into_iter().unzip();
+        if let Some((text, _)) = self.text {
+            // All at once: a text is not searched again for each of its mistakes.
+            let positions = Position::of_offsets(text.char_indices(), &offsets);
+            problems.iter_mut().zip(positions).for_each(|(problem, position)| problem.position = Some(position));
+        }
+        Err(SceneError::Invalid { scene, problems })
     }
 }

@@ -7,6 +7,9 @@ use ron::error::{Error as RonError, SpannedError};
 
 use super::locate::{Outline, Position};
 
+/// Mistakes that a message lists; it counts the others.
+const LISTED: usize = 20;
+
 /// Why a scene file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
@@ -43,7 +46,7 @@ pub enum SceneError {
         /// What to do about it.
         remedy: String,
     },
-    /// The scene is well formed, but values in it are out of range. Every one found is listed, in the file's order.
+    /// The scene is well formed, but values in it are out of range. The message lists the first 20.
     #[error("{}", problem_lines(scene, problems))]
     Invalid {
         /// The file, or [`Scene::label`](super::Scene::label) of a scene that was built in code.
@@ -79,8 +82,10 @@ impl fmt::Display for Problem {
 fn problem_lines(scene: &str, problems: &[Problem]) -> String {
     // Editors and terminals recognise `file:line:column: ` as a link.
     let colon = |problem: &Problem| if problem.position.is_some() { ":" } else { ": " };
-    let lines: Vec<String> = problems.iter().map(|problem| format!("{scene}{}{problem}", colon(problem))).collect();
-    lines.join("\n")
+    let listed = problems.iter().take(LISTED).map(|problem| format!("{scene}{}{problem}", colon(problem)));
+    let more = (problems.len() > LISTED)
+        .then(|| format!("{scene}: {} mistakes, of which the first {LISTED} are listed", problems.len()));
+    listed.chain(more).collect::<Vec<_>>().join("\n")
 }
 
 /// Turns RON's error into ours: known fields are listed, the nearest name is suggested, and the position is that of
@@ -193,10 +198,12 @@ pub(super) fn nearest<'a>(found: &str, known: &[&'a str]) -> Option<&'a str> {
     let found: Vec<char> = found.to_lowercase().chars().collect();
     known
         .iter()
-        .map(|name| {
+        .filter_map(|name| {
             let letters: Vec<char> = name.to_lowercase().chars().collect();
             let limit = (letters.len().max(found.len()) / 3).max(1);
-            (edit_distance(&found, &letters), limit, *name)
+            // The distance is at least the difference in length, and costs far more.
+            let possible = letters.len().abs_diff(found.len()) <= limit;
+            possible.then(|| (edit_distance(&found, &letters), limit, *name))
         })
         .filter(|(distance, limit, _)| distance <= limit)
         .min_by_key(|(distance, _, _)| *distance)

@@ -5,6 +5,7 @@
 //! handles RON's brackets, names, strings and comments, is independent of scenes, and answers "where is
 //! `species[1].height[0]`?".
 
+use std::collections::HashMap;
 use std::fmt;
 
 /// Nesting deeper than any scene; a text beyond it gets no outline rather than a full stack.
@@ -22,14 +23,25 @@ pub struct Position {
 impl Position {
     /// The position of byte `offset` of `text` (clamped to the text).
     pub fn of_offset(text: &str, offset: usize) -> Self {
-        let before = text.char_indices().take_while(|(at, _)| *at < offset).map(|(_, letter)| letter);
-        before.fold(Self { line: 1, column: 1 }, |at, letter| {
-            if letter == '\n' {
-                Self { line: at.line + 1, column: 1 }
-            } else {
-                Self { line: at.line, column: at.column + 1 }
+        Self::of_offsets(text.char_indices(), &[offset]).pop().unwrap_or(Self { line: 1, column: 1 })
+    }
+
+    /// The positions of byte `offsets` that grow, in a text of these `letters` with their offsets (clamped to the
+    /// text). No letter is taken twice, however many offsets there are.
+    pub(super) fn of_offsets(letters: impl Iterator<Item = (usize, char)>, offsets: &[usize]) -> Vec<Self> {
+        let mut letters = letters.peekable();
+        let mut at = Self { line: 1, column: 1 };
+        let position = |offset: &usize| {
+            while let Some((_, letter)) = letters.next_if(|(before, _)| before < offset) {
+                at = if letter == '\n' {
+                    Self { line: at.line + 1, column: 1 }
+                } else {
+                    Self { line: at.line, column: at.column + 1 }
+                };
             }
-        })
+            at
+        };
+        offsets.iter().map(position).collect()
     }
 
     /// This position, moved past blanks.
@@ -65,6 +77,8 @@ struct Node {
     group: bool,
     /// Values by name, with the offset of the name.
     fields: Vec<(String, usize, Node)>,
+    /// The first field of each name.
+    by_name: HashMap<String, usize>,
     /// Values without names (list and tuple elements; a map's values follow their keys).
     items: Vec<Node>,
 }
@@ -89,10 +103,10 @@ impl<'a> Outline<'a> {
         Some(Self { text, root: scanner.value(0)? })
     }
 
-    /// The position of the value at `path` (fields by name, elements by number: `species[1].height[0]`), or of the
+    /// The byte offset of the value at `path` (fields by name, elements by number: `species[1].height[0]`), or of the
     /// innermost structure on the way to it that the text does contain. Choices are transparent: the fields of
     /// `trees: Scattered(...)` are `trees.min_distance` and so on.
-    pub fn value(&self, path: &str) -> Position {
+    pub fn offset(&self, path: &str) -> usize {
         let mut node = &self.root;
         for step in path.split(['.', '[']) {
             let child = match step.strip_suffix(']') {
@@ -104,7 +118,7 @@ impl<'a> Outline<'a> {
                 None => break,
             }
         }
-        Position::of_offset(self.text, node.start)
+        node.start
     }
 
     /// The last field called `name` whose name starts before `end`.
@@ -167,7 +181,12 @@ impl<'a> Outline<'a> {
 
 impl Node {
     fn leaf(start: usize, end: usize, tag: Option<String>) -> Self {
-        Self { start, end, tag, group: false, fields: Vec::new(), items: Vec::new() }
+        Self { start, end, tag, group: false, fields: Vec::new(), by_name: HashMap::new(), items: Vec::new() }
+    }
+
+    fn push_field(&mut self, name: String, start: usize, value: Self) {
+        self.by_name.entry(name.clone()).or_insert(self.fields.len());
+        self.fields.push((name, start, value));
     }
 
     fn children(&self) -> impl Iterator<Item = &Node> {
@@ -183,7 +202,7 @@ impl Node {
     }
 
     fn field(&self, name: &str) -> Option<&Node> {
-        let named = self.fields.iter().find(|(field, _, _)| field == name).map(|(_, _, value)| value);
+        let named = self.by_name.get(name).and_then(|at| self.fields.get(*at)).map(|(_, _, value)| value);
         named.or_else(|| self.wrapped().and_then(|inner| inner.field(name)))
     }
 
@@ -338,7 +357,7 @@ impl Scanner<'_> {
             _ => '}',
         };
         self.at += 1;
-        let mut node = Node { start, end: start, tag, group: true, fields: Vec::new(), items: Vec::new() };
+        let mut node = Node { group: true, ..Node::leaf(start, start, tag) };
         loop {
             self.skip_blank()?;
             if self.take(close) {
@@ -357,7 +376,7 @@ impl Scanner<'_> {
                 Some(name) => {
                     self.skip_blank()?;
                     let value = self.value(depth + 1)?;
-                    node.fields.push((name, element_start, value));
+                    node.push_field(name, element_start, value);
                 }
                 None => {
                     self.at = element_start;
@@ -383,7 +402,7 @@ impl Scanner<'_> {
         let name = written.trim_matches('"').to_owned();
         self.skip_blank()?;
         let value = self.value(depth + 1)?;
-        node.fields.push((name, key_start, value));
+        node.push_field(name, key_start, value);
         Some(())
     }
 }
@@ -411,7 +430,7 @@ Scene(
 "###;
 
     fn position(path: &str) -> (usize, usize) {
-        let at = Outline::of(TEXT).map(|outline| outline.value(path));
+        let at = Outline::of(TEXT).map(|outline| Position::of_offset(TEXT, outline.offset(path)));
         at.map_or((0, 0), |at| (at.line, at.column))
     }
 
@@ -441,6 +460,18 @@ Scene(
             assert!(Outline::of(text).is_none(), "{text}");
         }
         assert!(Outline::of(&"(".repeat(1_000_000)).is_none());
+    }
+
+    #[test]
+    fn a_text_is_searched_once_for_all_its_positions() {
+        let text = "(\n  ü: 1,\n".repeat(10_000);
+        let offsets: Vec<usize> = (0..20_000).map(|line| 6 * line).collect();
+        let mut taken = 0;
+        let positions = Position::of_offsets(text.char_indices().inspect(|_| taken += 1), &offsets);
+        assert!(taken <= text.len(), "{taken} letters of {}", text.len());
+        for (offset, position) in offsets.iter().zip(positions).step_by(997) {
+            assert_eq!(Position::of_offset(&text, *offset), position);
+        }
     }
 
     #[test]

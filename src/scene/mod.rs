@@ -180,8 +180,8 @@ impl Scene {
         self.species.iter_mut().for_each(|species| species.resolve(folder));
     }
 
-    /// Reads and validates a scene file. Relative paths in it become relative to the working directory, that is,
-    /// ready to open.
+    /// Reads and validates a scene file, once and from its beginning to its end, so that it may be a pipe. Relative paths
+    /// in it become relative to the working directory, that is, ready to open; those of a pipe are so already.
     ///
     /// # Errors
     /// [`SceneError`]: the file cannot be read, is larger than 4 MiB, is not RON, has an unknown field, or values that
@@ -190,12 +190,16 @@ impl Scene {
         let failed = |source| SceneError::Read { path: path.to_owned(), source };
         let mut bytes = Vec::new();
         let file = File::open(path).map_err(failed)?;
-        let length = file.metadata().map_err(failed)?.len();
+        let found = file.metadata().map_err(failed)?;
+        let length = found.len();
         file.take(LARGEST_FILE + 1).read_to_end(&mut bytes).map_err(failed)?;
         if bytes.len() as u64 > LARGEST_FILE {
-            return Err(SceneError::TooLarge { path: path.to_owned(), bytes: length, limit: LARGEST_FILE });
+            let bytes = length.max(bytes.len() as u64);
+            return Err(SceneError::TooLarge { path: path.to_owned(), bytes, limit: LARGEST_FILE });
         }
         match std::str::from_utf8(&bytes) {
+            // What comes through a pipe has no folder: its paths count from the working directory.
+            Ok(text) if !found.is_file() => Self::parse_in(text, path, FilePath::new("")),
             Ok(text) => Self::parse(text, path),
             Err(error) => {
                 let valid = bytes.get(..error.valid_up_to()).unwrap_or_default();
@@ -216,13 +220,18 @@ impl Scene {
     /// # Errors
     /// [`SceneError::Syntax`] or [`SceneError::Invalid`].
     pub fn parse(text: &str, path: &FilePath) -> Result<Self, SceneError> {
+        Self::parse_in(text, path, path.parent().unwrap_or_else(|| FilePath::new("")))
+    }
+
+    /// As [`parse`](Self::parse), with relative paths in `folder`.
+    fn parse_in(text: &str, path: &FilePath, folder: &FilePath) -> Result<Self, SceneError> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let options = ron::Options::default()
             .with_default_extension(Extensions::IMPLICIT_SOME)
             .with_default_extension(Extensions::UNWRAP_VARIANT_NEWTYPES);
         let mut scene: Self = options.from_str(text).map_err(|error| error::from_ron(error, text, path.to_owned()))?;
         scene.check(Check::of_text(text), path.display().to_string())?;
-        scene.resolve_paths(path.parent().unwrap_or_else(|| FilePath::new("")));
+        scene.resolve_paths(folder);
         scene.file = Some(path.to_owned());
         if scene.name.trim().is_empty() {
             scene.name = path.file_stem().map_or("scene".to_owned(), |stem| stem.to_string_lossy().into_owned());

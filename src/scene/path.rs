@@ -29,7 +29,7 @@ struct Knot {
 
 impl Path {
     /// The path through `keys`, whose times must be finite and grow. `None` for fewer than two keys, or keys out of
-    /// order or not finite (a [`super::Scene`] that was read never has those).
+    /// order, not finite, or too close in time for a finite speed (a [`super::Scene`] that was read never has those).
     pub fn new(keys: &[PathKey]) -> Option<Self> {
         let in_order = keys.windows(2).all(|pair| matches!(pair, [a, b] if a.seconds < b.seconds));
         let mut knots: Vec<Knot> = keys.iter().map(Knot::at_rest).collect();
@@ -44,7 +44,8 @@ impl Path {
                 knot.tangent[coordinate] = tangent;
             }
         }
-        Some(Self { knots })
+        // Keys may be so close in time that the speed between them is no number.
+        knots.iter().all(|knot| knot.tangent.iter().all(|slope| slope.is_finite())).then_some(Self { knots })
     }
 
     /// The time of the first key in seconds.
@@ -141,6 +142,16 @@ mod tests {
 
     fn path(keys: &[PathKey]) -> Path {
         Path::new(keys).unwrap_or(Path { knots: Vec::new() })
+    }
+
+    #[test]
+    fn keys_without_time_between_them_are_no_path() {
+        let keys = |step: f64| [key(0.0, (0.0, 5.0, 0.0), 0.0, 0.0), key(step, (40.0, 9.0, -7.0), 40.0, -10.0)];
+        assert_eq!(Path::new(&keys(1e-308)), None);
+        let pose = path(&keys(1e-3)).at(5e-4);
+        assert!(
+            [pose.position.0, pose.position.1, pose.position.2, pose.yaw, pose.pitch].iter().all(|v| v.is_finite())
+        );
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The trees of a scene: scattered by rule, read from an inventory, or none.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use glam::DVec2;
@@ -229,7 +229,7 @@ impl InventoryTrees {
         if let Some(height) = self.default_height {
             check.number("trees.default_height", height, 0.1..=150.0, "m");
         }
-        let known: Vec<&str> = species.iter().map(|one| one.name.as_str()).collect();
+        let known = Known::new(species);
         for (theirs, ours) in &self.species {
             unknown_species(&format!("trees.species.{theirs}"), ours, &known, check);
         }
@@ -239,12 +239,37 @@ impl InventoryTrees {
     }
 }
 
-fn unknown_species(field: &str, name: &str, known: &[&str], check: &mut Check) {
-    if known.contains(&name) {
+/// The names of a scene's species.
+struct Known<'a> {
+    all: HashSet<&'a str>,
+    /// The first of them, for suggestions: thousands of names are compared with few.
+    first: Vec<&'a str>,
+    /// What a message says of them.
+    list: String,
+}
+
+impl<'a> Known<'a> {
+    /// Names that a message lists.
+    const LISTED: usize = 20;
+    /// Names that a suggestion is chosen from.
+    const COMPARED: usize = 200;
+
+    fn new(species: &'a [Species]) -> Self {
+        let names = || species.iter().map(|one| one.name.as_str());
+        let mut list = names().take(Self::LISTED).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+        if species.len() > Self::LISTED {
+            list.push_str(&format!(" and {} more", species.len() - Self::LISTED));
+        }
+        Self { all: names().collect(), first: names().take(Self::COMPARED).collect(), list }
+    }
+}
+
+fn unknown_species(field: &str, name: &str, known: &Known, check: &mut Check) {
+    if known.all.contains(name) {
         return;
     }
-    let list = known.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
-    let remedy = match nearest(name, known) {
+    let list = &known.list;
+    let remedy = match nearest(name, &known.first) {
         Some(meant) => format!("did you mean `{meant}`? The scene's species are {list}"),
         None => format!("the scene's species are {list}"),
     };

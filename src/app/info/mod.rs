@@ -15,7 +15,7 @@ use super::error::AppError;
 use page::Page;
 
 /// Describes the plant (.glb, .gltf), terrain (.tif, .tiff, .asc, .hgt, .png), inventory (.csv), scene or species
-/// (.ron) in `path`: some lines of text, each ended by a newline.
+/// (.ron) in `path`: some lines of text, each ended by a newline. A pipe holds a scene.
 ///
 /// # Errors
 /// [`AppError::UnknownKind`] for another ending; otherwise what the reader of that kind says of a file that it cannot
@@ -29,7 +29,14 @@ pub fn info(path: &Path) -> Result<String, AppError> {
         "tif" | "tiff" | "asc" | "hgt" => terrain::describe_file(&mut page, path)?,
         "csv" => inventory::describe_file(&mut page, path)?,
         "ron" => scene::describe_file(&mut page, path)?,
+        // A pipe, such as `/dev/stdin`, has no name that could say more; a scene can be read from it.
+        _ if is_pipe(path) => scene::describe_file(&mut page, path)?,
         _ => return Err(AppError::UnknownKind { path: path.to_owned() }),
     }
     Ok(page.finish())
+}
+
+/// Whether `path` is neither a file nor a folder.
+fn is_pipe(path: &Path) -> bool {
+    std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
 }

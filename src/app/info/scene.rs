@@ -25,7 +25,9 @@ pub(super) fn describe_file(page: &mut Page, path: &Path) -> Result<(), AppError
     let scene = match Scene::read(path) {
         Ok(scene) => scene,
         Err(error) => {
-            return match grown_species(path) {
+            // A pipe was read to its end.
+            let species = if super::is_pipe(path) { None } else { grown_species(path) };
+            return match species {
                 Some(species) => {
                     describe_species_file(page, path, &species);
                     Ok(())

@@ -82,7 +82,7 @@ impl Cache {
 
     /// Loads the baked plant with `key`, the key of `plant`. `None` if there is none that is whole and of this version.
     pub fn load(&self, key: &CacheKey, plant: &Arc<Plant>) -> Option<BakedPlant> {
-        let bytes = std::fs::read(self.file(key)).ok()?;
+        let bytes = files::read_ordinary(&self.file(key)).ok()?;
         codec::decode(&bytes, key, plant)
     }
 
@@ -97,7 +97,7 @@ impl Cache {
         let write = || {
             let bytes =
                 codec::encode(baked, &key.hash).ok_or_else(|| io::Error::other("it cannot be written as bytes"))?;
-            files::write_whole(&path, |writer| writer.write_all(&bytes))
+            files::replace(&path, |writer| writer.write_all(&bytes))
         };
         write().map_err(|source| BakeError::CacheWrite { path: path.clone(), source })
     }

@@ -4,11 +4,11 @@ use std::{collections::HashSet, sync::Arc};
 
 use super::{Forest3d, ForestError, ForestTrees};
 use crate::{
-    assets::{PlantAsset, StageError, background::Wanted, plants::PlantPlan, stage, trees::build_stand},
+    assets::{PlantAsset, StageError, background::Wanted, plants::PlantPlan, stage::cover, trees::StandPlan},
     bake::{BakedPlant, lighting::SunLight},
     progress::Progress,
     scatter::{
-        CoverMap, PackedStand, PlantSize, ScatterError, Stand, cover_map,
+        CoverMap, PackedStand, PlantSize, Stand,
         packed::{DEFAULT_CELL_SIZE, MAX_VARIANTS},
     },
     scene::{Anchor, GroundFlat, GrownPlants, Scene, Species, Trees},
@@ -29,6 +29,8 @@ pub struct Ingredients {
     pub plants: Vec<PlantAsset>,
     /// The ground; `None` is level.
     pub terrain: Option<Arc<Terrain>>,
+    /// The most trees that the device holds; `None` without a device.
+    pub most_trees: Option<usize>,
 }
 
 /// A built forest.
@@ -87,7 +89,12 @@ impl Ingredients {
         }
         let sizes: Vec<PlantSize> = plants.iter().map(BakedPlant::size).collect();
         let stand = match &self.forest.trees {
-            ForestTrees::Given(trees) => Stand { trees: trees.clone() },
+            ForestTrees::Given(trees) => {
+                if let Some(limit) = self.most_trees.filter(|limit| trees.len() > *limit) {
+                    return Err(StageError::TooManyTrees { count: trees.len(), limit }.into());
+                }
+                Stand { trees: trees.clone() }
+            }
             ForestTrees::Scattered(_) | ForestTrees::Inventory(_) => {
                 let scene = self.scene();
                 scene.validate().map_err(StageError::from)?;
@@ -95,7 +102,9 @@ impl Ingredients {
                     Some(terrain) => Arc::clone(terrain),
                     None => level_ground()?,
                 };
-                build_stand(&scene, &plan, &sizes, &terrain, &mut listener)?
+                let planned = StandPlan::new(&scene, &terrain)?;
+                planned.check(self.most_trees)?;
+                planned.build(&plan, &sizes, &mut listener)?
             }
         };
         let packed = PackedStand::new(&stand, DEFAULT_CELL_SIZE, &sizes).map_err(StageError::from)?;
@@ -185,11 +194,6 @@ fn own_heights(asset: &PlantAsset) -> (f64, f64) {
 fn level_ground() -> Result<Arc<Terrain>, StageError> {
     let field = HeightField::new(2, 2, glam::DVec2::splat(LEVEL_WIDTH), vec![0.0; 4])?;
     Ok(Arc::new(Terrain::new(field, None, Surroundings::default())))
-}
-
-fn cover(stand: &PackedStand, plants: &[BakedPlant]) -> Result<CoverMap, ScatterError> {
-    let crowns: Vec<PlantSize> = plants.iter().map(stage::crown).collect();
-    Ok(cover_map(stand, &crowns, stage::COVER_TEXEL, None)?.smoothed())
 }
 
 #[cfg(test)]

@@ -28,6 +28,7 @@ use crate::{
         PlantAsset, StageError, TerrainMap,
         background::{self, Background},
         load_error::load_error,
+        most_trees,
         stage::check_trees,
     },
     components::{Terrain3d, cover::ForestCover},
@@ -97,6 +98,7 @@ pub struct Sources<'w, 's> {
     maps: Res<'w, Assets<TerrainMap>>,
     server: Option<Res<'w, AssetServer>>,
     terrains: Query<'w, 's, (Entity, Ref<'static, Terrain3d>, &'static GlobalTransform)>,
+    device: Option<Res<'w, RenderDevice>>,
 }
 
 impl Sources<'_, '_> {
@@ -129,7 +131,8 @@ impl Sources<'_, '_> {
             Some(map) => self.maps.get(map).map(|map| Some(map.terrain.clone())),
         };
         let (Some(plants), Some(terrain)) = (plants, terrain) else { return Ok(None) };
-        Ok(Some(Ingredients { forest: forest.clone(), plants, terrain }))
+        let most_trees = self.device.as_ref().map(|device| most_trees(&device.limits()));
+        Ok(Some(Ingredients { forest: forest.clone(), plants, terrain, most_trees }))
     }
 }
 
@@ -139,7 +142,6 @@ pub fn tend_forests(
     mut forests: Query<(Entity, Ref<Forest3d>, Ref<ForestSettings>, &mut ForestWork, Option<&mut Forest>)>,
     mut changes: Changes,
     sources: Sources,
-    device: Option<Res<RenderDevice>>,
 ) {
     for entity in changes.removed_forests.read().filter(|entity| !forests.contains(*entity)) {
         if let Ok(mut entity) = commands.get_entity(entity) {
@@ -195,7 +197,7 @@ pub fn tend_forests(
         work.job = None;
         let built = result.map_err(|error| StageError::Background(error.to_string()).into()).flatten();
         let built = built.and_then(|built| {
-            device.as_ref().map_or(Ok(()), |device| check_trees(built.stand.trees.len(), device))?;
+            sources.device.as_ref().map_or(Ok(()), |device| check_trees(built.stand.trees.len(), device))?;
             Ok(built)
         });
         match built {

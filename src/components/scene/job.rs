@@ -34,11 +34,11 @@ pub struct Job {
 }
 
 impl Job {
-    /// Starts to build the scene of `request`.
+    /// Starts to build the scene of `request`, for a device that holds at most `most_trees` trees.
     ///
     /// # Errors
     /// [`StageError::Background`] if the system cannot create a thread.
-    pub fn start(request: &CanopyScene) -> Result<Self, StageError> {
+    pub fn start(request: &CanopyScene, most_trees: Option<usize>) -> Result<Self, StageError> {
         let (sender, events) = channel();
         let cancelled = Arc::<AtomicBool>::default();
         let mut reporter = Reporter { events: sender, cancelled: cancelled.clone() };
@@ -48,7 +48,7 @@ impl Job {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(spare_cores()).thread_name(name).build();
             let pool =
                 pool.map_err(|error| StageError::Background(format!("cannot create threads for bakes: {error}")))?;
-            pool.install(|| Stage::build(&overrides.applied(source.read()?), &mut reporter))
+            pool.install(|| Stage::build_within(&overrides.applied(source.read()?), most_trees, &mut reporter))
         };
         let thread = thread::Builder::new().name("canopy scene".to_owned()).spawn(work);
         let thread = thread.map_err(|error| StageError::Background(format!("cannot create a thread: {error}")))?;
@@ -145,7 +145,7 @@ mod tests {
 
     #[test]
     fn a_build_is_cancelled_when_its_job_is_dropped() -> Result<(), Box<dyn std::error::Error>> {
-        let mut job = Job::start(&many())?;
+        let mut job = Job::start(&many(), None)?;
         let thread = job.thread.take().ok_or("no thread")?;
         let at_plants = |event: &BuildEvent| matches!(event, BuildEvent::Begin(step, _) if step == "Plants");
         while !job.events().iter().any(at_plants) && !thread.is_finished() {

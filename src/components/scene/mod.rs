@@ -33,7 +33,7 @@ use tracing::{error, info, warn};
 
 use super::{Sun, sets::CanopySystems};
 use crate::{
-    assets::{Stage, StageError},
+    assets::{Stage, StageError, most_trees},
     scene::{Overrides, SceneSource},
 };
 use job::Job;
@@ -154,14 +154,19 @@ impl Plugin for ScenePlugin {
 }
 
 /// Starts to build the scenes that are new or have changed.
-fn begin(mut commands: Commands, scenes: Query<(Entity, Ref<CanopyScene>, Has<Job>), Changed<CanopyScene>>) {
+fn begin(
+    mut commands: Commands,
+    scenes: Query<(Entity, Ref<CanopyScene>, Has<Job>), Changed<CanopyScene>>,
+    device: Option<Res<RenderDevice>>,
+) {
+    let limit = device.map(|device| most_trees(&device.limits()));
     for (entity, scene, building) in &scenes {
         if building && !scene.is_added() {
             info!("the build of another scene is cancelled in favour of {}", scene.source);
         }
         let mut entity_commands = commands.entity(entity);
         entity_commands.remove::<Job>();
-        match Job::start(&scene) {
+        match Job::start(&scene, limit) {
             Ok(job) => {
                 entity_commands.insert((job, SceneProgress::default()));
             }

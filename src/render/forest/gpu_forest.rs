@@ -10,7 +10,10 @@ use bevy::{
     },
     log::error_once,
     platform::collections::HashMap,
-    render::render_resource::{Buffer, BufferUsages},
+    render::{
+        render_resource::{Buffer, BufferUsages},
+        settings::WgpuLimits,
+    },
 };
 
 use super::{
@@ -193,6 +196,12 @@ impl GpuForests {
     }
 }
 
+/// The most trees of a forest on a device of these limits: all of them lie in one storage buffer.
+pub fn most_trees(limits: &WgpuLimits) -> usize {
+    let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    usize::try_from(bytes).unwrap_or(usize::MAX) / size_of::<PackedTree>()
+}
+
 /// Uploads new and changed forests, and drops despawned ones.
 pub fn prepare_forests(
     scene: Res<ExtractedScene>,
@@ -203,10 +212,19 @@ pub fn prepare_forests(
 ) {
     let forests = &mut *forests;
     let mut upload = ForestUpload { gpu: &gpu, transfer: &mut transfer };
-    forests.order = scene.forests.iter().map(|(entity, _)| *entity).collect();
+    let limit = most_trees(&gpu.device.limits());
+    let fits = |forest: &Forest| {
+        let count = forest.stand.trees.len();
+        if count > limit {
+            error_once!("a forest of {count} trees is not drawn: this device holds at most {limit}");
+        }
+        count <= limit
+    };
+    let drawn: Vec<_> = scene.forests.iter().filter(|(_, forest)| fits(forest)).collect();
+    forests.order = drawn.iter().map(|(entity, _)| *entity).collect();
     let alive: Vec<Entity> = forests.order.clone();
     forests.forests.retain(|entity, _| alive.contains(entity));
-    for (entity, forest) in &scene.forests {
+    for (entity, forest) in drawn {
         if let Some(known) = forests.forests.get_mut(entity).filter(|known| known.can_follow(forest)) {
             if !Arc::ptr_eq(&known.plants, &forest.plants) {
                 known.relight(forest, &mut upload);

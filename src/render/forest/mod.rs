@@ -36,7 +36,7 @@ use super::{
     shaders::CanopyShaders,
 };
 pub use draw::draw_levels;
-pub use gpu_forest::{ForestLevel, GpuForest, GpuForests};
+pub use gpu_forest::{ForestLevel, GpuForest, GpuForests, most_trees};
 pub use instance_layout::instance_layout;
 pub use instances::{forest_view, instance_bind_group};
 pub use lists::{ForestStatistics, LevelStatistics};

@@ -1,5 +1,6 @@
 //! GeoTIFF [OGC 19-008r4] and BigTIFF: one band of heights with its location on earth.
 
+mod directory;
 mod keys;
 
 use glam::DVec2;
@@ -25,6 +26,7 @@ pub(super) fn recognises(start: &[u8]) -> bool {
 }
 
 pub(super) fn read(source: &Source) -> Result<Raster, TerrainError> {
+    directory::check(source)?;
     let mut limits = Limits::default();
     limits.decoding_buffer_size = MAX_CHUNK;
     limits.intermediate_buffer_size = MAX_CHUNK;
@@ -178,6 +180,13 @@ fn read_samples(
                 continue;
             }
             let at = || format!("strip or tile {index}");
+            let (left, top) = (column * chunk_columns, down * chunk_rows);
+            let (width, height) = (chunk_columns.min(columns - left), chunk_rows.min(rows - top));
+            // The decoder reserves memory for all of it, of which the window may be the least part.
+            if (width * height) as u64 > sizes[index].min(source.length).saturating_mul(MAX_EXPANSION) {
+                let problem = format!("{width} x {height} samples cannot be in {} bytes", sizes[index]);
+                return Err(source.malformed(at(), problem, FETCH));
+            }
             let number = u32::try_from(index).map_err(|error| source.malformed(at(), error, FETCH))?;
             let samples = decoder.read_chunk(number).map_err(|error| {
                 let remedy = format!(
@@ -186,8 +195,6 @@ fn read_samples(
                 source.malformed(at(), error, remedy)
             })?;
             // Strips and tiles are cut off at the image's border by the decoder.
-            let (left, top) = (column * chunk_columns, down * chunk_rows);
-            let (width, height) = (chunk_columns.min(columns - left), chunk_rows.min(rows - top));
             let samples = Samples { values: samples, missing };
             if samples.len() < width * height {
                 return Err(source.malformed(
