@@ -13,6 +13,7 @@
 //! | [`mip`] | a texture with its mip levels |
 //! | [`resample`] | images at another size: filtering in linear light with colours weighted by alpha |
 //! | [`digits`] | numbers as people read them |
+//! | [`range`] | the range, steps and unit of a number that people set |
 
 pub mod color;
 pub mod digits;
@@ -24,6 +25,7 @@ pub mod mip;
 pub mod octahedral;
 pub mod quadrature;
 pub mod radical_inverse;
+pub mod range;
 pub mod resample;
 pub mod sequence;
 
@@ -34,4 +36,5 @@ pub use interpolation::smoothstep;
 pub use mip::MipChain;
 pub use quadrature::SphereQuadrature;
 pub use radical_inverse::{RadicalInverse, radical_inverse};
+pub use range::Range;
 pub use sequence::{HaltonSequence, halton, hammersley};

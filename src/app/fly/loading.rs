@@ -20,7 +20,7 @@ use bevy::{
     window::{PrimaryWindow, Window},
 };
 
-use super::{light::LightPanel, session::Session};
+use super::{session::Session, settings::SettingsPanel};
 use crate::{
     app::{AppError, FlyOptions, camera},
     assets::StageError,
@@ -102,7 +102,7 @@ pub fn start(
     if let Some(window) = &mut window {
         window.title = title(&stage.scene);
     }
-    commands.insert_resource(LightPanel::new(&stage));
+    commands.insert_resource(SettingsPanel::new(&stage));
     match session {
         Some(mut session) => session.enter(stage),
         None => match Session::new(stage, &request.options) {
@@ -201,7 +201,101 @@ pub fn report(scene: Single<Ref<SceneProgress>>, mut terminal: ResMut<Terminal>,
 
 #[cfg(test)]
 mod tests {
+    use bevy::{
+        MinimalPlugins,
+        app::{App, Startup, Update},
+        prelude::TransformPlugin,
+    };
+
     use super::*;
+    use crate::{app::View, components::ScenePlugin, progress::Silent, scene::Overrides};
+
+    /// A species whose file is missing.
+    const MISSING: &str = "species: [(name: \"a\", plant: Gltf(files: [\"none.glb\"]))], trees: Scattered()";
+
+    /// The flight without window and device, through the scene of a file, until it has begun or has ended.
+    fn flight(file: &std::path::Path) -> Result<(App, Ending), AppError> {
+        let options = FlyOptions {
+            scene: file.into(),
+            size: (64, 36),
+            at: None,
+            view: View::Scene,
+            clock: 0.0,
+            underground: false,
+            overrides: Overrides::default(),
+            adapter: None,
+            quiet: true,
+            explain: false,
+        };
+        let (scene, ending) = (Arc::new(Request::read(&options)?), Ending::default());
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, TransformPlugin, ScenePlugin))
+            .insert_resource(Request { options, scene, ending: ending.clone() })
+            .insert_resource(Terminal::new(Box::new(Silent)))
+            .add_observer(start)
+            .add_observer(fail)
+            .add_systems(Startup, open)
+            .add_systems(Update, report);
+        while !app.world().contains_resource::<Session>() && app.should_exit().is_none() {
+            app.update();
+            std::thread::yield_now();
+        }
+        Ok((app, ending))
+    }
+
+    /// Presses the key R, and waits for the build that it begins, if it does.
+    fn load_again(app: &mut App) -> String {
+        let mut scenes = app.world_mut().query::<&mut CanopyScene>();
+        app.world_mut().resource_scope(|world, mut session: bevy::ecs::world::Mut<Session>| {
+            world.resource_scope(|world, mut terminal: bevy::ecs::world::Mut<Terminal>| {
+                world.resource_scope(|world, request: bevy::ecs::world::Mut<Request>| {
+                    let mut scene = scenes.single_mut(world).unwrap();
+                    reload(&request, &mut session, &mut terminal, &mut scene);
+                });
+            });
+        });
+        app.update();
+        let mut progress = app.world_mut().query::<&SceneProgress>();
+        while progress.single(app.world()).unwrap().state == SceneState::Building {
+            app.update();
+            std::thread::yield_now();
+        }
+        app.world().resource::<Session>().message().unwrap_or_default().to_owned()
+    }
+
+    #[test]
+    fn a_flight_begins_with_its_scene_and_a_changed_one_replaces_it() -> Result<(), Box<dyn std::error::Error>> {
+        let file = tempfile::Builder::new().suffix(".ron").tempfile()?;
+        let write = |seed: &str, more: &str| {
+            let ground = "terrain: Flat(size: 100), place: (latitude: 47, longitude: 9)";
+            std::fs::write(file.path(), format!("(seed: {seed}, {ground}, {more})"))
+        };
+        write("1", "")?;
+        let (mut app, ending) = flight(file.path())?;
+        let seed = |app: &App| app.world().resource::<Session>().stage.scene.seed;
+        assert!(seed(&app) == 1 && ending.take().is_none());
+        write("2", "")?;
+        assert!(load_again(&mut app).contains("was loaded again") && seed(&app) == 2);
+        // One cannot be read, one cannot be built.
+        for (wrong, more) in [("none", ""), ("3", MISSING)] {
+            write(wrong, more)?;
+            assert!(load_again(&mut app).contains("not loaded again") && seed(&app) == 2);
+        }
+        assert!(app.should_exit().is_none());
+        Ok(())
+    }
+
+    #[test]
+    fn a_scene_that_cannot_be_built_ends_the_program_with_its_error() -> Result<(), Box<dyn std::error::Error>> {
+        let file = tempfile::Builder::new().suffix(".ron").tempfile()?;
+        let text = format!("(terrain: Flat(size: 100), place: (latitude: 47, longitude: 9), {MISSING})");
+        std::fs::write(file.path(), text)?;
+        let (app, ending) = flight(file.path())?;
+        assert!(app.should_exit().is_some_and(|exit| exit.is_error()));
+        let message = ending.take().ok_or("no error")?.to_string();
+        assert!(message.contains("none.glb") && message.contains("check the path"), "{message}");
+        Ok(())
+    }
 
     #[derive(Default)]
     struct Lines(Vec<String>);

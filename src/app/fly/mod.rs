@@ -6,18 +6,19 @@
 //!
 //! `loading` leads from the request to the flight. `motion`, `tour`, `clock` and `session` are the flight itself and use
 //! neither window nor renderer; `controls` maps keys to commands; `window` connects both; `overlay`, `picture` and
-//! `explain` show and save what is seen; `light` adjusts the lighting of the leaves during the flight; `timing` measures.
+//! `explain` show and save what is seen; `settings` edits the lighting of the leaves and everything else that can be
+//! reflected; `timing` measures.
 
 mod clock;
 mod controls;
 mod display;
 mod explain;
-mod light;
 mod loading;
 mod motion;
 mod overlay;
 mod picture;
 mod session;
+mod settings;
 mod timing;
 mod tour;
 mod window;
@@ -25,7 +26,7 @@ mod window;
 use std::sync::Arc;
 
 use bevy::{
-    app::{App, AppExit, PluginGroup, PostUpdate, Startup, Update},
+    app::{App, AppExit, PluginGroup, PostUpdate, PreUpdate, Startup, Update},
     asset::AssetEventSystems,
     ecs::schedule::{IntoScheduleConfigs, common_conditions::resource_exists},
     log::{Level, LogPlugin},
@@ -36,7 +37,7 @@ use bevy::{
     },
     window::{PresentMode, Window, WindowPlugin},
 };
-use bevy_egui::{EguiPlugin, EguiPostUpdateSet, EguiPrimaryContextPass};
+use bevy_egui::{EguiPlugin, EguiPostUpdateSet, EguiPreUpdateSet, EguiPrimaryContextPass};
 
 use super::{FlyOptions, adapter, error::AppError};
 use crate::{plugin::CanopyPlugins, progress::Progress};
@@ -99,7 +100,7 @@ fn build(request: Request, terminal: Terminal, settings: WgpuSettings) -> App {
     if request.options.explain {
         app.add_systems(Update, explain::explain.after(window::follow).run_if(resource_exists::<Session>));
     }
-    let flight = (light::apply_bakes, window::fly, window::follow, picture::save_image);
+    let flight = (settings::update, window::fly, window::follow, picture::save_image);
     app.add_plugins((CanopyPlugins, EguiPlugin::default(), timing::TimingPlugin))
         .insert_resource(request)
         .insert_resource(terminal)
@@ -115,6 +116,10 @@ fn build(request: Request, terminal: Terminal, settings: WgpuSettings) -> App {
                 flight.chain().run_if(resource_exists::<Session>),
             )
                 .chain(),
+        )
+        .add_systems(
+            PreUpdate,
+            window::keep_keys_from_overlay.after(EguiPreUpdateSet::ProcessInput).before(EguiPreUpdateSet::BeginPass),
         )
         .add_systems(EguiPrimaryContextPass, overlay::draw_overlays);
     // Glyphs that the overlay shows for the first time must be uploaded in the same frame.

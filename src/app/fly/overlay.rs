@@ -4,22 +4,22 @@ use bevy::ecs::system::{Local, Res, ResMut, Single};
 use bevy_egui::{
     EguiContexts,
     egui::{
-        Align2, Area, Color32, Context, CornerRadius, Frame, Grid, Id, Margin, ProgressBar, RichText, Stroke, Ui,
-        Visuals,
+        Align2, Area, Color32, Context, CornerRadius, Frame, Grid, Id, Margin, ProgressBar, RichText, Spinner, Stroke,
+        Ui, Visuals,
     },
 };
 
 use super::{
     controls::HELP,
-    light::{LightPanel, light_panel},
     session::Session,
+    settings::{SettingsPanel, settings_panel},
     timing::FrameTimes,
 };
 use crate::{
     components::{SceneProgress, SceneState},
     math::digits::grouped,
     render::{
-        components::Daylight,
+        components::{Daylight, ViewOptions},
         report::{FrameReport, PassOutcome},
     },
 };
@@ -48,7 +48,8 @@ const POSITION: &str = "Metres east (x) and south (z) of the terrain's centre, a
 pub fn draw_overlays(
     mut contexts: EguiContexts,
     session: Option<ResMut<Session>>,
-    light: Option<Res<LightPanel>>,
+    settings: Option<ResMut<SettingsPanel>>,
+    view: Single<&ViewOptions>,
     scene: Single<&SceneProgress>,
     frames: Res<FrameTimes>,
     report: Res<FrameReport>,
@@ -62,7 +63,7 @@ pub fn draw_overlays(
         context.set_visuals(visuals);
         *styled = true;
     }
-    let (Some(mut session), Some(light)) = (session, light) else {
+    let (Some(mut session), Some(mut settings)) = (session, settings) else {
         panel(context, "canopy_building", Align2::CENTER_CENTER, [0.0, 0.0], |ui| building(ui, &scene));
         return;
     };
@@ -74,12 +75,12 @@ pub fn draw_overlays(
     } else if session.overlay {
         panel(context, "canopy_numbers", Align2::LEFT_TOP, [EDGE, EDGE], |ui| {
             let sun = daylight.as_ref().map(|light| light.0.sun_direction.y.clamp(-1.0, 1.0).asin().to_degrees());
-            numbers(ui, &session, &scene, &frames, sun);
+            numbers(ui, &session, &scene, &frames, sun, view.tint_levels);
             passes(ui, &report);
         });
     }
-    if light.open && !session.help {
-        panel(context, "canopy_light_panel", Align2::RIGHT_TOP, [-EDGE, EDGE], |ui| light_panel(ui, &light));
+    if settings.open && !session.help {
+        panel(context, "canopy_settings", Align2::RIGHT_TOP, [-EDGE, EDGE], |ui| settings_panel(ui, &mut settings));
     }
     if scene.state == SceneState::Building {
         panel(context, "canopy_building_again", Align2::RIGHT_BOTTOM, [-EDGE, -EDGE], |ui| building(ui, &scene));
@@ -120,6 +121,7 @@ fn building(ui: &mut Ui, scene: &SceneProgress) {
     let count =
         if scene.total > 0 { format!("{} of {}", scene.done.min(scene.total), scene.total) } else { String::new() };
     ui.horizontal(|ui| {
+        ui.add(Spinner::new().size(SMALL));
         ui.label(small(step).strong());
         ui.label(small(count).color(NAME));
     });
@@ -132,7 +134,7 @@ fn building(ui: &mut Ui, scene: &SceneProgress) {
     }
 }
 
-fn numbers(ui: &mut Ui, session: &Session, scene: &SceneProgress, frames: &FrameTimes, sun: Option<f32>) {
+fn numbers(ui: &mut Ui, session: &Session, scene: &SceneProgress, frames: &FrameTimes, sun: Option<f32>, tinted: bool) {
     let milliseconds = |share| frames.percentile(share).map_or("-".to_owned(), |s| format!("{:.1}", s * 1e3));
     let (forest, terrain) = (&frames.forest, frames.terrain);
     let levels: Vec<String> =
@@ -180,7 +182,7 @@ fn numbers(ui: &mut Ui, session: &Session, scene: &SceneProgress, frames: &Frame
             ("sun", format!("{:.1}\u{b0} {} the horizon", sun.abs(), if sun < 0.0 { "below" } else { "above" }), SUN),
         );
     }
-    let states = [(session.underground, "below the ground"), (session.tinted, "tinted by level")];
+    let states = [(session.underground, "below the ground"), (tinted, "tinted by level")];
     let states: Vec<&str> = states.iter().filter(|(on, _)| *on).map(|(_, name)| *name).collect();
     if !states.is_empty() {
         rows.push(("options", states.join(", "), "Keys U and T."));

@@ -38,8 +38,6 @@ pub struct Session {
     pub paused: bool,
     /// Whether the camera may go below the ground.
     pub underground: bool,
-    /// Whether trees are tinted by their level of detail.
-    pub tinted: bool,
     /// Whether the small overlay is shown.
     pub overlay: bool,
     /// Whether the help is shown.
@@ -80,7 +78,6 @@ impl Session {
             clock: SceneClock::new(time, options.clock),
             paused: false,
             underground: options.underground,
-            tinted: false,
             overlay: true,
             help: false,
             capturing: false,
@@ -157,14 +154,13 @@ impl Session {
     /// Carries out a command as far as it concerns the flight; the window does the rest.
     pub fn carry_out(&mut self, command: Command) {
         match command {
-            Command::Leave | Command::Light | Command::Reload => {}
+            Command::Leave | Command::Settings | Command::Reload | Command::Tint => {}
             Command::SaveImage => self.capturing = true,
             Command::Tour if self.tour.is_none() => {
                 self.show_message("this scene has no camera path; add `camera: (path: [...])` to its file".to_owned());
             }
             Command::Tour => self.touring = !self.touring,
             Command::Pause => self.paused = !self.paused,
-            Command::Tint => self.tinted = !self.tinted,
             Command::Underground => self.underground = !self.underground,
             Command::Help => self.help = !self.help,
             Command::Overlay => self.overlay = !self.overlay,
