@@ -41,8 +41,7 @@ fn list_adapters() -> anyhow::Result<()> {
 }
 
 fn fly_through(options: &canopy::app::FlyOptions) -> anyhow::Result<()> {
-    let mut bars = Bars::new(options.quiet);
-    Ok(canopy::app::fly(options, &mut bars)?)
+    Ok(canopy::app::fly(options, Bars::new(options.quiet))?)
 }
 
 fn render_pictures(options: &canopy::app::RenderOptions) -> anyhow::Result<()> {

@@ -25,8 +25,8 @@ fn help_and_version_succeed_and_show_examples() -> Outcome {
         assert!(text(&output.stdout).contains("Examples:"), "{arguments:?}");
     }
     let fly = text(&canopy(&["fly", "--help"])?.stdout);
-    for key in ["Up, Down", "Left, Right", "Backspace", "Tab", "Enter"] {
-        assert!(fly.contains(key), "the light panel's key {key} is missing in:\n{fly}");
+    for key in ["Up, Down", "Left, Right", "Backspace", "Delete", "Tab", "Enter"] {
+        assert!(fly.contains(key), "the settings panel's key {key} is missing in:\n{fly}");
     }
     let version = canopy(&["--version"])?;
     assert_eq!(text(&version.stdout).trim(), format!("canopy {}", env!("CARGO_PKG_VERSION")));

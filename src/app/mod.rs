@@ -1,6 +1,10 @@
 //! The program, behind the cargo feature `program`: the interactive flight, rendering without a window, the ground
 //! truth of a scene, and what a file holds. The command line fills the requests ([`FlyOptions`], [`RenderOptions`],
 //! [`ReferenceOptions`]), and the functions here carry them out.
+//!
+//! It uses the library as any program does. The flight spawns a [`CanopyScene`](crate::components::CanopyScene), which is
+//! built beside the frames. [`render`] and [`reference()`] have nothing to show before their scene is built, so they wait
+//! for [`Stage::build`](crate::assets::Stage::build).
 
 mod adapter;
 mod camera;

@@ -92,15 +92,17 @@ pub struct CameraArguments {
   W A S D Q E   fly              mouse   look around
   wheel         set the speed    Shift   five times faster
   F             fly the scene's path
-  L             open or close the light panel
+  L             open or close the settings: leaves, view, sun, shadows
+  R             load the changed scene file
   H             show all keys
 
-Keys of the light panel, which adjusts the lighting of the leaves:
+Keys of the settings, which the mouse changes too:
   Up, Down      select a value
   Left, Right   decrease or increase it; with Shift in small steps
-  Backspace     reset it to automatic, or to the scene's lighting
-  Tab           next species; with Shift the previous one
-  Enter         print the values for the scene file in the terminal
+  Backspace     reset it to the scene's own
+  Delete        make it automatic
+  Tab           next section; with Shift the previous one
+  Enter         print the lighting for the scene file in the terminal
 
 Examples:
   canopy fly

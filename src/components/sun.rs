@@ -33,6 +33,7 @@ use crate::{
         moon::{MoonSetting, celestial_rotation},
         sun::{Observer, SunPosition},
     },
+    math::Range,
     render::components::{Daylight, LightUpdates, SunShadowSettings},
     scene::LocalTime,
 };
@@ -60,6 +61,7 @@ pub enum SunRefresh {
     Background {
         /// Seconds, 0 or more. Within the default of 5 the sun moves by 0.02 degrees, and the shadow of a 20 m tree by
         /// about 7 mm.
+        #[reflect(@Range::factor(0.0..=3600.0).unit("s"), @"Seconds of the clock by which the drawn light may lag while the clock runs.")]
         lag: f32,
     },
 }
@@ -88,11 +90,14 @@ pub struct Sun {
     /// Seconds of the clock per second of the app's virtual time; 0: it is stopped.
     pub rate: f64,
     /// The moon of the night.
+    #[reflect(@"The moon of the night.")]
     pub moon: MoonSetting,
     /// Meteorological visibility at sea level in kilometres, 2 to 250. Lower is hazier.
+    #[reflect(@Range::factor(2.0..=250.0).unit("km"), @"Meteorological visibility at sea level. Lower is hazier.")]
     pub visibility_km: f64,
     /// Exposure compensation in stops, -10 to 10; positive is brighter. A forest is darker than the middle grey that
     /// the exposure curve is made for; the default is 0.9.
+    #[reflect(@Range::steps(-10.0..=10.0, 0.5, 0.1).unit("EV"), @"Exposure compensation in stops; positive is brighter.")]
     pub compensation_ev: f32,
 }
 

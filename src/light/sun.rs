@@ -12,6 +12,7 @@ use glam::Vec3;
 use solar_positioning::{spa, time::DeltaT, time::JulianDate};
 
 use super::error::{LightError, check_range};
+use crate::math::Range;
 
 /// Angular radius of the sun's disc in radians: 0.2666 degrees, the mean over the year (+-1.7 %).
 pub const SUN_ANGULAR_RADIUS: f64 = 0.266_6 * PI / 180.0;
@@ -20,14 +21,19 @@ pub const SUN_ANGULAR_RADIUS: f64 = 0.266_6 * PI / 180.0;
 #[derive(Debug, Clone, Copy, Default, PartialEq, bevy::reflect::Reflect)]
 pub struct Observer {
     /// Geographic latitude in degrees, north positive, -90 to 90.
+    #[reflect(@Range::steps(-90.0..=90.0, 1.0, 0.1).unit("°"))]
     pub latitude_deg: f64,
     /// Geographic longitude in degrees, EAST positive, -180 to 180.
+    #[reflect(@Range::steps(-180.0..=180.0, 1.0, 0.1).unit("°"))]
     pub longitude_deg: f64,
     /// Height above the sea in metres, -500 to 9000.
+    #[reflect(@Range::steps(-500.0..=9000.0, 100.0, 10.0).unit("m"))]
     pub height_m: f64,
     /// Air pressure in millibar, 0 (no refraction) to 1100.
+    #[reflect(@Range::steps(0.0..=1100.0, 10.0, 1.0).unit("mbar"))]
     pub pressure_mbar: f64,
     /// Air temperature in degrees Celsius, -90 to 60.
+    #[reflect(@Range::steps(-90.0..=60.0, 1.0, 0.1).unit("°C"))]
     pub temperature_c: f64,
 }
 

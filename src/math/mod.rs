@@ -14,6 +14,7 @@
 //! | [`resample`] | images at another size: filtering in linear light with colours weighted by alpha |
 //! | [`compute_once`](mod@compute_once) | shared values that parallel work computes |
 //! | [`digits`] | numbers formatted for people |
+//! | [`range`] | the range, steps and unit of a number that people set |
 
 pub mod color;
 pub mod compute_once;
@@ -26,6 +27,7 @@ pub mod mip;
 pub mod octahedral;
 pub mod quadrature;
 pub mod radical_inverse;
+pub mod range;
 pub mod resample;
 pub mod sequence;
 
@@ -37,4 +39,5 @@ pub use interpolation::smoothstep;
 pub use mip::{MipChain, MipView};
 pub use quadrature::SphereQuadrature;
 pub use radical_inverse::{RadicalInverse, radical_inverse};
+pub use range::Range;
 pub use sequence::{HaltonSequence, halton, hammersley};

@@ -21,6 +21,7 @@ use crate::{
     bake::BakedPlant,
     light::LightState,
     lod::Levels,
+    math::Range,
     scatter::{CoverMap, PackedStand},
     terrain::Terrain,
 };
@@ -164,15 +165,20 @@ impl LightUpdates {
 #[reflect(Component, Default)]
 pub struct SunShadowSettings {
     /// Texels along a side of each map, 256 to 8192. Twice the size halves the texel and quadruples the fill cost.
+    #[reflect(@Range::doubled(256..=8192), @"Texels along a side of each map. Twice the size: sharper, four times the fill cost.")]
     pub map_size: u32,
     /// Number of cascades, 1 to 4; 0 switches the maps off (the terrain's own shadow stays).
+    #[reflect(@Range::steps(0..=4, 1.0, 1.0), @"Number of maps; 0 leaves only the terrain's own shadow.")]
     pub cascades: usize,
     /// Radius in metres around the camera that the finest cascade covers.
+    #[reflect(@Range::factor(1.0..=1e5).unit("m"), @"Radius around the camera that the finest map covers.")]
     pub finest_radius: f64,
     /// Radius in metres around the camera that the widest cascade covers. Beyond it the canopy cover darkens the
     /// ground.
+    #[reflect(@Range::factor(1.0..=1e5).unit("m"), @"Radius around the camera that the widest map covers; beyond it the canopy cover darkens the ground.")]
     pub distance: f64,
     /// Radius in metres around the camera within which plants cast as shadow proxies instead of billboards.
+    #[reflect(@Range::factor(0.0..=1e5).unit("m"), @"Radius around the camera within which plants cast as shadow proxies instead of billboards.")]
     pub proxy_distance: f64,
 }
 
@@ -188,6 +194,7 @@ impl Default for SunShadowSettings {
 #[reflect(Component, Default)]
 pub struct ViewOptions {
     /// Whether trees are tinted by their level of detail, each level in its own colour.
+    #[reflect(@"Each level of detail in its own colour.")]
     pub tint_levels: bool,
 }
 

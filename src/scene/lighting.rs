@@ -1,16 +1,20 @@
 //! How the foliage of a species is lit.
 
+use bevy::reflect::{Reflect, std_traits::ReflectDefault};
 use serde::{Deserialize, Serialize};
 
 use super::check::Check;
-use crate::bake::lighting::{
-    LightingSettings, SunLight,
-    implicit::ImplicitSettings,
-    transfer::{Channels, Scattering, TransferSettings},
+use crate::{
+    bake::lighting::{
+        LightingSettings, SunLight,
+        implicit::ImplicitSettings,
+        transfer::{Channels, Scattering, TransferSettings},
+    },
+    math::Range,
 };
 
 /// The lighting of a species' foliage. Each choice has its own fields, all of them optional: `Transfer()`.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Reflect)]
 pub enum Lighting {
     /// Each leaf by its own normal, without occlusion of the sky: nothing is baked. For comparison.
     Local,
@@ -24,19 +28,25 @@ pub enum Lighting {
 
 /// Radiance transfer, in a user's terms: [`TransferSettings`] has more options than a scene needs, and how the sun
 /// lights full models is no part of a bake.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Reflect)]
+#[reflect(Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct Transfer {
     /// Bands of spherical harmonics, 2 to 6. More: more accurate, and memory grows with the square. Default 4.
+    #[reflect(@Range::steps(2..=6, 1.0, 1.0), @"Bands of spherical harmonics. More: more accurate, and memory grows with the square.")]
     pub bands: u32,
     /// Whether light takes on the colour of the leaves inside the crown; three times the memory. Default false.
+    #[reflect(@"Whether light takes on the colour of the leaves inside the crown; three times the memory.")]
     pub color: bool,
     /// Rays per vertex, 16 to 16384. More: a slower bake with less noise. Default 1024.
+    #[reflect(@Range::doubled(16..=16_384), @"Rays per vertex. More: a slower bake with less noise.")]
     pub rays: u32,
     /// How often light is followed from leaf to leaf, 0 to 8; 0: straight through leaves only. Default 3. Along
     /// 48 to 143 of the rays' lines at most: 57 of the 512 lines of 1024 rays.
+    #[reflect(@Range::steps(0..=8, 1.0, 1.0), @"How often light is followed from leaf to leaf; 0: straight through leaves only.")]
     pub bounces: u32,
     /// How the sun lights full models, `LeafShader` or `Harmonics`; costs no bake of its own. Default `LeafShader`.
+    #[reflect(@"How the sun lights full models: each leaf by its normal, or soft, through the plant's transfer.")]
     pub sun: SunLight,
 }
 

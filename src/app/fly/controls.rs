@@ -29,10 +29,12 @@ pub enum Command {
     Help,
     /// Show the small overlay.
     Overlay,
-    /// Open or close the light panel.
-    Light,
+    /// Open or close the settings panel.
+    Settings,
     /// Return to the start of the flight, position and time.
     Home,
+    /// Read the scene file again.
+    Reload,
     /// Move the clock by this many minutes.
     Minutes(i64),
     /// Move the calendar by this many days.
@@ -52,13 +54,13 @@ impl Command {
     }
 }
 
-/// A key press for the open light panel.
+/// A key press for the open settings panel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PanelInput {
     /// Select the next line, downwards if `true`, else upwards.
     Line(bool),
-    /// Select the next species, forwards if `true`, else backwards.
-    Species(bool),
+    /// Select the next section, forwards if `true`, else backwards.
+    Section(bool),
     /// Adjust the selected line.
     Value {
         /// Whether to increase it.
@@ -66,14 +68,16 @@ pub enum PanelInput {
         /// Whether to use a small step.
         fine: bool,
     },
-    /// Reset the selected line to its automatic value.
+    /// Reset the selected line to the scene's value.
     Reset,
+    /// Make the selected number automatic.
+    Automatic,
     /// Print the values for a scene file.
     Write,
 }
 
 /// All keys and what they do, as the help shows them.
-pub const HELP: [(&str, &str); 20] = [
+pub const HELP: [(&str, &str); 21] = [
     ("W A S D", "fly forward, left, back, right"),
     ("E  Q", "up, down"),
     ("Shift", "five times faster"),
@@ -87,9 +91,10 @@ pub const HELP: [(&str, &str); 20] = [
     ("Page Up, Down", "one day forward, back; with Shift one month"),
     ("+  -", "clock speed: stopped, 1x, 60x, 600x, 3600x"),
     ("Home", "return to the start, position and time"),
+    ("R", "load the changed scene file; camera and clock stay"),
     ("U", "allow flight below the ground, or not"),
     ("T", "tint trees by level of detail"),
-    ("L", "light panel: adjust the lighting of the leaves with the arrows"),
+    ("L", "settings: lighting of the leaves, view, sun and shadows"),
     ("P", "save an image in the working directory"),
     ("O", "show or hide the overlay"),
     ("H", "this help"),
@@ -137,7 +142,8 @@ pub fn command(code: KeyCode, key: &Key, shift: bool, repeat: bool) -> Option<Co
             "p" => Command::SaveImage,
             "h" => Command::Help,
             "o" => Command::Overlay,
-            "l" => Command::Light,
+            "l" => Command::Settings,
+            "r" => Command::Reload,
             "," => Command::Minutes(-60),
             "." => Command::Minutes(60),
             "[" => Command::Minutes(-10),
@@ -160,8 +166,9 @@ pub fn panel_input(key: &Key, shift: bool, repeat: bool) -> Option<PanelInput> {
         Key::ArrowRight => PanelInput::Value { up: true, fine: shift },
         Key::ArrowLeft => PanelInput::Value { up: false, fine: shift },
         _ if repeat => return None,
-        Key::Tab => PanelInput::Species(!shift),
+        Key::Tab => PanelInput::Section(!shift),
         Key::Backspace => PanelInput::Reset,
+        Key::Delete => PanelInput::Automatic,
         Key::Enter => PanelInput::Write,
         _ => return None,
     };
@@ -220,11 +227,11 @@ mod tests {
 
     #[test]
     fn the_panel_has_its_own_keys() {
-        assert_eq!(typed(KeyCode::KeyL, "l"), Some(Command::Light));
+        assert_eq!(typed(KeyCode::KeyL, "l"), Some(Command::Settings));
         assert_eq!(panel_input(&Key::ArrowLeft, true, true), Some(PanelInput::Value { up: false, fine: true }));
         assert_eq!(
             (panel_input(&Key::Tab, true, false), panel_input(&Key::Tab, false, true)),
-            (Some(PanelInput::Species(false)), None)
+            (Some(PanelInput::Section(false)), None)
         );
         // What the panel does not know goes to the flight.
         assert_eq!(panel_input(&Key::Character("t".into()), false, false), None);

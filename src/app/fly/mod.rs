@@ -1,26 +1,34 @@
 //! The interactive flight: a window onto a scene.
 //!
-//! `motion`, `tour`, `clock` and `session` are the flight itself and use neither window nor renderer; `controls` maps
-//! keys to commands; `window` connects both; `overlay`, `picture` and `explain` show and save what is seen; `light`
-//! adjusts the lighting of the leaves during the flight; `timing` measures.
+//! It stands on the library's front door: a [`CanopyScene`](crate::components::CanopyScene) builds the scene while the
+//! window is open, and the flight moves a [`CanopyCamera`](crate::render::components::CanopyCamera) and the scene's
+//! [`Sun`](crate::components::Sun).
+//!
+//! `loading` leads from the request to the flight. `motion`, `tour`, `clock` and `session` are the flight itself and use
+//! neither window nor renderer; `controls` maps keys to commands; `window` connects both; `overlay`, `picture` and
+//! `explain` show and save what is seen; `settings` edits the lighting of the leaves and everything else that can be
+//! reflected; `timing` measures.
 
 mod clock;
 mod controls;
 mod display;
 mod explain;
-mod light;
+mod loading;
 mod motion;
 mod overlay;
 mod picture;
 mod session;
+mod settings;
 mod timing;
 mod tour;
 mod window;
 
+use std::sync::Arc;
+
 use bevy::{
-    app::{App, AppExit, PluginGroup, PostStartup, PostUpdate, Startup, Update},
+    app::{App, AppExit, PluginGroup, PostUpdate, PreUpdate, Startup, Update},
     asset::AssetEventSystems,
-    ecs::schedule::IntoScheduleConfigs,
+    ecs::schedule::{IntoScheduleConfigs, common_conditions::resource_exists},
     log::{Level, LogPlugin},
     prelude::DefaultPlugins,
     render::{
@@ -29,43 +37,55 @@ use bevy::{
     },
     window::{PresentMode, Window, WindowPlugin},
 };
-use bevy_egui::{EguiPlugin, EguiPostUpdateSet, EguiPrimaryContextPass};
+use bevy_egui::{EguiPlugin, EguiPostUpdateSet, EguiPreUpdateSet, EguiPrimaryContextPass};
 
 use super::{FlyOptions, adapter, error::AppError};
-use crate::{assets::Stage, plugin::CanopyPlugins, progress::Progress};
+use crate::{plugin::CanopyPlugins, progress::Progress};
+use loading::{Ending, Request, Terminal};
 use session::Session;
+use tour::Tour;
 
-/// Opens a window and flies until the user quits. Blocks; must be called on the program's main thread.
+/// Exit code of an app that the user interrupted with Ctrl-C (Bevy's `TerminalCtrlCHandlerPlugin`).
+const INTERRUPTED: u8 = 130;
+
+/// Opens a window and flies until the user quits. Blocks; must be called on the program's main thread. `progress` hears
+/// of the scene's build.
 ///
 /// # Errors
 /// [`AppError`] if the scene cannot be used, if there is no display or no graphics adapter, or if the device fails
-/// during the flight.
-pub fn fly(options: &FlyOptions, progress: &mut dyn Progress) -> Result<(), AppError> {
+/// during the flight; [`AppError::Interrupted`] after Ctrl-C. What can be known of it is checked before the window opens.
+pub fn fly(options: &FlyOptions, progress: impl Progress + 'static) -> Result<(), AppError> {
     display::check()?;
     let settings = adapter::settings(options.adapter.as_deref())?;
-    let most_trees = adapter::check_size(&settings, options.size)?;
-    let scene = options.overrides.applied(options.scene.read()?);
-    // A start off the path is found before the long work.
-    tour::Tour::new(&scene, options.view)?;
-    let stage = Stage::build_within(&scene, most_trees, progress)?;
-    let session = Session::new(stage, options)?;
-    let mut app = display::open(|| build(session, options, settings))?;
-    match app.run() {
-        AppExit::Success => Ok(()),
-        AppExit::Error(_) => {
+    adapter::check_size(&settings, options.size)?;
+    let scene = Request::read(options)?;
+    Tour::new(&scene, options.view)?;
+    let ending = Ending::default();
+    let request = Request { options: options.clone(), scene: Arc::new(scene), ending: ending.clone() };
+    let mut app = display::open(|| build(request, Terminal::new(Box::new(progress)), settings))?;
+    let exit = app.run();
+    match (ending.take(), exit) {
+        (Some(error), _) => Err(error),
+        (None, AppExit::Success) => Ok(()),
+        (None, AppExit::Error(code)) if code.get() == INTERRUPTED => {
+            Err(AppError::Interrupted("the flight was ended".to_owned()))
+        }
+        (None, AppExit::Error(_)) => {
             Err(AppError::Render("the graphics device or the window reported an error (see above)".to_owned()))
         }
     }
 }
 
-fn build(session: Session, options: &FlyOptions, settings: WgpuSettings) -> App {
+fn build(request: Request, terminal: Terminal, settings: WgpuSettings) -> App {
     let mut app = App::new();
+    // What a build reports goes to the terminal without the marks of a log.
+    let filter = format!("{},canopy::components::scene=off", adapter::LOG_FILTER);
     app.add_plugins(
         DefaultPlugins
             .set(WindowPlugin {
                 primary_window: Some(Window {
-                    title: format!("{} - Canopy", session.stage.scene.name),
-                    resolution: options.size.into(),
+                    title: loading::title(&request.scene),
+                    resolution: request.options.size.into(),
                     present_mode: PresentMode::AutoVsync,
                     ..Window::default()
                 }),
@@ -75,30 +95,34 @@ fn build(session: Session, options: &FlyOptions, settings: WgpuSettings) -> App 
                 render_creation: RenderCreation::Automatic(Box::new(settings)),
                 ..RenderPlugin::default()
             })
-            .set(LogPlugin { level: Level::WARN, filter: adapter::LOG_FILTER.to_owned(), ..LogPlugin::default() }),
+            .set(LogPlugin { level: Level::WARN, filter, ..LogPlugin::default() }),
     );
+    if request.options.explain {
+        app.add_systems(Update, explain::explain.after(window::follow).run_if(resource_exists::<Session>));
+    }
+    let flight = (settings::update, window::fly, window::follow, picture::save_image);
     app.add_plugins((CanopyPlugins, EguiPlugin::default(), timing::TimingPlugin))
-        .insert_resource(light::LightPanel::new(&session.stage))
-        .insert_resource(session)
-        .add_systems(Startup, window::set_up)
-        .add_systems(PostStartup, window::follow)
+        .insert_resource(request)
+        .insert_resource(terminal)
+        .add_observer(loading::start)
+        .add_observer(loading::fail)
+        .add_systems(Startup, loading::open)
         .add_systems(
             Update,
             (
+                loading::report,
                 window::capture_mouse,
                 window::handle_keys,
-                light::apply_bakes,
-                window::fly,
-                window::follow,
-                picture::save_image,
+                flight.chain().run_if(resource_exists::<Session>),
             )
                 .chain(),
+        )
+        .add_systems(
+            PreUpdate,
+            window::keep_keys_from_overlay.after(EguiPreUpdateSet::ProcessInput).before(EguiPreUpdateSet::BeginPass),
         )
         .add_systems(EguiPrimaryContextPass, overlay::draw_overlays);
     // Glyphs that the overlay shows for the first time must be uploaded in the same frame.
     app.configure_sets(PostUpdate, AssetEventSystems.after(EguiPostUpdateSet::PostProcessOutput));
-    if options.explain {
-        app.add_systems(Update, explain::explain.after(window::follow));
-    }
     app
 }

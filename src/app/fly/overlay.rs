@@ -1,21 +1,25 @@
 //! The overlays of the window: numbers, help, messages.
 
-use bevy::ecs::system::{Local, Res, ResMut};
+use bevy::ecs::system::{Local, Res, ResMut, Single};
 use bevy_egui::{
     EguiContexts,
-    egui::{Align2, Area, Color32, Context, CornerRadius, Frame, Grid, Id, Margin, RichText, Stroke, Ui, Visuals},
+    egui::{
+        Align2, Area, Color32, Context, CornerRadius, Frame, Grid, Id, Margin, ProgressBar, RichText, Spinner, Stroke,
+        Ui, Visuals,
+    },
 };
 
 use super::{
     controls::HELP,
-    light::{LightPanel, light_panel},
     session::Session,
+    settings::{SettingsPanel, settings_panel},
     timing::FrameTimes,
 };
 use crate::{
+    components::{SceneProgress, SceneState},
     math::digits::grouped,
     render::{
-        components::Daylight,
+        components::{Daylight, ViewOptions},
         report::{FrameReport, PassOutcome},
     },
 };
@@ -26,6 +30,11 @@ const EDGE: f32 = 8.0;
 pub(super) const SMALL: f32 = 12.0;
 /// Colour of a value's name.
 pub(super) const NAME: Color32 = Color32::from_gray(185);
+/// Colour of warnings.
+pub(super) const WARNING: Color32 = Color32::from_rgb(255, 150, 110);
+/// Width of the progress of a build in points, and height of its bar.
+const BUILDING_WIDTH: f32 = 420.0;
+const BAR_HEIGHT: f32 = 6.0;
 const FRAME_TIME: &str = "Time between the completion of two frames on the device, over the last 120 frames: CPU, \
                           device, and the wait for the screen. Half of the frames take at most p50, 95 % of them at \
                           most p95.";
@@ -38,8 +47,10 @@ const POSITION: &str = "Metres east (x) and south (z) of the terrain's centre, a
 /// Draws the overlays. A frame that is saved as an image has none.
 pub fn draw_overlays(
     mut contexts: EguiContexts,
-    mut session: ResMut<Session>,
-    light: Res<LightPanel>,
+    session: Option<ResMut<Session>>,
+    settings: Option<ResMut<SettingsPanel>>,
+    view: Single<&ViewOptions>,
+    scene: Single<&SceneProgress>,
     frames: Res<FrameTimes>,
     report: Res<FrameReport>,
     daylight: Option<Res<Daylight>>,
@@ -52,6 +63,10 @@ pub fn draw_overlays(
         context.set_visuals(visuals);
         *styled = true;
     }
+    let (Some(mut session), Some(mut settings)) = (session, settings) else {
+        panel(context, "canopy_building", Align2::CENTER_CENTER, [0.0, 0.0], |ui| building(ui, &scene));
+        return;
+    };
     if std::mem::take(&mut session.capturing) {
         return;
     }
@@ -60,12 +75,15 @@ pub fn draw_overlays(
     } else if session.overlay {
         panel(context, "canopy_numbers", Align2::LEFT_TOP, [EDGE, EDGE], |ui| {
             let sun = daylight.as_ref().map(|light| light.0.sun_direction.y.clamp(-1.0, 1.0).asin().to_degrees());
-            numbers(ui, &session, &frames, sun);
+            numbers(ui, &session, &scene, &frames, sun, view.tint_levels);
             passes(ui, &report);
         });
     }
-    if light.open && !session.help {
-        panel(context, "canopy_light_panel", Align2::RIGHT_TOP, [-EDGE, EDGE], |ui| light_panel(ui, &light));
+    if settings.open && !session.help {
+        panel(context, "canopy_settings", Align2::RIGHT_TOP, [-EDGE, EDGE], |ui| settings_panel(ui, &mut settings));
+    }
+    if scene.state == SceneState::Building {
+        panel(context, "canopy_building_again", Align2::RIGHT_BOTTOM, [-EDGE, -EDGE], |ui| building(ui, &scene));
     }
     if let Some(message) = session.message() {
         // An area remembers its size by its name, so each message has its own.
@@ -96,7 +114,27 @@ pub(super) fn small(text: impl Into<String>) -> RichText {
     RichText::new(text).size(SMALL)
 }
 
-fn numbers(ui: &mut Ui, session: &Session, frames: &FrameTimes, sun: Option<f32>) {
+/// How far the build of the scene has come.
+fn building(ui: &mut Ui, scene: &SceneProgress) {
+    ui.set_width(BUILDING_WIDTH);
+    let step = if scene.step.is_empty() { "Scene" } else { &scene.step };
+    let count =
+        if scene.total > 0 { format!("{} of {}", scene.done.min(scene.total), scene.total) } else { String::new() };
+    ui.horizontal(|ui| {
+        ui.add(Spinner::new().size(SMALL));
+        ui.label(small(step).strong());
+        ui.label(small(count).color(NAME));
+    });
+    match scene.share() {
+        Some(share) => ui.add(ProgressBar::new(share).desired_height(BAR_HEIGHT)),
+        None => ui.add(ProgressBar::new(1.0).desired_height(BAR_HEIGHT).fill(Color32::from_gray(70)).animate(true)),
+    };
+    for warning in &scene.warnings {
+        ui.label(small(warning).color(WARNING));
+    }
+}
+
+fn numbers(ui: &mut Ui, session: &Session, scene: &SceneProgress, frames: &FrameTimes, sun: Option<f32>, tinted: bool) {
     let milliseconds = |share| frames.percentile(share).map_or("-".to_owned(), |s| format!("{:.1}", s * 1e3));
     let (forest, terrain) = (&frames.forest, frames.terrain);
     let levels: Vec<String> =
@@ -144,10 +182,14 @@ fn numbers(ui: &mut Ui, session: &Session, frames: &FrameTimes, sun: Option<f32>
             ("sun", format!("{:.1}\u{b0} {} the horizon", sun.abs(), if sun < 0.0 { "below" } else { "above" }), SUN),
         );
     }
-    let states = [(session.underground, "below the ground"), (session.tinted, "tinted by level")];
+    let states = [(session.underground, "below the ground"), (tinted, "tinted by level")];
     let states: Vec<&str> = states.iter().filter(|(on, _)| *on).map(|(_, name)| *name).collect();
     if !states.is_empty() {
         rows.push(("options", states.join(", "), "Keys U and T."));
+    }
+    let warnings = scene.warnings.join("\n");
+    if !warnings.is_empty() {
+        rows.push(("warnings", format!("{}, in the terminal and here", scene.warnings.len()), &warnings));
     }
     Grid::new("canopy_rows").num_columns(2).spacing([10.0, 2.0]).show(ui, |ui| {
         for (name, value, tip) in rows {

@@ -8,7 +8,7 @@ use std::{
 use bevy::{
     ecs::{
         observer::On,
-        system::{Commands, Res, ResMut},
+        system::{Commands, Res, ResMut, Single},
     },
     image::Image,
     log::warn,
@@ -16,21 +16,28 @@ use bevy::{
 };
 use chrono::{DateTime, Utc};
 
-use super::{light::LightPanel, session::Session};
+use super::{session::Session, settings::SettingsPanel};
 use crate::{
     app::{error::AppError, notes::notes, rendered_image::RenderedImage},
     components::DrawnSun,
+    render::components::ViewOptions,
 };
 
 /// Captures this frame if the session asks for it.
-pub fn save_image(mut commands: Commands, session: Res<Session>, panel: Res<LightPanel>, drawn: Option<Res<DrawnSun>>) {
+pub fn save_image(
+    mut commands: Commands,
+    session: Res<Session>,
+    panel: Res<SettingsPanel>,
+    view: Single<&ViewOptions>,
+    drawn: Option<Res<DrawnSun>>,
+) {
     if !session.capturing {
         return;
     }
     // The light may lag behind the clock.
     let instant = drawn.map_or_else(|| session.clock.now().to_utc(), |sun| sun.0.instant);
     let mut notes = notes(&session.stage, &session.view(), instant);
-    if session.tinted {
+    if view.tint_levels {
         notes.push(("View", "trees tinted by level of detail".to_owned()));
     }
     notes.extend(panel.notes().map(|light| ("Light", light)));

@@ -1,5 +1,7 @@
 //! The state of a flight and what changes it: commands, held keys, time.
 
+use std::sync::Arc;
+
 use chrono::TimeDelta;
 
 use super::{
@@ -23,7 +25,7 @@ const MESSAGE_SECONDS: f64 = 6.0;
 #[derive(Resource)]
 pub struct Session {
     /// The scene of the flight.
-    pub stage: Stage,
+    pub stage: Arc<Stage>,
     /// The camera.
     pub pilot: Pilot,
     /// The scripted flight, if the scene has a path.
@@ -36,8 +38,6 @@ pub struct Session {
     pub paused: bool,
     /// Whether the camera may go below the ground.
     pub underground: bool,
-    /// Whether trees are tinted by their level of detail.
-    pub tinted: bool,
     /// Whether the small overlay is shown.
     pub overlay: bool,
     /// Whether the help is shown.
@@ -62,7 +62,7 @@ impl Session {
     ///
     /// # Errors
     /// [`AppError::Plan`] for a start on a path that the scene does not have.
-    pub fn new(stage: Stage, options: &FlyOptions) -> Result<Self, AppError> {
+    pub fn new(stage: Arc<Stage>, options: &FlyOptions) -> Result<Self, AppError> {
         let tour = Tour::new(&stage.scene, options.view)?;
         let touring = matches!(options.view, View::Along(_));
         let pose = match options.view {
@@ -78,7 +78,6 @@ impl Session {
             clock: SceneClock::new(time, options.clock),
             paused: false,
             underground: options.underground,
-            tinted: false,
             overlay: true,
             help: false,
             capturing: false,
@@ -89,6 +88,20 @@ impl Session {
         session.fly(&Controls::default(), 0.0);
         session.show_message("press H for all keys".to_owned());
         Ok(session)
+    }
+
+    /// Continues in `stage`, the changed scene: the camera and the clock stay, and so does the time on a path that still
+    /// has it. [`Command::Home`] leads to the start of the new scene.
+    pub fn enter(&mut self, stage: Arc<Stage>) {
+        let tour = |view| Tour::new(&stage.scene, view).ok().flatten();
+        let along = self.tour.as_ref().and_then(|old| tour(View::Along(old.seconds())));
+        let fresh = tour(View::Scene);
+        self.tour = along.or_else(|| fresh.clone());
+        self.touring &= self.tour.is_some();
+        let pose = stage.scene.camera.start;
+        self.start = Start { pose, tour: fresh, touring: false, time: stage.scene.place.time };
+        self.stage = stage;
+        self.show_message("the scene was loaded again".to_owned());
     }
 
     /// The camera, ready to draw with.
@@ -141,14 +154,13 @@ impl Session {
     /// Carries out a command as far as it concerns the flight; the window does the rest.
     pub fn carry_out(&mut self, command: Command) {
         match command {
-            Command::Leave | Command::Light => {}
+            Command::Leave | Command::Settings | Command::Reload | Command::Tint => {}
             Command::SaveImage => self.capturing = true,
             Command::Tour if self.tour.is_none() => {
                 self.show_message("this scene has no camera path; add `camera: (path: [...])` to its file".to_owned());
             }
             Command::Tour => self.touring = !self.touring,
             Command::Pause => self.paused = !self.paused,
-            Command::Tint => self.tinted = !self.tinted,
             Command::Underground => self.underground = !self.underground,
             Command::Help => self.help = !self.help,
             Command::Overlay => self.overlay = !self.overlay,
@@ -205,7 +217,7 @@ mod tests {
             quiet: true,
             explain: false,
         };
-        let stage = Stage::build(&scene, &mut Silent)?;
+        let stage = Arc::new(Stage::build(&scene, &mut Silent)?);
         Ok(Session::new(stage, &options)?)
     }
 
@@ -246,6 +258,25 @@ mod tests {
         session.carry_out(Command::Home);
         assert_eq!((session.pilot.position.x, session.pilot.position.z), (5.0, 7.0));
         assert!((session.pilot.bearing() - 90.0).abs() < 1e-9);
+        Ok(())
+    }
+
+    #[test]
+    fn a_changed_scene_leaves_camera_and_clock() -> Result<(), Box<dyn std::error::Error>> {
+        let mut session = session(View::Along(4.0), 60.0)?;
+        session.fly(&Controls::default(), 1.0);
+        let (there, time) = (session.pilot.position, session.clock.now());
+        let mut scene = Scene::parse(SCENE, "session.ron".as_ref())?;
+        scene.camera.start.position = (1.0, 30.0, 2.0);
+        session.enter(Arc::new(Stage::build(&scene, &mut Silent)?));
+        assert_eq!((session.pilot.position, session.clock.now()), (there, time));
+        assert!(session.touring && session.tour.as_ref().is_some_and(|tour| tour.seconds() == 5.0));
+        scene.camera.path.clear();
+        session.enter(Arc::new(Stage::build(&scene, &mut Silent)?));
+        session.fly(&Controls::default(), 1.0);
+        assert!(!session.touring && session.tour.is_none() && session.pilot.position.abs_diff_eq(there, 1e-6));
+        session.carry_out(Command::Home);
+        assert_eq!((session.pilot.position.x, session.pilot.position.z), (1.0, 2.0));
         Ok(())
     }
 

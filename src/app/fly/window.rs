@@ -8,45 +8,37 @@ use bevy::{
         change_detection::DetectChangesMut,
         message::{MessageReader, MessageWriter},
         query::With,
-        system::{Commands, Local, Res, ResMut, Single},
+        system::{Local, Query, Res, ResMut, Single},
     },
     input::{
         ButtonInput, ButtonState,
-        keyboard::{KeyCode, KeyboardInput},
+        keyboard::{Key, KeyCode, KeyboardInput},
         mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll, MouseButton, MouseScrollUnit},
     },
     prelude::Transform,
-    render::view::Msaa,
     time::{Real, Time},
     window::{CursorGrabMode, CursorOptions, PrimaryWindow, WindowFocused},
 };
-use bevy_egui::input::EguiWantsInput;
+use bevy_egui::{
+    EguiInput,
+    egui::{self, Event},
+    input::EguiWantsInput,
+};
 
 use super::{
-    controls::{self, Command},
-    light::LightPanel,
+    controls::{self, Command, PanelInput},
+    loading::{self, Request, Terminal},
     session::Session,
+    settings::SettingsPanel,
 };
 use crate::{
     app::camera,
-    components::Sun,
+    components::{CanopyScene, Sun},
     render::components::{CanopyCamera, CanopyOrigin, ViewOptions},
 };
 
 /// Pixels of touchpad scrolling that equal one notch of a wheel.
 const PIXELS_PER_NOTCH: f64 = 100.0;
-
-/// Spawns the stage and the camera.
-pub fn set_up(mut commands: Commands, session: Res<Session>) {
-    let stage = &session.stage;
-    stage.show(&mut commands);
-    commands.spawn((stage.sun(session.clock.now().to_utc()), stage.shadow()));
-    commands.spawn((
-        CanopyCamera,
-        Msaa::from_samples(stage.scene.quality.msaa),
-        camera::projection(session.view().field_of_view),
-    ));
-}
 
 /// Captures the mouse on a click, and releases it when the window loses the focus.
 pub fn capture_mouse(
@@ -73,12 +65,27 @@ fn set_captured(cursor: &mut CursorOptions, captured: bool) {
     cursor.visible = !captured;
 }
 
-/// Carries out the commands of the pressed keys.
+/// Takes the keys from the overlay that select something in the panel. Only a number that is typed gets them.
+pub fn keep_keys_from_overlay(mut inputs: Query<&mut EguiInput>, overlay: Res<EguiWantsInput>) {
+    if overlay.wants_any_keyboard_input() {
+        return;
+    }
+    for mut input in &mut inputs {
+        input.events.retain(|event| !matches!(event, Event::Key { key: egui::Key::Tab, .. }));
+    }
+}
+
+/// Carries out the commands of the pressed keys. Before the flight there is one: to quit.
 pub fn handle_keys(
     mut keys: MessageReader<KeyboardInput>,
     held: Res<ButtonInput<KeyCode>>,
-    mut session: ResMut<Session>,
-    mut panel: ResMut<LightPanel>,
+    mut session: Option<ResMut<Session>>,
+    mut panel: Option<ResMut<SettingsPanel>>,
+    request: Res<Request>,
+    mut terminal: ResMut<Terminal>,
+    mut scene: Single<&mut CanopyScene>,
+    mut view: Single<&mut ViewOptions, With<CanopyCamera>>,
+    overlay: Res<EguiWantsInput>,
     mut cursor: Single<&mut CursorOptions, With<PrimaryWindow>>,
     mut exit: MessageWriter<AppExit>,
     mut shift: Local<bool>,
@@ -90,14 +97,24 @@ pub fn handle_keys(
         if SHIFTS.contains(&key.key_code) {
             *shift = pressed;
         }
-        if !pressed {
+        if !pressed || overlay.wants_any_keyboard_input() {
             continue;
         }
+        let (Some(session), Some(panel)) = (&mut session, &mut panel) else {
+            if key.logical_key == Key::Escape {
+                exit.write(AppExit::Success);
+            }
+            continue;
+        };
         if panel.open
             && let Some(input) = controls::panel_input(&key.logical_key, *shift, key.repeat)
         {
-            if let Some(text) = panel.handle(input) {
-                print(&text, &mut session);
+            match panel.handle(input) {
+                Some(text) => print(&text, session),
+                None if input == PanelInput::Write => {
+                    session.show_message("only the lighting of a species is written into scene files".to_owned());
+                }
+                None => {}
             }
             continue;
         }
@@ -105,14 +122,12 @@ pub fn handle_keys(
         match command {
             Command::Leave if captured(&cursor) => set_captured(&mut cursor, false),
             Command::Leave if panel.open => panel.open = false,
-            Command::Light => {
-                if !panel.toggle() {
-                    session.show_message("this scene has no species whose lighting can be adjusted".to_owned());
-                }
-            }
+            Command::Settings => panel.open = !panel.open,
+            Command::Tint => view.tint_levels = !view.tint_levels,
             Command::Leave => {
                 exit.write(AppExit::Success);
             }
+            Command::Reload => loading::reload(&request, session, &mut terminal, &mut scene),
             _ => session.carry_out(command),
         }
     }
@@ -136,34 +151,39 @@ pub fn fly(
     motion: Res<AccumulatedMouseMotion>,
     wheel: Res<AccumulatedMouseScroll>,
     cursor: Single<&CursorOptions, With<PrimaryWindow>>,
-    panel: Res<LightPanel>,
+    panel: Res<SettingsPanel>,
+    overlay: Res<EguiWantsInput>,
     mut session: ResMut<Session>,
 ) {
     let seconds = time.delta_secs_f64();
     let mouse = if captured(&cursor) { motion.delta.as_dvec2() } else { glam::DVec2::ZERO };
+    let scrolls = overlay.wants_any_pointer_input() && !captured(&cursor);
     let notches = match wheel.unit {
+        _ if scrolls => 0.0,
         MouseScrollUnit::Line => f64::from(wheel.delta.y),
         MouseScrollUnit::Pixel => f64::from(wheel.delta.y) / PIXELS_PER_NOTCH,
     };
     // A key that was pressed and released between two slow frames still counts.
     let pressed = |key| keys.pressed(key) || keys.just_pressed(key);
-    let held = |key| pressed(key) && !(panel.open && controls::rotates_view(key));
+    let typing = overlay.wants_any_keyboard_input();
+    let held = |key| pressed(key) && !typing && !(panel.open && controls::rotates_view(key));
     let controls = controls::controls(held, mouse, notches, seconds);
     session.fly(&controls, seconds);
 }
 
-/// Updates camera, light and options from the flight. Unchanged values are not touched, so change detection works.
+/// Updates camera and sun from the flight. Unchanged values are not touched, so change detection works.
 pub fn follow(
     session: Res<Session>,
     mut origin: ResMut<CanopyOrigin>,
-    camera: Single<(&mut Transform, &mut ViewOptions), With<CanopyCamera>>,
+    mut transform: Single<&mut Transform, With<CanopyCamera>>,
     mut sun: Single<&mut Sun>,
 ) {
-    let (mut transform, mut options) = camera.into_inner();
     let (new_origin, new_transform) = camera::origin_and_transform(&session.view());
     origin.set_if_neq(new_origin);
     transform.set_if_neq(new_transform);
-    options.set_if_neq(ViewOptions { tint_levels: session.tinted });
     // The sun's refresh policy decides how often the light is computed again.
-    sun.set_if_neq(session.stage.sun(session.clock.now().to_utc()));
+    let instant = session.clock.now().to_utc();
+    if sun.instant != instant {
+        sun.instant = instant;
+    }
 }

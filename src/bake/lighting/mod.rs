@@ -23,7 +23,7 @@ use transfer::{
 };
 
 /// How the key light (sun or moon) lights a plant's full models. It needs no bake of its own.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Serialize, bevy::reflect::Reflect)]
 pub enum SunLight {
     /// Each leaf by the angle between its own normal and the sun, front and back [Franzke 2005, 4.2.2]: sharp and
     /// accurate.

@@ -25,7 +25,7 @@ pub struct Generator {
 }
 
 /// The weight of a generator in the density field.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, bevy::reflect::Reflect)]
 pub enum Weighting {
     /// Each primitive has the weight 1, as published. A finer tessellation of the same leaves makes the crown darker.
     Primitives,

@@ -12,12 +12,14 @@
 
 use std::ops::RangeInclusive;
 
+use bevy::reflect::{Reflect, std_traits::ReflectDefault};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::density::DensityField;
 use super::generators::{Generator, Weighting, even_share};
 use super::partition::Aabb;
+use crate::math::Range;
 
 /// ρ as a share of the plant's longest extent.
 const RADIUS_SHARE: f32 = 0.1;
@@ -32,7 +34,7 @@ const SAMPLES: usize = 4096;
 
 /// What the ambient term is a function of, and with it how k_a lights the leaves: as published, or with constants that are
 /// fitted to the path tracer.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Reflect)]
 pub enum AmbientField {
     /// F - τ of the field with the radius ρ, as published: the surface of the normals is where the crown begins to
     /// darken. What lies beyond ρ casts no shade. The plant is then lit by eq. 1 alone: k_a on the ambient light and on
@@ -73,7 +75,7 @@ impl AmbientField {
 }
 
 /// Where the normals of the foliage come from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Reflect)]
 pub enum NormalSource {
     /// The nearest vertex of the surface, as published. Jumps between lobes of the crown. In a scene file: `Nearest`.
     #[default]
@@ -87,41 +89,54 @@ pub enum NormalSource {
 /// Settings of the implicit-surface bake. Values out of range are clamped. Values that are `None`, or that a scene file
 /// leaves out in `lighting: Expressive(...)`, are derived from the plant. Scene files must keep within the ranges that
 /// are constants here.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, Reflect)]
+#[reflect(Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct ImplicitSettings {
     /// ρ, metres, 0..=1e6. Larger: a smoother, more general shape of the crown.
+    #[reflect(@Range::factor(ImplicitSettings::RADIUS).unit("m"), @"Distance of a leaf's influence. Larger: a smoother crown.")]
     pub radius: Option<f32>,
     /// τ in units of the field (see [`Weighting`]), 0..=1e6. Larger: a surface closer to the densest foliage.
+    #[reflect(@Range::factor(ImplicitSettings::DENSITY), @"Density at the surface. Larger: a surface closer to the densest foliage.")]
     pub threshold: Option<f32>,
     /// What the ambient term is a function of: `Depth`, nearer to the truth, or `Published`, lit by the paper's equations
     /// alone ([`AmbientField`]).
+    #[reflect(@"Depth: leaves on the way out of the crown, at all radii. Published: density within rho minus tau.")]
     pub ambient: AmbientField,
     /// First radius of [`AmbientField::Depth`], metres, 0..=1e6. Larger: gaps between twigs no longer count. 0: the
     /// ambient term is 1.
+    #[reflect(@Range::factor(ImplicitSettings::AMBIENT_RADIUS).unit("m"), @"First radius of the depth field. Larger: gaps between twigs are ignored.")]
     pub ambient_radius: Option<f32>,
     /// k_a_min, 0..=1: the least ambient term, in the core of the crown.
+    #[reflect(@Range::fraction(ImplicitSettings::UNIT), @"Ambient light of the crown's core.")]
     pub least: Option<f32>,
     /// d_min in units of the ambient field, 0..=1e6: from this value on the ambient term is k_a_min. Larger: brighter.
+    #[reflect(@Range::factor(ImplicitSettings::DENSITY), @"Depth or density at which the ambient light reaches that of the core. Larger: brighter.")]
     pub core: Option<f32>,
     /// n, 0.01..=100. Below 1 the crown darkens only near its core, above 1 already near its surface.
+    #[reflect(@Range::factor(ImplicitSettings::EXPONENT), @"Below 1 the crown darkens late towards the core, above 1 early.")]
     pub exponent: Option<f32>,
     /// Fraction of the foliage's primitives that become generators, 0..=1 (at least one does). Smaller: faster and less
     /// accurate. [`AmbientField::Depth`] always uses all of them: it needs single leaves to find gaps, and thins them
     /// out itself. In a scene file: `share`.
     #[serde(rename = "share")]
+    #[reflect(@Range::factor(ImplicitSettings::SHARE), @"Fraction of the leaves that form the surface. Smaller: a faster but less accurate bake.")]
     pub generator_share: f32,
     /// What a generator counts: `LeafArea`, `Primitives` [Luft 2007, 3.1] or `Vertices` [Luft 2006, 4.1]. It changes the units
     /// of [`threshold`](Self::threshold), and of [`core`](Self::core) as published. [`AmbientField::Depth`] goes by leaf area.
+    #[reflect(@"What each leaf counts: its area, one per primitive, or one per vertex. It changes the unit of the threshold.")]
     pub weighting: Weighting,
     /// Where the normals come from.
+    #[reflect(@"The normal of the surface's nearest vertex, as published, or the gradient of the density.")]
     pub normals: NormalSource,
     /// Weight of a leaf's own normal in the result, 0..=1; the publication shows 0. 1: the leaves' own normals,
     /// unchanged.
+    #[reflect(@Range::fraction(ImplicitSettings::UNIT), @"Weight of each leaf's own normal in the result.")]
     pub own_normal: f32,
     /// Whether the surface is extracted even if the normals do not need it.
     pub surface: bool,
     /// Cells of the surface per radius ρ, 1..=16. More: a finer surface, whose triangles grow with the square.
+    #[reflect(@Range::steps(ImplicitSettings::RESOLUTION, 1.0, 0.1), @"Cells of the surface per radius. More: a finer surface.")]
     pub resolution: f32,
     /// Triangles of the returned surface as a fraction of the foliage's, 0..=1 (the presets
     /// [`COARSE_SHARE`](super::COARSE_SHARE) and [`FINE_SHARE`](super::FINE_SHARE)); `None` leaves it as extracted. The
@@ -200,7 +215,7 @@ impl ImplicitSettings {
 }
 
 /// The values that a bake went by.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Reflect)]
 pub struct ImplicitParameters {
     /// ρ, metres.
     pub radius: f32,
