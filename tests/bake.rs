@@ -335,6 +335,27 @@ fn a_damaged_cache_file_is_replaced() {
     assert_eq!(std::fs::read(cache.file(&key)).unwrap(), whole);
 }
 
+#[cfg(unix)]
+#[test]
+fn a_pipe_in_the_place_of_a_cache_file_is_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = Cache::new(folder.path());
+    let plant = Arc::new(Plant::default());
+    let key = CacheKey::new(&plant, &small_settings());
+    // Whoever opens a pipe waits for its other end, here for ever.
+    let made = std::process::Command::new("mkfifo").arg(cache.file(&key)).status().unwrap();
+    assert!(made.success());
+    assert!(cache.load(&key, &plant).is_none());
+    for from_cache in [false, true] {
+        let (_, source) = bake_plant(Arc::clone(&plant), &small_settings(), Some(&cache));
+        match source {
+            BakeSource::Fresh { warning: None } => assert!(!from_cache),
+            BakeSource::Cache => assert!(from_cache),
+            source => panic!("{source:?}"),
+        }
+    }
+}
+
 #[test]
 fn a_folder_that_cannot_be_written_is_a_warning() {
     let folder = tempfile::tempdir().unwrap();

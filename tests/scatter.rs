@@ -728,6 +728,36 @@ fn cover_maps_refuse_what_they_cannot_hold() {
 }
 
 #[test]
+fn a_bounded_cover_has_texels_as_large_as_its_stand_is_wide() {
+    let bounds = [PlantSize { radius: 60.0, height: 10.0 }];
+    let pair = |distance: f64| Stand { trees: vec![tree(0.0, 0.0, 0.0), tree(distance, 0.0, distance)] };
+    for (distance, texel) in [(100.0, 8.0), (4_000.0, 8.0), (20_000.0, 32.0), (500_000.0, 512.0)] {
+        let map = bounded_cover_map(&pair(distance), &bounds, 8.0, 1 << 20).unwrap();
+        assert_eq!(map.texel, texel, "{distance} m");
+        assert!(map.cover.len() <= 1 << 20, "{distance} m: {} texels", map.cover.len());
+        for map in [&map, &map.smoothed()] {
+            assert!(map.at(DVec2::ZERO) > 0.0 && map.at(DVec2::splat(distance)) > 0.0, "{distance} m");
+        }
+        if texel == 8.0 {
+            assert_eq!(map, cover_map(&pair(distance), &bounds, 8.0, None).unwrap());
+        }
+    }
+    assert!(bounded_cover_map(&pair(10.0), &bounds, f64::NAN, 1 << 20).is_err());
+    assert_eq!(bounded_cover_map(&Stand::default(), &bounds, 8.0, 0).unwrap().cover, [0u8; 0]);
+    let least = bounded_cover_map(&pair(10.0), &bounds, 8.0, 0).unwrap();
+    assert!(least.cover.len() <= 4, "{} texels", least.cover.len());
+}
+
+#[test]
+fn a_coarsened_cover_keeps_its_sum_and_its_place() {
+    let map = CoverMap { origin: DVec2::new(-8.0, 8.0), texel: 8.0, columns: 3, rows: 1, cover: vec![64, 16, 32] };
+    let coarse = map.coarsened(2);
+    assert_eq!((coarse.origin, coarse.texel), (DVec2::new(-16.0, 0.0), 16.0));
+    assert_eq!((coarse.columns, coarse.rows, coarse.cover), (2, 1, vec![16, 12]));
+    assert_eq!((map.coarsened(1), map.coarsened(0)), (map.clone(), map));
+}
+
+#[test]
 fn a_widened_cover_is_the_mean_of_the_surroundings() {
     let mut cover = vec![0; 9 * 9];
     cover[4 * 9 + 4] = 250;
