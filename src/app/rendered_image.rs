@@ -62,16 +62,21 @@ mod tests {
     fn an_image_is_stored_with_its_size_and_notes() -> Result<(), Box<dyn std::error::Error>> {
         let folder = tempfile::tempdir()?;
         let path = folder.path().join("a.png");
-        let picture = Picture { width: 2, height: 1, pixels: vec![7; 6] };
+        let image = RenderedImage { width: 2, height: 1, pixels: vec![7; 6] };
         let notes = [("Title", "a wood".to_owned()), ("Seed", "1".to_owned())];
-        assert!(!Picture::is_stored(&path, (2, 1), &notes));
-        picture.save(&path, &notes)?;
-        assert!(Picture::is_stored(&path, (2, 1), &notes));
-        assert!(!Picture::is_stored(&path, (1, 2), &notes) && !Picture::is_stored(&path, (2, 1), &notes[..1]));
+        assert!(!RenderedImage::is_stored(&path, (2, 1), &notes));
+        image.save(&path, &notes)?;
+        assert!(RenderedImage::is_stored(&path, (2, 1), &notes));
+        assert!(
+            !RenderedImage::is_stored(&path, (1, 2), &notes) && !RenderedImage::is_stored(&path, (2, 1), &notes[..1])
+        );
         let other = [("Title", "a wood".to_owned()), ("Seed", "2".to_owned())];
-        assert!(!Picture::is_stored(&path, (2, 1), &other));
+        assert!(!RenderedImage::is_stored(&path, (2, 1), &other));
         std::fs::write(&path, b"no image")?;
-        assert!(!Picture::is_stored(&path, (2, 1), &notes) && !Picture::is_stored(folder.path(), (2, 1), &notes));
+        assert!(
+            !RenderedImage::is_stored(&path, (2, 1), &notes)
+                && !RenderedImage::is_stored(folder.path(), (2, 1), &notes)
+        );
         Ok(())
     }
 }
