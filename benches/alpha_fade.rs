@@ -12,6 +12,8 @@
 //!
 //! Results: `docs/measurements/alpha-fade.md`.
 
+#![allow(clippy::expect_used)]
+
 use std::sync::Arc;
 
 use canopy::bake::levels::cross::{CrossSettings, bake_cross};
@@ -46,7 +48,7 @@ struct Pixel {
 }
 
 /// A square image of the crown alone.
-type Picture = Vec<Pixel>;
+type RenderedImage = Vec<Pixel>;
 
 /// Largest and mean value of a series.
 #[derive(Default)]
@@ -119,7 +121,7 @@ fn at_rest() {
                 };
                 let side = chain.level_size(level).0 as usize;
                 let (truth, mip) = (averaged(&of(0), chain.width as usize, 1 << level), of(level));
-                let area = |picture: &Picture| picture.iter().map(|pixel| f64::from(pixel.coverage)).sum::<f64>();
+                let area = |picture: &RenderedImage| picture.iter().map(|pixel| f64::from(pixel.coverage)).sum::<f64>();
                 println!(
                     "| {} | {level} | {side} | {fade:?} | {:.3} | {:.4} | {:.4} |",
                     species.name,
@@ -133,7 +135,7 @@ fn at_rest() {
 }
 
 /// An image of `width` pixels a row with the mean of `times`² of them in each.
-fn averaged(picture: &Picture, width: usize, times: usize) -> Picture {
+fn averaged(picture: &RenderedImage, width: usize, times: usize) -> RenderedImage {
     let side = width / times;
     let mean = |index: usize| {
         let (x, y) = (index % side * times, index / side * times);
@@ -145,21 +147,21 @@ fn averaged(picture: &Picture, width: usize, times: usize) -> Picture {
     (0..side * side).map(mean).collect()
 }
 
-fn rmse(a: &Picture, b: &Picture) -> f64 {
+fn rmse(a: &RenderedImage, b: &RenderedImage) -> f64 {
     let square = a.iter().zip(b).map(|(a, b)| f64::from((shown(a) - shown(b)).length_squared() / 3.0)).sum::<f64>();
     (square / a.len() as f64).sqrt()
 }
 
-fn mean_flip(a: &Picture, b: &Picture, side: usize) -> f64 {
-    let image = |picture: &Picture| {
+fn mean_flip(a: &RenderedImage, b: &RenderedImage, side: usize) -> f64 {
+    let image = |picture: &RenderedImage| {
         let bytes: Vec<u8> = picture.iter().flat_map(|pixel| shown(pixel).to_array().map(byte)).collect();
         FlipImageRgb8::with_data(side as u32, side as u32, &bytes)
     };
     f64::from(FlipPool::from_image(&flip(image(a), image(b), PIXELS_PER_DEGREE)).mean())
 }
 
-fn report(crown: &str, level: &str, side: usize, fade: AlphaFade, draw: impl Fn(f32) -> Picture) {
-    let pictures: Vec<Picture> = thresholds().map(draw).collect();
+fn report(crown: &str, level: &str, side: usize, fade: AlphaFade, draw: impl Fn(f32) -> RenderedImage) {
+    let pictures: Vec<RenderedImage> = thresholds().map(draw).collect();
     compare(crown, level, side, fade, &pictures);
 }
 
@@ -198,11 +200,11 @@ fn transition(name: &str, tree: &Plant, fade: AlphaFade, side: usize) {
     };
     let appears = thresholds().map(|threshold| at(0.5, threshold));
     let goes = thresholds().rev().skip(1).map(|threshold| at(threshold, 0.5));
-    compare(name, "model to crosses", side, fade, &appears.chain(goes).collect::<Vec<Picture>>());
+    compare(name, "model to crosses", side, fade, &appears.chain(goes).collect::<Vec<RenderedImage>>());
 }
 
-fn compare(crown: &str, level: &str, side: usize, fade: AlphaFade, pictures: &[Picture]) {
-    let area = |picture: &Picture| picture.iter().map(|pixel| f64::from(pixel.coverage)).sum::<f64>();
+fn compare(crown: &str, level: &str, side: usize, fade: AlphaFade, pictures: &[RenderedImage]) {
+    let area = |picture: &RenderedImage| picture.iter().map(|pixel| f64::from(pixel.coverage)).sum::<f64>();
     let whole = pictures.last().map_or(1.0, area).max(1.0);
     let (mut changed, mut error, mut difference) = (Series::default(), Series::default(), Series::default());
     for pair in pictures.windows(2) {
@@ -224,7 +226,7 @@ fn byte(linear: f32) -> u8 {
 }
 
 /// A texture with a texel a pixel, its alpha interpolated between texels and tested at [`SAMPLES`]² points of each.
-fn of_texture(texture: &RgbaImage, threshold: f32) -> Picture {
+fn of_texture(texture: &RgbaImage, threshold: f32) -> RenderedImage {
     let (width, height) = texture.dimensions();
     let alpha = |x: i64, y: i64| {
         let (x, y) = (x.clamp(0, i64::from(width) - 1), y.clamp(0, i64::from(height) - 1));
@@ -281,7 +283,7 @@ fn with_thresholds(plant: &Plant, thresholds: &[f32]) -> Plant {
 }
 
 /// A plant seen from +Z in a square of `side` pixels that is as high as the plant's top.
-fn drawn(plant: &Plant, side: usize) -> Picture {
+fn drawn(plant: &Plant, side: usize) -> RenderedImage {
     let height = plant.height();
     let tracer = PlantTracer::new(&Arc::new(plant.clone()));
     let sample = |at: Vec2| {

@@ -13,6 +13,8 @@
 //! depends on the constants. They are fitted to means: of classes of k_a, twelve a plant and hour, each relative to
 //! that plant's mean.
 
+#![allow(clippy::expect_used)]
+
 use std::path::Path;
 use std::sync::Arc;
 

@@ -13,6 +13,8 @@
 //! and aspen; in 4 and 5 also our conifer and fewer triangles of both, and a bush. The contestants of a table take turns
 //! in one run; medians are printed, as Markdown.
 
+#![allow(clippy::expect_used)]
+
 use std::hint::black_box;
 use std::path::Path;
 use std::sync::Arc;

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use canopy::{
-    app::{LightGroup, Picture, ReferenceOptions, Renderer, View, parse_lighting, parse_size, reference},
+    app::{LightGroup, ReferenceOptions, RenderedImage, Renderer, View, parse_lighting, parse_size, reference},
     assets::Stage,
     math::srgb_to_linear,
     progress::Silent,
@@ -150,7 +150,7 @@ fn stands(arguments: &Arguments, folder: &Path) -> anyhow::Result<()> {
 }
 
 /// The scene in one light; without one, the scene without its trees.
-fn draw(arguments: &Arguments, scene: &Scene, light: Option<&str>, at: LocalTime) -> anyhow::Result<Picture> {
+fn draw(arguments: &Arguments, scene: &Scene, light: Option<&str>, at: LocalTime) -> anyhow::Result<RenderedImage> {
     let overrides = Overrides { lighting: light.map(parse_lighting).transpose()?, ..Overrides::default() };
     let stage = Stage::build(&overrides.applied(scene.clone()), &mut Silent)?;
     let view = stage.scene.camera.start;
@@ -165,7 +165,7 @@ fn draw(arguments: &Arguments, scene: &Scene, light: Option<&str>, at: LocalTime
     Ok(renderer.draw(&stage, &view, at.utc())?)
 }
 
-fn trace(arguments: &Arguments, scene: &Scene, at: LocalTime, out: &Path) -> anyhow::Result<Picture> {
+fn trace(arguments: &Arguments, scene: &Scene, at: LocalTime, out: &Path) -> anyhow::Result<RenderedImage> {
     let options = ReferenceOptions {
         scene: scene.clone().into(),
         out: out.to_owned(),
@@ -182,18 +182,18 @@ fn trace(arguments: &Arguments, scene: &Scene, at: LocalTime, out: &Path) -> any
     };
     let file = reference(&options, &mut Silent)?;
     let image = image::open(&file).with_context(|| file.display().to_string())?.to_rgb8();
-    Ok(Picture { width: image.width(), height: image.height(), pixels: image.into_raw() })
+    Ok(RenderedImage { width: image.width(), height: image.height(), pixels: image.into_raw() })
 }
 
 /// Whether a tree stands in pixel `index`: where the image without trees differs from the traced one.
-fn of_tree(truth: &Picture, bare: &Picture, index: usize) -> bool {
-    let pixel = |picture: &Picture| [0, 1, 2].map(|c| picture.pixels[3 * index + c]);
+fn of_tree(truth: &RenderedImage, bare: &RenderedImage, index: usize) -> bool {
+    let pixel = |picture: &RenderedImage| [0, 1, 2].map(|c| picture.pixels[3 * index + c]);
     pixel(truth).iter().zip(pixel(bare)).any(|(a, b)| a.abs_diff(b) >= 40)
 }
 
 /// Mean FLIP; in the pixels that are `counted`, by their index: relative RMSE, and light as a share of the truth's.
-fn compare(truth: &Picture, drawn: &Picture, counted: impl Fn(usize) -> bool) -> (f32, f64, f64) {
-    let flip_image = |picture: &Picture| FlipImageRgb8::with_data(picture.width, picture.height, &picture.pixels);
+fn compare(truth: &RenderedImage, drawn: &RenderedImage, counted: impl Fn(usize) -> bool) -> (f32, f64, f64) {
+    let flip_image = |picture: &RenderedImage| FlipImageRgb8::with_data(picture.width, picture.height, &picture.pixels);
     let mean = FlipPool::from_image(&flip(flip_image(truth), flip_image(drawn), PIXELS_PER_DEGREE)).mean();
     let linear = |code: u8| f64::from(srgb_to_linear(f32::from(code) / 255.0));
     let (mut squared, mut square, mut sum, mut of) = (0.0, 0.0, 0.0, 0.0);
@@ -211,12 +211,12 @@ fn compare(truth: &Picture, drawn: &Picture, counted: impl Fn(usize) -> bool) ->
 }
 
 /// The images of one size beside each other.
-fn beside(pictures: &[Picture]) -> Picture {
+fn beside(pictures: &[RenderedImage]) -> RenderedImage {
     let (width, height) = pictures.first().map_or((0, 0), |picture| (picture.width, picture.height));
     let row = 3 * width as usize;
     let pixels = (0..height as usize)
         .flat_map(|y| pictures.iter().flat_map(move |picture| &picture.pixels[y * row..(y + 1) * row]))
         .copied()
         .collect();
-    Picture { width: width * pictures.len() as u32, height, pixels }
+    RenderedImage { width: width * pictures.len() as u32, height, pixels }
 }

@@ -9,6 +9,8 @@
 //!
 //! Run `cargo bench --bench reference -- --help` for the arguments.
 
+#![allow(clippy::expect_used)]
+
 use std::hint::black_box;
 use std::ops::ControlFlow;
 use std::sync::Arc;

@@ -8,6 +8,8 @@
 //!
 //! The contestants of a table take turns in one run; medians are printed, as Markdown.
 
+#![allow(clippy::expect_used)]
+
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -16,7 +18,7 @@ use canopy::math::radical_inverse::{radical_inverse_2, radical_inverse_3};
 use canopy::math::{HaltonSequence, RadicalInverse, halton, hammersley, star_discrepancy};
 use canopy::scatter::{
     Area, ClearingNoise, Ground, PackedStand, PlacementRules, PlantSize, Sequence, SizeRule, SpeciesRule, Stream,
-    cover_map, place, random,
+    cover_map, place_trees, random,
 };
 use glam::{DVec2, DVec3};
 
@@ -184,7 +186,7 @@ fn stand_building() {
     let cleared = PlacementRules { clearings, ..one_million.clone() };
     let hammersley_spaced = PlacementRules { sequence: Sequence::Hammersley, ..spaced.clone() };
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread pool");
-    let placed = |rules: &PlacementRules| place(rules, &ground).expect("the rules can be met");
+    let placed = |rules: &PlacementRules| place_trees(rules, &ground).expect("the rules can be met");
     let stand = placed(&rules(30.0)).stand;
     let bounds = vec![PlantSize { radius: 3.5, height: 20.0 }; 8];
 

@@ -8,7 +8,12 @@
 //! and sky are made anew every time: once with all plants and trees uploaded again, once without. What the first frame
 //! costs beyond the former are the pipelines; what the former costs beyond the latter is the upload.
 //!
+//! With `--appear`: how long are the frames around the one in which a forest of these plants appears?
+//!
 //! Run `cargo bench --bench startup -- --help` for the arguments; benches/README.md has results.
+
+#[path = "startup/appear.rs"]
+mod appear;
 
 use std::{path::PathBuf, process::Command, time::Instant};
 
@@ -18,7 +23,7 @@ use bevy::ecs::{
     query::{Or, With},
 };
 use canopy::{
-    app::{Pictures, RenderOptions, RenderPlan, Renderer, Still, View},
+    app::{Output, RenderOptions, RenderPlan, Renderer, Still, View},
     assets::Stage,
     progress::Progress,
     render::components::{Forest, Ground},
@@ -43,6 +48,15 @@ struct Arguments {
     /// The other image's shift, metres.
     #[arg(long, default_value_t = 700.0)]
     shift: f64,
+    /// Instead: times the frames around the appearance of a forest of the plants in these glTF files.
+    #[arg(long, num_args = 1..)]
+    appear: Vec<PathBuf>,
+    /// Trees per hectare of that forest.
+    #[arg(long, default_value_t = 100.0)]
+    stems: f64,
+    /// Draw that forest without shadow maps. They are drawn for what appears, and for nothing else.
+    #[arg(long)]
+    no_shadows: bool,
     /// One turn in this process: what the other processes of a run are.
     #[arg(long, hide = true)]
     turn: bool,
@@ -60,6 +74,9 @@ fn main() -> anyhow::Result<()> {
     let arguments = Arguments::parse();
     if arguments.turn {
         return turn(&arguments);
+    }
+    if !arguments.appear.is_empty() {
+        return appear::run(&arguments);
     }
     let mut turns = Vec::new();
     for warm in (0..=arguments.turns).map(|index| index > 0) {
@@ -167,7 +184,7 @@ fn turn(arguments: &Arguments) -> anyhow::Result<()> {
 fn first_view(arguments: &Arguments, scene: &Scene, stage: &Stage) -> anyhow::Result<Viewpoint> {
     let options = RenderOptions {
         scene: arguments.scene.as_path().into(),
-        pictures: Pictures::Stills(vec![Still { out: "picture.png".into(), at: None }]),
+        output: Output::Stills(vec![Still { out: "picture.png".into(), at: None }]),
         view: View::Scene,
         size: arguments.size,
         resume: false,

@@ -13,6 +13,8 @@
 //!
 //! The contestants of a table take turns in one run; medians are printed, as Markdown.
 
+#![allow(clippy::expect_used, clippy::unreachable)]
+
 #[path = "transfer/cache.rs"]
 mod cache;
 #[path = "transfer/error.rs"]

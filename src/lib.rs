@@ -74,7 +74,8 @@ pub mod prelude {
         lod::{FadeBand, Levels, Representation},
         progress::{Progress, Silent},
         render::components::{
-            CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, SunShadowSettings, ViewOptions,
+            CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, LightUpdates, SunShadowSettings,
+            ViewOptions,
         },
         render::diagnostics::CanopyDiagnosticsPlugin,
         scene::{Overrides, Scene, SceneSource},

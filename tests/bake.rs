@@ -9,9 +9,11 @@ use canopy::bake::levels::rasterize::{View, projected_area};
 use canopy::bake::levels::shadow_proxy::{shadow_proxy, simplify_foliage};
 use canopy::bake::lighting::implicit::{AmbientField, ImplicitSettings, NoSurface};
 use canopy::bake::lighting::{BakedLighting, ExpressiveLighting, LightingSettings};
+use canopy::bake::textures::{FilteredTexture, PartTextures, filter_together};
 use canopy::bake::{BakeError, BakeSettings, BakeSource, BakedLevel, BakedPlant, bake_plant};
 use canopy::lod::Representation;
-use canopy::math::octahedral;
+use canopy::math::{MipChain, octahedral};
+use canopy::plant::texture::{color_mips, leaf_mips, normal_mips};
 use canopy::plant::{PartKind, Plant, PlantMaterial, PlantMesh, PlantPart};
 use glam::{Mat3, Quat, Vec2, Vec3};
 use image::{Rgba, RgbaImage};
@@ -289,8 +291,105 @@ fn the_cache_gives_back_what_was_baked() {
     ] {
         assert!(cache.load(&CacheKey::new(&other, &settings), &Arc::new(other)).is_none());
     }
-    let left: Vec<PathBuf> = std::fs::read_dir(cache.folder()).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let left = files_of(&cache, "bake");
     assert_eq!(left, [cache.file(&CacheKey::new(&plant, &small_settings().sanitized()))]);
+}
+
+/// The files of `cache` with this ending.
+fn files_of(cache: &Cache, ending: &str) -> Vec<PathBuf> {
+    let files = std::fs::read_dir(cache.folder()).unwrap().map(|entry| entry.unwrap().path());
+    files.filter(|path| path.extension().is_some_and(|known| known == ending)).collect()
+}
+
+/// A plant with a bark and a leaf texture of this size, in memory of its own.
+fn textured(side: u32) -> Arc<Plant> {
+    let image = |blue: u8| {
+        let alpha = |x: u32, y: u32| if (x + y) % 7 < 4 { 255 } else { 20 };
+        Some(Arc::new(RgbaImage::from_fn(side, side, |x, y| Rgba([(3 * x) as u8, (5 * y) as u8, blue, alpha(x, y)]))))
+    };
+    let mut plant = tree(20, 3);
+    plant.parts[0].material.base_color_texture = image(1);
+    plant.parts[0].material.normal_texture = image(128);
+    plant.parts[1].material.base_color_texture = image(2);
+    Arc::new(plant)
+}
+
+/// The textures of `plant`, in the order of its parts.
+fn textures_of(plant: &BakedPlant) -> Vec<Arc<FilteredTexture>> {
+    let of_part = |part: &PartTextures| [part.color.clone(), part.normals.clone()];
+    plant.textures.0.iter().flat_map(of_part).flatten().collect()
+}
+
+#[test]
+fn textures_of_full_models_are_those_of_the_filters_wherever_they_come_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = Cache::new(folder.path());
+    let plant = textured(40);
+    let [wood, leaf] = [0, 1].map(|part| &plant.parts[part].material);
+    let (bark, normals) = (wood.base_color_texture.as_ref().unwrap(), wood.normal_texture.as_ref().unwrap());
+    let wanted = [
+        color_mips(bark),
+        normal_mips(normals),
+        leaf_mips(leaf.base_color_texture.as_ref().unwrap(), leaf.alpha_cutoff),
+    ];
+    for from_cache in [false, true] {
+        let (baked, source) = bake_plant(Arc::clone(&plant), &small_settings(), Some(&cache));
+        assert_eq!(matches!(source, BakeSource::Cache), from_cache);
+        let textures = textures_of(&baked);
+        assert_eq!(
+            textures.iter().map(|texture| texture.mips()).collect::<Vec<_>>(),
+            wanted.each_ref().map(MipChain::view)
+        );
+        // What filtering keeps is not held twice.
+        assert!(Arc::ptr_eq(textures[0].base(), bark) && Arc::ptr_eq(textures[1].base(), normals));
+    }
+}
+
+#[test]
+fn plants_with_equal_textures_share_them_in_memory_and_on_disk() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = Cache::new(folder.path());
+    let (one, other) = (textured(41), textured(41));
+    let shared = filter_together([&*one, &*other], Some(&cache));
+    assert_eq!((shared.len(), files_of(&cache, "texture").len()), (3, 3), "each image is filtered once");
+    let bake = |plant: &Arc<Plant>| bake_plant(Arc::clone(plant), &small_settings(), Some(&cache)).0;
+    let (first, second) = (textures_of(&bake(&one)), textures_of(&bake(&other)));
+    for texture in &first {
+        assert!(shared.iter().any(|known| Arc::ptr_eq(known, texture)));
+    }
+    assert!(first.iter().zip(&second).all(|(a, b)| Arc::ptr_eq(a, b)) && first.len() == 3);
+    assert_eq!(files_of(&cache, "texture").len(), 3);
+    // Another cache gets its files although the textures are in memory.
+    let second_folder = tempfile::tempdir().unwrap();
+    let elsewhere = Cache::new(second_folder.path());
+    bake_plant(Arc::clone(&one), &small_settings(), Some(&elsewhere));
+    assert_eq!(files_of(&elsewhere, "texture").len(), 3);
+    // Nothing holds them when the last plant is gone.
+    let weak = Arc::downgrade(&first[0]);
+    drop((shared, first, second));
+    assert!(weak.upgrade().is_none());
+}
+
+#[test]
+fn a_texture_that_is_missing_or_damaged_in_the_cache_is_filtered_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = Cache::new(folder.path());
+    let plant = textured(42);
+    let bake = || bake_plant(Arc::clone(&plant), &small_settings(), Some(&cache));
+    let wanted: Vec<_> = textures_of(&bake().0).iter().map(|texture| FilteredTexture::clone(texture)).collect();
+    let files = files_of(&cache, "texture");
+    let contents: Vec<Vec<u8>> = files.iter().map(|file| std::fs::read(file).unwrap()).collect();
+    for (number, (file, content)) in files.iter().zip(&contents).enumerate() {
+        match number {
+            0 => std::fs::remove_file(file).unwrap(),
+            1 => std::fs::write(file, &content[..100]).unwrap(),
+            _ => std::fs::write(file, b"").unwrap(),
+        }
+    }
+    let (again, source) = bake();
+    assert!(matches!(source, BakeSource::Cache), "{source:?}");
+    assert!(textures_of(&again).iter().map(|texture| &**texture).eq(&wanted));
+    assert!(files.iter().map(|file| std::fs::read(file).unwrap()).eq(contents));
 }
 
 #[test]
@@ -308,8 +407,12 @@ fn what_is_not_listed_is_not_baked() {
         let (models, source) = bake(MODEL);
         assert_eq!(matches!(source, BakeSource::Cache), from_cache, "{source:?}");
         assert!(models.cross().is_none() && models.shadow_proxy() == all.shadow_proxy());
+        assert_eq!(models.textures.0.len(), plant.parts.len());
     }
-    assert!(bake(&[]).0.levels.is_empty());
+    for _from_cache in [false, true] {
+        assert!(bake(&[]).0.levels.is_empty());
+        assert!(bake(&[]).0.textures.0.is_empty());
+    }
     // A level goes into the place of its kind.
     let (mut none, _) = bake(&[]);
     let cross = BakedLevel::Cross(all.cross().unwrap().clone());
@@ -333,6 +436,27 @@ fn a_damaged_cache_file_is_replaced() {
     assert!(matches!(source, BakeSource::Fresh { warning: None }));
     assert!(same(&fresh, &again));
     assert_eq!(std::fs::read(cache.file(&key)).unwrap(), whole);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_in_the_place_of_a_cache_file_is_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = Cache::new(folder.path());
+    let plant = Arc::new(Plant::default());
+    let key = CacheKey::new(&plant, &small_settings());
+    // Whoever opens a pipe waits for its other end, here for ever.
+    let made = std::process::Command::new("mkfifo").arg(cache.file(&key)).status().unwrap();
+    assert!(made.success());
+    assert!(cache.load(&key, &plant).is_none());
+    for from_cache in [false, true] {
+        let (_, source) = bake_plant(Arc::clone(&plant), &small_settings(), Some(&cache));
+        match source {
+            BakeSource::Fresh { warning: None } => assert!(!from_cache),
+            BakeSource::Cache => assert!(from_cache),
+            source => panic!("{source:?}"),
+        }
+    }
 }
 
 #[test]
@@ -367,7 +491,9 @@ fn several_writers_leave_one_whole_file() {
             scope.spawn(|| bake_plant(Arc::clone(&plant), &small_settings(), Some(&cache)));
         }
     });
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    // The plant, and the texture of its leaves.
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
+    assert_eq!((files_of(&cache, "bake").len(), files_of(&cache, "texture").len()), (1, 1));
     let (_, source) = bake_plant(plant, &small_settings(), Some(&cache));
     assert!(matches!(source, BakeSource::Cache));
 }

@@ -120,3 +120,37 @@ fn a_reader_that_leaves_early_is_no_error() -> Outcome {
     assert!(!text(&output.stderr).contains("panicked"));
     Ok(())
 }
+
+/// What `canopy info` says of a scene that comes through a pipe, in a folder with the files that it names.
+#[cfg(unix)]
+#[test]
+fn scenes_are_read_from_pipes_with_paths_from_the_working_directory() -> Outcome {
+    use std::io::Write;
+
+    let folder = tempfile::tempdir()?;
+    std::fs::write(folder.path().join("trees.csv"), "x,y\n1,2\n3,4\n")?;
+    let scene = "(terrain: Flat(size: 100), place: (latitude: 48, longitude: 9), species: [(name: \"x\", plant: Grown(form: \
+                 Broadleaf, individuals: 1, triangles: 5000), height: (5, 9))], trees: Inventory(path: \"trees.csv\"))";
+    let mut program = Command::new(env!("CARGO_BIN_EXE_canopy"))
+        .args(["info", "/dev/stdin"])
+        .current_dir(folder.path())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()?;
+    program.stdin.take().ok_or("no input")?.write_all(scene.as_bytes())?;
+    let output = program.wait_with_output()?;
+    assert_eq!(code(&output), Some(0), "{}", text(&output.stderr));
+    assert!(text(&output.stdout).contains("2 from the inventory trees.csv"), "{}", text(&output.stdout));
+
+    let mut broken = Command::new(env!("CARGO_BIN_EXE_canopy"))
+        .args(["info", "/dev/stdin"])
+        .stdin(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()?;
+    broken.stdin.take().ok_or("no input")?.write_all(b"(terrain: Flt())")?;
+    let output = broken.wait_with_output()?;
+    assert_eq!(code(&output), Some(1));
+    assert!(text(&output.stderr).contains("/dev/stdin:1:11: unknown choice"), "{}", text(&output.stderr));
+    Ok(())
+}

@@ -3,6 +3,7 @@
 mod assets;
 mod examples;
 mod forests;
+mod reflection;
 
 use std::path::Path;
 

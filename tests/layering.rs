@@ -163,6 +163,27 @@ fn circles_of_files_are_found() {
     assert_eq!(circles(&files_graph("render", &files(&circle))), [["render/mod.rs", "render/sky.rs"]]);
 }
 
+/// Places in the render room that name the filters of plant textures: those take up to seconds, so a frame may not wait
+/// for them. The bake filters.
+fn filters_in_render(sources: &BTreeMap<String, String>) -> Vec<String> {
+    let is_filter = |import: &&Import| {
+        room_of(&import.file) == "render" && import.path.starts_with(&["plant".to_owned(), "texture".to_owned()])
+    };
+    let place = |import: &Import| format!("src/{}:{}: {}", import.file, import.line, import.path.join("::"));
+    all_imports(sources).iter().filter(is_filter).map(place).collect()
+}
+
+#[test]
+fn the_render_room_filters_no_texture() {
+    let mut sources = sources();
+    assert_eq!(filters_in_render(&sources), Vec::<String>::new());
+    // The control.
+    let text = "use crate::plant::{\n    PartKind,\n    texture::{color_mips, leaf_mips},\n};\n";
+    sources.insert("render/forest/made_up.rs".to_owned(), text.to_owned());
+    let found = filters_in_render(&sources);
+    assert!(found.iter().any(|place| place.starts_with("src/render/forest/made_up.rs:3")), "{found:?}");
+}
+
 #[test]
 fn render_has_no_circles() {
     let circles = circles(&files_graph("render", &sources()));

@@ -1,15 +1,19 @@
 //! The one integration binary: every room's tests, the shaders, the pictures and what the program must withstand.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
+
 mod app;
 mod bake;
 mod cli;
 mod front_door;
+mod fuzz;
 mod grow;
 mod implicit;
 mod interrupts;
 mod layering;
 mod library;
 mod light;
+mod limits;
 mod load;
 mod math;
 mod plant;

@@ -9,7 +9,7 @@ use canopy::light::{Atmosphere, AtmosphereParams, LightSettings, LightState, Obs
 use canopy::plant::grow::{GrowParameters, grow};
 use canopy::plant::{Gloss, PartKind, Plant, PlantMaterial, PlantMesh, PlantPart};
 use canopy::reference::{
-    Camera, Development, Disc, Environment, Film, Fog, Ground, GroundColor, GroundShape, Instance, Light, Normals,
+    Camera, Disc, DisplayTransform, Environment, Film, Fog, Ground, GroundColor, GroundShape, Instance, Light, Normals,
     PathTracer, ReferenceError, ReferenceScene, Shot, SurfaceSample, TraceSettings, WorldRay,
 };
 use canopy::scene::Viewpoint;
@@ -603,7 +603,7 @@ fn strange_scenes_give_finite_pictures_or_errors() {
         for position in [DVec3::new(0.2, 0.3, 3.0), DVec3::ZERO, DVec3::new(0.0, -5.0, 0.0), DVec3::splat(1e9)] {
             let film = film(&tracer, &shot(position, 0.0, 0.0, (8, 8)), 4);
             assert!(film.radiance().iter().all(|pixel| pixel.is_finite() && pixel.min_element() >= 0.0));
-            assert_eq!(film.develop(&Development::of(&daylight_once(), None)).len(), 3 * 64);
+            assert_eq!(film.display(&DisplayTransform::of(&daylight_once(), None)).len(), 3 * 64);
         }
         assert!(tracer.vertex_radiance(1, 0, &[0, 3, 4], 4).unwrap().iter().flatten().all(|value| value.is_finite()));
         assert!(tracer.vertex_radiance(1, 0, &[5], 4).is_err());

@@ -1,14 +1,17 @@
 //! Images: small scenes drawn without a window, on whatever graphics driver there is (a software one will do).
 
 mod foliage;
+mod forests;
 mod levels;
+mod light_updates;
+mod memory;
 mod pictures;
 mod plate;
 mod plugins;
 mod shadows;
 mod world;
 
-use canopy::app::{Picture, Renderer};
+use canopy::app::{RenderedImage, Renderer};
 use canopy::assets::Stage;
 use canopy::scene::Viewpoint;
 
@@ -39,7 +42,7 @@ fn showing(stage: &Stage) -> Renderer {
 }
 
 #[track_caller]
-fn draw(renderer: &mut Renderer, stage: &Stage, view: &Viewpoint, at: &str) -> Picture {
+fn draw(renderer: &mut Renderer, stage: &Stage, view: &Viewpoint, at: &str) -> RenderedImage {
     match renderer.draw(stage, view, instant(at)) {
         Ok(picture) => picture,
         Err(error) => panic!("{error}"),
@@ -48,7 +51,7 @@ fn draw(renderer: &mut Renderer, stage: &Stage, view: &Viewpoint, at: &str) -> P
 
 /// Another frame of what is there.
 #[track_caller]
-fn again(renderer: &mut Renderer) -> Picture {
+fn again(renderer: &mut Renderer) -> RenderedImage {
     match renderer.update().and_then(|()| renderer.read()) {
         Ok(picture) => picture,
         Err(error) => panic!("{error}"),

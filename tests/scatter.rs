@@ -73,7 +73,7 @@ fn least_distance(stand: &Stand) -> f64 {
 fn a_stand_has_its_density_inside_its_area() {
     for sequence in SEQUENCES {
         let rules = PlacementRules { sequence, ..rules() };
-        let Placement { stand, report } = place(&rules, &FLAT).unwrap();
+        let Placement { stand, report } = place_trees(&rules, &FLAT).unwrap();
         assert_eq!(stand.trees.len(), 8000, "40 ha of 200 stems");
         assert_eq!((report.wanted, report.placed), (8000, 8000));
         assert!((report.stems_per_hectare - 200.0).abs() < 1e-9 && (report.allowed_hectares - 40.0).abs() < 1e-9);
@@ -90,7 +90,7 @@ fn a_stand_has_its_density_inside_its_area() {
 fn the_least_distance_holds_and_the_density_is_met_again() {
     for sequence in SEQUENCES {
         let rules = PlacementRules { sequence, min_distance_m: 4.5, ..rules() };
-        let Placement { stand, report } = place(&rules, &FLAT).unwrap();
+        let Placement { stand, report } = place_trees(&rules, &FLAT).unwrap();
         assert!(least_distance(&stand) >= 4.5, "{sequence:?}: {}", least_distance(&stand));
         assert_eq!(stand.trees.len(), 8000, "{sequence:?} tried {} candidates", report.candidates);
     }
@@ -98,8 +98,8 @@ fn the_least_distance_holds_and_the_density_is_met_again() {
 
 #[test]
 fn the_lower_index_wins() {
-    let free = place(&rules(), &FLAT).unwrap().stand;
-    let spaced = place(&PlacementRules { min_distance_m: 5.0, ..rules() }, &FLAT).unwrap().stand;
+    let free = place_trees(&rules(), &FLAT).unwrap().stand;
+    let spaced = place_trees(&PlacementRules { min_distance_m: 5.0, ..rules() }, &FLAT).unwrap().stand;
     let mut kept: Vec<DVec3> = Vec::new();
     for tree in &free.trees[..2000] {
         if kept.iter().all(|other| other.distance(tree.position) >= 5.0) {
@@ -111,8 +111,8 @@ fn the_lower_index_wins() {
 
 #[test]
 fn a_denser_halton_stand_contains_the_thinner_one() {
-    let thin = place(&rules(), &FLAT).unwrap().stand;
-    let dense = place(&PlacementRules { stems_per_hectare: 450.0, ..rules() }, &FLAT).unwrap().stand;
+    let thin = place_trees(&rules(), &FLAT).unwrap().stand;
+    let dense = place_trees(&PlacementRules { stems_per_hectare: 450.0, ..rules() }, &FLAT).unwrap().stand;
     assert_eq!(thin.trees, dense.trees[..thin.trees.len()]);
 }
 
@@ -125,7 +125,7 @@ fn stands_do_not_depend_on_the_number_of_threads() {
         let on = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
-                let stand = place(&rules, &hilly).unwrap().stand;
+                let stand = place_trees(&rules, &hilly).unwrap().stand;
                 let bounds = [PlantSize { radius: 3.0, height: 20.0 }];
                 let packed = PackedStand::new(&stand, DEFAULT_CELL_SIZE, &bounds).unwrap();
                 let cover = cover_map(&stand, &bounds, 5.0, None).unwrap();
@@ -139,7 +139,7 @@ fn stands_do_not_depend_on_the_number_of_threads() {
 #[test]
 fn seeds_change_the_stand() {
     for sequence in SEQUENCES {
-        let stand = |seed| place(&PlacementRules { sequence, seed, ..rules() }, &FLAT).unwrap().stand;
+        let stand = |seed| place_trees(&PlacementRules { sequence, seed, ..rules() }, &FLAT).unwrap().stand;
         let (a, b) = (stand(1), stand(2));
         let same = a.trees.iter().zip(&b.trees).filter(|(a, b)| a.position == b.position || a.yaw == b.yaw).count();
         assert!(same < 5, "{same} trees have the same place or yaw");
@@ -151,25 +151,25 @@ fn trees_stand_only_where_the_rules_allow_them_and_as_densely_there() {
     // The plane rises by 0.1 to the east: 60 m to 140 m, of which the rule takes 90 m to 110 m.
     let ramp = Plane { height: 95.0, east: 0.1, south: 0.0, reach: f64::INFINITY };
     let limited = PlacementRules { height_range_m: Some((90.0, 110.0)), min_distance_m: 3.0, ..rules() };
-    let Placement { stand, report } = place(&limited, &ramp).unwrap();
+    let Placement { stand, report } = place_trees(&limited, &ramp).unwrap();
     assert!(stand.trees.iter().all(|t| (-50.0..=150.0).contains(&t.position.x)));
     assert!((stand.trees.len() as f64 / 2000.0 - 1.0).abs() < 0.02, "{} instead of 2000", stand.trees.len());
     assert!((report.allowed_hectares - 10.0).abs() < 0.2 && (report.stems_per_hectare - 200.0).abs() < 1e-6);
 
     let steep = PlacementRules { slope_limit: 0.05, ..rules() };
-    assert!(place(&steep, &ramp).unwrap().stand.trees.is_empty());
+    assert!(place_trees(&steep, &ramp).unwrap().stand.trees.is_empty());
     let island = Plane { reach: 100.0, ..FLAT };
-    let stand = place(&rules(), &island).unwrap().stand;
+    let stand = place_trees(&rules(), &island).unwrap().stand;
     assert!((stand.trees.len() as f64 / 800.0 - 1.0).abs() < 0.02, "{} on 4 ha", stand.trees.len());
     let abyss = Plane { height: f64::NAN, ..FLAT };
-    assert!(place(&rules(), &abyss).unwrap().stand.trees.is_empty());
+    assert!(place_trees(&rules(), &abyss).unwrap().stand.trees.is_empty());
 }
 
 #[test]
 fn clearings_are_open_and_the_forest_keeps_its_density() {
     let clearings = Some(ClearingNoise { wavelength_m: 120.0, cover: 0.4, edge: 0.0 });
     let rules = PlacementRules { stems_per_hectare: 1000.0, clearings, ..rules() };
-    let Placement { stand, report } = place(&rules, &FLAT).unwrap();
+    let Placement { stand, report } = place_trees(&rules, &FLAT).unwrap();
     assert!((stand.trees.len() as f64 / 24_000.0 - 1.0).abs() < 0.03, "{} trees", stand.trees.len());
     assert!((report.allowed_hectares - 24.0).abs() < 0.7);
     // On squares of 10 m: forest squares have ten trees in the mean, open ones none, few squares are between.
@@ -194,7 +194,7 @@ fn species_have_their_shares_and_their_limits() {
         species: vec![species(3.0, 0..2, None), species(1.0, 2..3, None), species(4.0, 3..4, Some((120.0, 1000.0)))],
         ..rules()
     };
-    let stand = place(&mixed, &ramp).unwrap().stand;
+    let stand = place_trees(&mixed, &ramp).unwrap().stand;
     let (low, high): (Vec<&Tree>, Vec<&Tree>) = stand.trees.iter().partition(|tree| tree.position.x < 250.0);
     assert_eq!(stand.trees.len(), 8000, "other species take the ground that one cannot");
     let share = |trees: &[&Tree], variants: std::ops::Range<u16>| {
@@ -209,7 +209,7 @@ fn species_have_their_shares_and_their_limits() {
 fn heights_follow_their_distribution() {
     let size = SizeRule::Height { mean_m: 18.0, deviation_m: 3.0, plant_heights_m: vec![20.0, 12.0] };
     let rules = PlacementRules { species: vec![SpeciesRule { size, variants: 4..6, ..Default::default() }], ..rules() };
-    let stand = place(&rules, &FLAT).unwrap().stand;
+    let stand = place_trees(&rules, &FLAT).unwrap().stand;
     let heights: Vec<f64> =
         stand.trees.iter().map(|t| f64::from(t.scale) * if t.variant == 4 { 20.0 } else { 12.0 }).collect();
     let mean = heights.iter().sum::<f64>() / heights.len() as f64;
@@ -222,7 +222,7 @@ fn the_rim_of_a_trunk_reaches_into_the_slope() {
     let slope = Plane { height: 50.0, east: 0.3, south: -0.4, reach: f64::INFINITY };
     let species =
         SpeciesRule { trunk_radius_m: 0.5, size: SizeRule::Scale { min: 0.5, max: 2.0 }, ..Default::default() };
-    let stand = place(&PlacementRules { species: vec![species], ..rules() }, &slope).unwrap().stand;
+    let stand = place_trees(&PlacementRules { species: vec![species], ..rules() }, &slope).unwrap().stand;
     for tree in &stand.trees {
         let radius = 0.5 * f64::from(tree.scale);
         let rim = (0..16).map(|k| {
@@ -274,7 +274,7 @@ fn impossible_rules_are_refused_by_name() {
         ("species[0].plant_heights_m", one(heights(vec![0.2], 10.0, 1.0))),
     ];
     for (name, rules) in wrong {
-        match place(&rules, &FLAT) {
+        match place_trees(&rules, &FLAT) {
             Err(ScatterError::Rule { field, remedy, .. }) => {
                 assert_eq!(field, name);
                 assert!(!remedy.is_empty());
@@ -283,7 +283,7 @@ fn impossible_rules_are_refused_by_name() {
         }
     }
     let crowded = PlacementRules { stems_per_hectare: 1e9, ..base };
-    assert!(matches!(place(&crowded, &FLAT), Err(ScatterError::TooManyTrees { .. })));
+    assert!(matches!(place_trees(&crowded, &FLAT), Err(ScatterError::TooManyTrees { .. })));
 }
 
 proptest! {
@@ -302,7 +302,7 @@ proptest! {
             clearings: Some(ClearingNoise { wavelength_m: 50.0, cover, edge: 0.1 }),
             ..rules()
         };
-        match place(&rules, &FLAT) {
+        match place_trees(&rules, &FLAT) {
             Err(ScatterError::Rule { field, .. }) => prop_assert_eq!(field, "min_distance_m"),
             Err(other) => prop_assert!(false, "{}", other),
             Ok(Placement { stand, report }) => {
@@ -615,7 +615,7 @@ fn cells_partition_the_trees_and_hold_their_crowns() {
     let sizes = SizeRule::Scale { min: 0.3, max: 3.0 };
     let species = vec![SpeciesRule { variants: 0..2, size: sizes, ..Default::default() }];
     let slope = Plane { height: 0.0, east: 0.3, south: 0.2, reach: f64::INFINITY };
-    let stand = place(&PlacementRules { species, ..rules() }, &slope).unwrap().stand;
+    let stand = place_trees(&PlacementRules { species, ..rules() }, &slope).unwrap().stand;
     let bounds = [PlantSize { radius: 4.0, height: 25.0 }, PlantSize { radius: 1.0, height: 5.0 }];
     let packed = PackedStand::new(&stand, 50.0, &bounds).unwrap();
     assert_eq!(packed.trees.len(), stand.trees.len());
@@ -681,7 +681,7 @@ fn cover_agrees_with_a_fine_raster() {
     let species = vec![SpeciesRule { size: SizeRule::Scale { min: 0.5, max: 1.5 }, ..Default::default() }];
     let area = Area { min: DVec2::ZERO, max: DVec2::splat(80.0) };
     let rules = PlacementRules { area, species, sequence: Sequence::Random, ..rules() };
-    let stand = place(&rules, &FLAT).unwrap().stand;
+    let stand = place_trees(&rules, &FLAT).unwrap().stand;
     let bounds = [PlantSize { radius: 3.0, height: 10.0 }];
     let map = cover_map(&stand, &bounds, 4.0, Some(area)).unwrap();
     assert_eq!((map.columns, map.rows, map.origin), (20, 20, DVec2::ZERO));
@@ -725,6 +725,36 @@ fn cover_maps_refuse_what_they_cannot_hold() {
     let extent = Area { min: DVec2::ZERO, max: DVec2::splat(10.0) };
     let map = cover_map(&far, &bounds, 2.0, Some(extent)).unwrap();
     assert!((covered(&map) - 9.0 * PI).abs() < 0.5);
+}
+
+#[test]
+fn a_bounded_cover_has_texels_as_large_as_its_stand_is_wide() {
+    let bounds = [PlantSize { radius: 60.0, height: 10.0 }];
+    let pair = |distance: f64| Stand { trees: vec![tree(0.0, 0.0, 0.0), tree(distance, 0.0, distance)] };
+    for (distance, texel) in [(100.0, 8.0), (4_000.0, 8.0), (20_000.0, 32.0), (500_000.0, 512.0)] {
+        let map = bounded_cover_map(&pair(distance), &bounds, 8.0, 1 << 20).unwrap();
+        assert_eq!(map.texel, texel, "{distance} m");
+        assert!(map.cover.len() <= 1 << 20, "{distance} m: {} texels", map.cover.len());
+        for map in [&map, &map.smoothed()] {
+            assert!(map.at(DVec2::ZERO) > 0.0 && map.at(DVec2::splat(distance)) > 0.0, "{distance} m");
+        }
+        if texel == 8.0 {
+            assert_eq!(map, cover_map(&pair(distance), &bounds, 8.0, None).unwrap());
+        }
+    }
+    assert!(bounded_cover_map(&pair(10.0), &bounds, f64::NAN, 1 << 20).is_err());
+    assert_eq!(bounded_cover_map(&Stand::default(), &bounds, 8.0, 0).unwrap().cover, [0u8; 0]);
+    let least = bounded_cover_map(&pair(10.0), &bounds, 8.0, 0).unwrap();
+    assert!(least.cover.len() <= 4, "{} texels", least.cover.len());
+}
+
+#[test]
+fn a_coarsened_cover_keeps_its_sum_and_its_place() {
+    let map = CoverMap { origin: DVec2::new(-8.0, 8.0), texel: 8.0, columns: 3, rows: 1, cover: vec![64, 16, 32] };
+    let coarse = map.coarsened(2);
+    assert_eq!((coarse.origin, coarse.texel), (DVec2::new(-16.0, 0.0), 16.0));
+    assert_eq!((coarse.columns, coarse.rows, coarse.cover), (2, 1, vec![16, 12]));
+    assert_eq!((map.coarsened(1), map.coarsened(0)), (map.clone(), map));
 }
 
 #[test]

@@ -556,3 +556,45 @@ fn the_levels_of_detail_are_a_list() -> Outcome {
     assert!(message.starts_with(&place), "no `{place}` in {message}");
     Ok(())
 }
+
+#[test]
+fn thousands_of_mistakes_are_counted_and_the_first_twenty_listed() -> Outcome {
+    let keys: String = (0..10_000)
+        .map(|key| format!("\n(seconds: {}, position: (0, 5, 0), yaw: 0, pitch: {}),", 2 * key, 100 + key))
+        .collect();
+    let names: String = (0..10_000).map(|name| format!("\n\"name {name}\": \"species {name}\",")).collect();
+    let text = format!(
+        "(terrain: Flat(), place: (latitude: 47, longitude: 9), species: [(name: \"oak\", plant: Grown(form: \
+         Broadleaf))], trees: Inventory(path: \"t.csv\", species: {{{names}}}), camera: (path: [{keys}]))"
+    );
+    let Err(error) = Scene::parse(&text, FilePath::new("many.ron")) else { return Err("no error".into()) };
+    let SceneError::Invalid { problems, .. } = &error else { return Err(error.into()) };
+    assert_eq!(problems.len(), 20_000);
+    for (line, problem) in problems.iter().enumerate() {
+        assert_eq!(problem.position.map(|position| position.line), Some(line + 2), "{problem}");
+    }
+    let message = error.to_string();
+    let lines: Vec<&str> = message.lines().collect();
+    assert_eq!(lines.len(), 21, "{message}");
+    assert!(lines[0].starts_with("many.ron:2:11: `trees.species.name 0`"), "{}", lines[0]);
+    assert_eq!(lines[20], "many.ron: 20000 mistakes, of which the first 20 are listed");
+    Ok(())
+}
+
+#[test]
+fn keys_of_a_path_need_a_millisecond() {
+    let scene = |seconds: &str| {
+        Scene::parse(
+            &format!(
+                "(terrain: Flat(), place: (latitude: 47, longitude: 9), camera: (path: [(seconds: 0, position: (0, 5, 0), \
+                 yaw: 0, pitch: 0), (seconds: {seconds}, position: (900, 5, 0), yaw: 0, pitch: 0)]))"
+            ),
+            FilePath::new("path.ron"),
+        )
+    };
+    for seconds in ["1e-308", "1e-9", "0.0009"] {
+        let message = scene(seconds).map_or_else(|error| error.to_string(), |_| String::new());
+        assert!(message.contains("camera.path[1].seconds") && message.contains("millisecond"), "{seconds}: {message}");
+    }
+    assert!(scene("0.001").is_ok());
+}

@@ -615,6 +615,65 @@ fn patch_tag(bytes: &mut [u8], tag: u16, value: u32) {
     }
 }
 
+/// A TIFF of whose first directory these are the entries: tag, type, count, value.
+fn tiff_of(entries: &[(u16, u16, u32, u32)], length: usize) -> Vec<u8> {
+    let mut bytes = b"II*\0\x08\0\0\0".to_vec();
+    bytes.extend((entries.len() as u16).to_le_bytes());
+    for (tag, kind, count, value) in entries {
+        bytes.extend(tag.to_le_bytes());
+        bytes.extend(kind.to_le_bytes());
+        bytes.extend(count.to_le_bytes());
+        bytes.extend(value.to_le_bytes());
+    }
+    bytes.resize(length, 0);
+    bytes
+}
+
+#[test]
+fn counts_and_strips_beyond_the_file_are_refused_before_memory_is_reserved() {
+    let folder = tempfile::tempdir().unwrap();
+    // Width, height, bits, compression, greyscale, offset, samples, rows of a strip, bytes of it, sample format.
+    let image = |side: u32| {
+        [
+            (256, 4, 1, side),
+            (257, 4, 1, side),
+            (258, 3, 1, 32),
+            (259, 3, 1, 1),
+            (262, 3, 1, 1),
+            (273, 4, 1, 4096),
+            (277, 3, 1, 1),
+            (278, 4, 1, side),
+            (279, 4, 1, 3000),
+            (339, 3, 1, 3),
+        ]
+    };
+    let refused = |bytes: &[u8], words: &str| {
+        let crop = Crop { west: 0.0, south: -10.0, east: 10.0, north: 0.0 };
+        let system = Some(CoordinateSystem::Local);
+        let options = ReadOptions { coordinate_system: system, crop: Some(crop), ..ReadOptions::default() };
+        let path = write(folder.path(), "small.tif", bytes);
+        let error = read_terrain(&path, &options).unwrap_err();
+        assert!(matches!(error, TerrainError::Malformed { .. }) && error.to_string().contains(words), "{error}");
+    };
+    // A text of a billion letters, as no-data value and where a number belongs, and a billion tile sizes.
+    for (tag, kind) in [(42113, 2), (33550, 12), (279, 4), (324, 16), (256, 2)] {
+        let mut entries: Vec<_> = image(20).into_iter().filter(|entry| entry.0 != tag).collect();
+        entries.push((tag, kind, 1 << 30, 200));
+        entries.sort_by_key(|entry| entry.0);
+        refused(&tiff_of(&entries, 7000), &format!("tag {tag} counts 1073741824 values in a file of 7000 bytes"));
+    }
+    // One strip of a gigabyte, of which the crop keeps four samples.
+    let mut entries = image(16_000).to_vec();
+    // Scale and position lie behind the directory.
+    entries.extend([(33550, 12, 3, 400), (33922, 12, 6, 424)]);
+    let mut bytes = tiff_of(&entries, 7100);
+    for (at, value) in [(400, 10.0), (408, 10.0), (448, -5.0), (456, 5.0)] {
+        bytes[at..at + 8].copy_from_slice(&f64::to_le_bytes(value));
+    }
+    refused(&bytes, "16000 x 16000 samples cannot be in 3000 bytes");
+    assert!(read(&write(folder.path(), "entries.tif", &tiff_of(&[(256, 4, 1, 1); 5000], 70_000))).is_err());
+}
+
 #[test]
 fn headers_that_promise_too_much_allocate_nothing() {
     let folder = tempfile::tempdir().unwrap();

@@ -15,7 +15,7 @@ use canopy::{
     },
     scatter::{
         Area, CoverMap, PackedStand, PlacementRules, PlantSize, Sequence, SizeRule, SpeciesRule, cover_map,
-        packed::DEFAULT_CELL_SIZE, place,
+        packed::DEFAULT_CELL_SIZE, place_trees,
     },
     scene::Viewpoint,
     terrain::{HeightField, Surroundings, Terrain},
@@ -119,7 +119,7 @@ impl Field {
             clearings: None,
             species: vec![SpeciesRule { size: SizeRule::Scale { min: 0.8, max: 1.2 }, ..SpeciesRule::default() }],
         };
-        let mut stand = place(&rules, &terrain)?.stand;
+        let mut stand = place_trees(&rules, &terrain)?.stand;
         for tree in &mut stand.trees {
             // Stock materials have no tint of their own a tree.
             tree.tint = 0.0;

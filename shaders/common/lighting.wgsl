@@ -87,30 +87,49 @@ fn leaf_gloss(surface: Surface, specular_albedo: vec3<f32>, room: vec3<f32>) -> 
     return fresnel * mix(strength * (distribution * masking * nl), specular_albedo * 0.25, surface.gloss_isotropy);
 }
 
-// Exitant radiance towards the viewer. `near` and `far`: unshadowed irradiance over pi of the key light on the viewer's
-// side and on the other; `visibility` of the key light in 0..1; `sky`: irradiance of the surroundings over pi,
-// transmitted light included.
-//
-// Only the diffuse part of the key light is reduced by the gloss: the sky has no visible specular lobe.
-fn exitant(surface: Surface, near: vec3<f32>, far: vec3<f32>, visibility: f32, sky: vec3<f32>) -> vec3<f32> {
-    var reflected = near;
-    var gloss = vec3(0.0);
-    if surface.specular_reflectance > 0.0 {
-        let subsurface = subsurface_share(surface.albedo, surface.specular_reflectance);
-        reflected *= subsurface;
-        let room = 1.0 - surface.albedo * (subsurface + surface.transmission);
-        let specular_albedo = surface.albedo * (1.0 - subsurface);
-        gloss = leaf_gloss(surface, specular_albedo, room) * light.key_illuminance * INVERSE_PI;
-    }
-    return surface.albedo * ((reflected + far * surface.transmission) * visibility + sky) + gloss * visibility;
+// Exitant radiance of a matt surface towards the viewer. `near` and `far`: unshadowed irradiance over pi of the key light
+// on the viewer's side and on the other; `visibility` of the key light in 0..1; `sky`: irradiance of the surroundings
+// over pi, transmitted light included.
+fn exitant_matt(surface: Surface, near: vec3<f32>, far: vec3<f32>, visibility: f32, sky: vec3<f32>) -> vec3<f32> {
+    return surface.albedo * ((near + far * surface.transmission) * visibility + sky);
 }
 
-// Exitant radiance of a surface that the key light hits at the angle to its normal.
-fn shade(surface: Surface, visibility: f32, sky: vec3<f32>) -> vec3<f32> {
+// The same of a leaf, whose specular reflectance may be 0. Only the diffuse part of the key light is reduced by the
+// gloss: the sky has no visible specular lobe.
+fn exitant(surface: Surface, near: vec3<f32>, far: vec3<f32>, visibility: f32, sky: vec3<f32>) -> vec3<f32> {
+    let subsurface = subsurface_share(surface.albedo, surface.specular_reflectance);
+    let room = 1.0 - surface.albedo * (subsurface + surface.transmission);
+    let specular_albedo = surface.albedo * (1.0 - subsurface);
+    let gloss = leaf_gloss(surface, specular_albedo, room) * light.key_illuminance * INVERSE_PI;
+    return exitant_matt(surface, near * subsurface, far, visibility, sky) + gloss * visibility;
+}
+
+// Unshadowed irradiance over pi of the key light on the two sides of a surface.
+struct KeySides {
+    // The viewer's side.
+    near: vec3<f32>,
+    far: vec3<f32>,
+}
+
+fn key_sides(surface: Surface) -> KeySides {
     let cosine = dot(surface.normal, light.key_direction);
     let between = dot(surface.viewer, light.key_direction);
     let front = mix(max(cosine, 0.0), sphere_cosine(between), surface.isotropic_fraction);
     let back = mix(max(-cosine, 0.0), sphere_cosine(-between), surface.isotropic_fraction);
     let full = light.key_illuminance * INVERSE_PI;
-    return exitant(surface, front * full, back * full, visibility, sky);
+    return KeySides(front * full, back * full);
+}
+
+// Exitant radiance of a leaf that the key light hits at the angle to its normal. There is no branch for leaves without
+// gloss: their reflectance is a uniform, and a driver in software compiles a shader again for each value of a uniform
+// that decides a branch (docs/decisions/0002-no-branch-on-uniforms-alone.md).
+fn shade(surface: Surface, visibility: f32, sky: vec3<f32>) -> vec3<f32> {
+    let key = key_sides(surface);
+    return exitant(surface, key.near, key.far, visibility, sky);
+}
+
+// The same of a matt surface: wood and ground.
+fn shade_matt(surface: Surface, visibility: f32, sky: vec3<f32>) -> vec3<f32> {
+    let key = key_sides(surface);
+    return exitant_matt(surface, key.near, key.far, visibility, sky);
 }

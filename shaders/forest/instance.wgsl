@@ -1,7 +1,7 @@
 // Packed trees of 16 bytes: src/scatter/packed.rs packs them, this file unpacks them.
 #define_import_path canopy::instance
 
-#import canopy::constants::{PLACE_STEPS, YAW_BITS, YAWS, SCALE_SHIFT, SCALE_BITS, SCALE_STEPS, SCALE_OCTAVES, LEAST_SCALE_LOG2}
+#import canopy::constants::{POSITION_STEPS, YAW_BITS, YAWS, SCALE_SHIFT, SCALE_BITS, SCALE_STEPS, SCALE_OCTAVES, LEAST_SCALE_LOG2}
 #import canopy::constants::{CELL_BITS, VARIANT_LOW_SHIFT, VARIANT_LOW_BITS, VARIANT_HIGH_SHIFT, VARIANT_HIGH_BITS}
 #import canopy::constants::{TINT_SHIFT, TINT_BITS, TINT_STEPS}
 #import canopy::constants::{WHOLE, FADE_SPAN, AMBIENT_PUBLISHED}
@@ -76,7 +76,7 @@ struct Instance {
 fn unpack_tree(tree: Tree) -> Instance {
     let packed_cell = bitcast<i32>(tree.cell);
     let cell = vec2(extractBits(packed_cell, 0u, CELL_BITS), extractBits(packed_cell, CELL_BITS, CELL_BITS));
-    let offset = vec2(f32(tree.xz & 0xffffu), f32(tree.xz >> 16u)) * (view.cell_size / PLACE_STEPS);
+    let offset = vec2(f32(tree.xz & 0xffffu), f32(tree.xz >> 16u)) * (view.cell_size / POSITION_STEPS);
     let xz = vec2<f32>(cell - view.anchor_cell) * view.cell_size + (offset - view.anchor_offset);
     let yaw_code = extractBits(tree.look, 0u, YAW_BITS);
     let yaw = f32(yaw_code) * (6.28318531 / f32(YAWS));

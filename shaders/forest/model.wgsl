@@ -2,7 +2,7 @@
 #import canopy::constants::{NORMAL_STEPS, NORMAL_LEAST_LENGTH, WHOLE, AMBIENT_FITTED}
 #import canopy::frame::{frame, light}
 #import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, leaf_visibility}
-#import canopy::lighting::{Surface, shade, exitant, even_sky, leaf_transmission}
+#import canopy::lighting::{Surface, shade, shade_matt, exitant, exitant_matt, even_sky, leaf_transmission}
 #import canopy::output::finish
 #import canopy::stand::stand_light
 #import canopy::sun_visibility::{sample_ground, terrain_visibility, cascaded_visibility}
@@ -237,10 +237,14 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let far_sun = select(in.back_sun, in.front_sun, behind);
     var color = exitant(surface, near_sun, far_sun, visibility, sky);
 #else
-    var color = exitant(surface, in.front_sun, vec3(0.0), visibility, sky);
+    var color = exitant_matt(surface, in.front_sun, vec3(0.0), visibility, sky);
 #endif
 #else
+#ifdef FOLIAGE
     var color = shade(surface, visibility, sky);
+#else
+    var color = shade_matt(surface, visibility, sky);
+#endif
 #endif
     color = tint_level(color);
     return finish(in.relative, color, coverage);

@@ -1,7 +1,7 @@
 // The ground: tiles that morph into each other (src/terrain/tiles), coloured by slope, height, canopy cover and noise.
 #import canopy::constants::TILE_SIDE
 #import canopy::frame::{frame, light, shadow}
-#import canopy::lighting::{Surface, shade, even_sky}
+#import canopy::lighting::{Surface, shade_matt, even_sky}
 #import canopy::output::finish
 #import canopy::stand::ground_light
 #import canopy::sun_visibility::{sample_ground, terrain_visibility, cascaded_visibility}
@@ -139,6 +139,6 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         // Beyond the maps: the fraction of light that passes between the crowns.
         visibility *= mix(stand.key_transmittance, cascades.visibility, cascades.weight);
     }
-    let color = shade(surface, visibility, even_sky(surface, stand));
+    let color = shade_matt(surface, visibility, even_sky(surface, stand));
     return finish(in.relative, color, 1.0);
 }

@@ -33,7 +33,7 @@ use chrono::{DateTime, Utc};
 
 use super::{
     Frame, RenderOptions, RenderPlan, RenderReport, adapter, camera, error::AppError, interrupt, notes::notes,
-    picture::Picture,
+    rendered_image::RenderedImage,
 };
 use crate::{
     assets::Stage,
@@ -42,7 +42,7 @@ use crate::{
     plugin::CanopyPlugins,
     progress::Progress,
     render::{
-        components::{CanopyCamera, SunShadowSettings},
+        components::{CanopyCamera, LightUpdates, SunShadowSettings},
         readback::read_rgb,
         report::{FrameReport, PassOutcome},
         shaders::CanopyShaders,
@@ -67,7 +67,8 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
     let plan = RenderPlan::new(options, &stage.scene, &|x, z| stage.terrain.height(x, z))?;
     let mut report = RenderReport::default();
     let finished = |frame: &Frame| {
-        options.resume && Picture::is_stored(&frame.file, options.size, &notes(&stage, &frame.view, frame.instant))
+        options.resume
+            && RenderedImage::is_stored(&frame.file, options.size, &notes(&stage, &frame.view, frame.instant))
     };
     let wanted: Vec<bool> = plan.frames.iter().map(|frame| !finished(frame)).collect();
     let kept = wanted.iter().filter(|wanted| !*wanted).count();
@@ -117,7 +118,7 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
 
 /// Checks whether the images can be written.
 fn check_writable(options: &RenderOptions) -> Result<(), AppError> {
-    for file in RenderPlan::first_files(&options.pictures) {
+    for file in RenderPlan::first_files(&options.output) {
         files::check_writable(&file).map_err(|source| AppError::Write { path: file, source })?;
     }
     Ok(())
@@ -180,7 +181,7 @@ impl Renderer {
                 .disable::<TerminalCtrlCHandlerPlugin>()
                 .disable::<PipelinedRenderingPlugin>(),
         );
-        app.add_plugins(CanopyPlugins);
+        app.add_plugins(CanopyPlugins).insert_resource(LightUpdates::Blocking);
         while app.plugins_state() == PluginsState::Adding {
             bevy::tasks::tick_global_task_pools_on_main_thread();
         }
@@ -326,7 +327,7 @@ impl Renderer {
     ///
     /// # Errors
     /// [`AppError::Render`].
-    pub fn draw(&mut self, stage: &Stage, view: &Viewpoint, instant: DateTime<Utc>) -> Result<Picture, AppError> {
+    pub fn draw(&mut self, stage: &Stage, view: &Viewpoint, instant: DateTime<Utc>) -> Result<RenderedImage, AppError> {
         self.set_instant(stage, instant);
         self.set_view(view);
         self.update()?;
@@ -347,7 +348,7 @@ impl Renderer {
     ///
     /// # Errors
     /// [`AppError::Render`].
-    pub fn read(&self) -> Result<Picture, AppError> {
+    pub fn read(&self) -> Result<RenderedImage, AppError> {
         let render_world = self.app.sub_app(RenderApp).world();
         let device = render_world.resource::<RenderDevice>();
         let queue = render_world.resource::<RenderQueue>();
@@ -360,7 +361,7 @@ impl Renderer {
         self.check_fault()?;
         let pixels = pixels.map_err(|error| AppError::Render(error.to_string()))?;
         let (width, height) = self.size;
-        Ok(Picture { width, height, pixels })
+        Ok(RenderedImage { width, height, pixels })
     }
 }
 

@@ -1,5 +1,5 @@
-//! The program, behind the cargo feature `program`: the interactive flight, rendering without a window, the ground truth of
-//! a scene, and what a file holds. The command line fills the requests ([`FlyOptions`], [`RenderOptions`],
+//! The program, behind the cargo feature `program`: the interactive flight, rendering without a window, the ground
+//! truth of a scene, and what a file holds. The command line fills the requests ([`FlyOptions`], [`RenderOptions`],
 //! [`ReferenceOptions`]), and the functions here carry them out.
 //!
 //! It uses the library as any program does. The flight spawns a [`CanopyScene`](crate::components::CanopyScene), which is
@@ -15,9 +15,9 @@ mod info;
 mod interrupt;
 mod notes;
 mod parse;
-mod picture;
 mod plan;
 mod reference;
+mod rendered_image;
 mod request;
 mod tone;
 
@@ -28,9 +28,7 @@ pub use headless::{Renderer, render};
 pub use info::info;
 pub use interrupt::{Interrupt, listen as listen_to_interrupts, received as interrupt_received};
 pub use parse::{ArgumentError, parse_lighting, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size};
-pub use picture::Picture;
 pub use plan::{Frame, PlanError, RenderPlan};
 pub use reference::reference;
-pub use request::{
-    Clock, FlyOptions, LightGroup, Pictures, ReferenceOptions, RenderOptions, RenderReport, Still, View,
-};
+pub use rendered_image::RenderedImage;
+pub use request::{Clock, FlyOptions, LightGroup, Output, ReferenceOptions, RenderOptions, RenderReport, Still, View};

@@ -6,7 +6,7 @@ use std::path::{Path as FilePath, PathBuf};
 
 use chrono::{DateTime, Utc};
 
-use super::request::{Clock, Pictures, RenderOptions, View};
+use super::request::{Clock, Output, RenderOptions, View};
 use crate::scene::{LocalTime, Path, Pose, Scene, Viewpoint};
 
 /// Default frames per second of a flight.
@@ -72,8 +72,8 @@ impl RenderPlan {
     /// Those of [`RenderPlan::new`].
     pub fn check(options: &RenderOptions, scene: &Scene) -> Result<(), PlanError> {
         Flight::new(options.view, scene)?;
-        match &options.pictures {
-            Pictures::Stills(stills) => {
+        match &options.output {
+            Output::Stills(stills) => {
                 for (number, still) in stills.iter().enumerate() {
                     if !is_png(&still.out) {
                         return Err(PlanError::NoPng(still.out.clone()));
@@ -84,7 +84,7 @@ impl RenderPlan {
                 }
                 if stills.is_empty() { Err(PlanError::Nothing) } else { Ok(()) }
             }
-            Pictures::Sequence { frames, fps, .. } => {
+            Output::Sequence { frames, fps, .. } => {
                 if *frames > MOST_FRAMES {
                     return Err(PlanError::TooMany(*frames));
                 }
@@ -96,11 +96,11 @@ impl RenderPlan {
         }
     }
 
-    /// At least one file of each folder that `pictures` are written to.
-    pub(super) fn first_files(pictures: &Pictures) -> Vec<PathBuf> {
-        match pictures {
-            Pictures::Stills(stills) => stills.iter().map(|still| still.out.clone()).collect(),
-            Pictures::Sequence { out, frames, .. } => vec![numbered(out, 0, *frames)],
+    /// At least one file of each folder that `output` writes to.
+    pub(super) fn first_files(output: &Output) -> Vec<PathBuf> {
+        match output {
+            Output::Stills(stills) => stills.iter().map(|still| still.out.clone()).collect(),
+            Output::Sequence { out, frames, .. } => vec![numbered(out, 0, *frames)],
         }
     }
 
@@ -121,13 +121,13 @@ impl RenderPlan {
             let (x, _, z) = pose.position;
             pose.viewpoint(ground(x, z), scene.camera.field_of_view)
         };
-        let frames = match &options.pictures {
-            Pictures::Stills(stills) => {
+        let frames = match &options.output {
+            Output::Stills(stills) => {
                 let view = viewpoint(camera.still());
                 let instant = |at: Option<LocalTime>| at.unwrap_or(scene.place.time).utc();
                 stills.iter().map(|still| Frame { file: still.out.clone(), view, instant: instant(still.at) }).collect()
             }
-            Pictures::Sequence { out, frames, fps, clock } => {
+            Output::Sequence { out, frames, fps, clock } => {
                 let step = match clock {
                     Clock::Lapse { .. } => fps.map(|rate| 1.0 / rate),
                     Clock::Standing(_) => Some(1.0 / fps.unwrap_or(DEFAULT_FPS)),
@@ -233,10 +233,10 @@ mod tests {
     const PATH: &str = "(seconds: 0, position: (0, 10, 0), yaw: 0, pitch: 0), \
                         (seconds: 10, position: (100, 10, 0), yaw: 0, pitch: 0)";
 
-    fn options(view: View, pictures: Pictures) -> RenderOptions {
+    fn options(view: View, output: Output) -> RenderOptions {
         RenderOptions {
             scene: "test.ron".into(),
-            pictures,
+            output,
             view,
             size: (64, 36),
             resume: false,
@@ -247,8 +247,8 @@ mod tests {
         }
     }
 
-    fn sequence(frames: u32, fps: Option<f64>, clock: Clock) -> Pictures {
-        Pictures::Sequence { out: "out/flight".into(), frames, fps, clock }
+    fn sequence(frames: u32, fps: Option<f64>, clock: Clock) -> Output {
+        Output::Sequence { out: "out/flight".into(), frames, fps, clock }
     }
 
     fn hill(x: f64, z: f64) -> f64 {
@@ -258,7 +258,7 @@ mod tests {
     #[test]
     fn a_still_stands_over_the_ground_and_looks_along_its_bearing() -> Outcome {
         let still = Still { out: "a.png".into(), at: None };
-        let plan = RenderPlan::new(&options(View::Scene, Pictures::Stills(vec![still])), &scene(PATH)?, &hill)?;
+        let plan = RenderPlan::new(&options(View::Scene, Output::Stills(vec![still])), &scene(PATH)?, &hill)?;
         let frame = &plan.frames[0];
         assert_eq!(frame.view.position, glam::DVec3::new(1.0, 105.5, 3.0));
         let expected = glam::DVec3::new(10_f64.to_radians().cos(), -10_f64.to_radians().sin(), 0.0);
@@ -305,8 +305,8 @@ mod tests {
     #[test]
     fn requests_that_cannot_be_planned_say_what_to_do() -> Outcome {
         let bare = scene("")?;
-        let still = |out: &str| Pictures::Stills(vec![Still { out: out.into(), at: None }]);
-        let error = |view, pictures, scene: &Scene| RenderPlan::new(&options(view, pictures), scene, &hill).err();
+        let still = |out: &str| Output::Stills(vec![Still { out: out.into(), at: None }]);
+        let error = |view, output, scene: &Scene| RenderPlan::new(&options(view, output), scene, &hill).err();
         assert_eq!(error(View::Along(1.0), still("a.png"), &bare), Some(PlanError::NoPath("test".into())));
         assert!(matches!(error(View::Along(11.0), still("a.png"), &scene(PATH)?), Some(PlanError::OffPath { .. })));
         assert!(matches!(error(View::Along(f64::NAN), still("a.png"), &scene(PATH)?), Some(PlanError::OffPath { .. })));
@@ -315,7 +315,7 @@ mod tests {
         assert_eq!(error(View::Scene, sequence(0, None, standing), &bare), Some(PlanError::Nothing));
         assert_eq!(error(View::Scene, sequence(2, Some(0.0), standing), &bare), Some(PlanError::BadRate(0.0)));
         assert_eq!(error(View::Scene, sequence(u32::MAX, None, standing), &bare), Some(PlanError::TooMany(u32::MAX)));
-        let twice = Pictures::Stills(vec![Still { out: "a.png".into(), at: None }; 2]);
+        let twice = Output::Stills(vec![Still { out: "a.png".into(), at: None }; 2]);
         assert_eq!(error(View::Scene, twice, &bare), Some(PlanError::SameFile("a.png".into())));
         let fault = PlanError::NoPng("a.jpg".into()).to_string();
         assert!(fault.ends_with("call it a.png"), "{fault}");

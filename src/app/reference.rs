@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 
 use super::{
-    Frame, LightGroup, Pictures, PlanError, ReferenceOptions, RenderOptions, RenderPlan, Still, camera::NEAR,
-    error::AppError, interrupt, notes::notes, picture::Picture, tone::tone_table,
+    Frame, LightGroup, Output, PlanError, ReferenceOptions, RenderOptions, RenderPlan, Still, camera::NEAR,
+    error::AppError, interrupt, notes::notes, rendered_image::RenderedImage, tone::tone_table,
 };
 use crate::{
     assets::Stage,
@@ -16,8 +16,8 @@ use crate::{
     light::{Atmosphere, AtmosphereParams, LightState},
     progress::Progress,
     reference::{
-        Camera, Development, Film, Fog, Ground, GroundColor, GroundShape, Instance, Light, PathTracer, ReferenceScene,
-        Shot, Soil, TraceSettings,
+        Camera, DisplayTransform, Film, Fog, Ground, GroundColor, GroundShape, Instance, Light, PathTracer,
+        ReferenceScene, Shot, Soil, TraceSettings,
     },
 };
 
@@ -129,7 +129,7 @@ fn frame(options: &ReferenceOptions, stage: &Stage) -> Result<Frame, AppError> {
 fn as_still(options: &ReferenceOptions) -> RenderOptions {
     RenderOptions {
         scene: options.scene.clone(),
-        pictures: Pictures::Stills(vec![Still { out: options.out.with_extension("png"), at: options.at }]),
+        output: Output::Stills(vec![Still { out: options.out.with_extension("png"), at: options.at }]),
         view: options.view,
         size: options.size,
         resume: false,
@@ -162,10 +162,10 @@ fn save(
     }
     let table = tone_table()?;
     let (width, height) = film.size();
-    let pixels = film.develop(&Development::of(light, Some(&table)));
+    let pixels = film.display(&DisplayTransform::of(light, Some(&table)));
     let mut notes = notes(stage, &frame.view, frame.instant);
     notes.push(("Samples", film.samples().to_string()));
-    Picture { width, height, pixels }.save(&options.out, &notes)
+    RenderedImage { width, height, pixels }.save(&options.out, &notes)
 }
 
 fn is_exr(path: &Path) -> bool {

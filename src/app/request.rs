@@ -35,7 +35,7 @@ pub struct RenderOptions {
     /// The scene.
     pub scene: SceneSource,
     /// The images, and where they are written. [`super::RenderPlan`] turns them into frames.
-    pub pictures: Pictures,
+    pub output: Output,
     /// Where the camera is.
     pub view: View,
     /// Size of an image in pixels, each at least 1; the device may have a lower limit.
@@ -97,7 +97,7 @@ pub struct ReferenceOptions {
 
 /// Single images or a sequence.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Pictures {
+pub enum Output {
     /// Images from one camera at one or several instants.
     Stills(Vec<Still>),
     /// Numbered frames.

@@ -1,9 +1,10 @@
-//! Background work on its own threads.
+//! Background work on its own threads: loads, bakes, and the builds of forests and scenes.
 //!
 //! Bevy's task pools are not used: a bake would block their few threads for seconds while other loads wait. Neither is
-//! rayon's global pool: the frames' own work would queue up behind the bake. There is one thread per core but one; the
-//! first work starts them, and all work shares them. Cancelled work does not start, and running work can check whether
-//! it is still needed.
+//! rayon's global pool: the frames' own work (the sky's tables, the tiles) would queue up behind the bake. There is one
+//! thread per core but one; the first work starts them, and all work shares them. The work runs on a thread of the
+//! pool, so rayon's parallel iterators inside it stay in this pool as well. Cancelled work does not start, and running
+//! work can check whether it is still needed. A program that exits does not wait for the threads.
 
 use std::{
     any::Any,
@@ -138,6 +139,7 @@ mod tests {
     use std::sync::mpsc::channel;
 
     use bevy::tasks::block_on;
+    use rayon::prelude::*;
 
     use super::*;
 
@@ -151,6 +153,25 @@ mod tests {
         let broken = block_on(start(|_| -> u32 { panic!("index out of bounds") }));
         assert_eq!(broken, Err(BackgroundError::BrokeOff("index out of bounds".to_owned())));
         assert_eq!(block_on(start(|_| 1)), Ok(1));
+    }
+
+    #[test]
+    fn a_panic_becomes_a_message() {
+        let text = |panic: &(dyn Any + Send)| BackgroundError::BrokeOff(message(panic)).to_string();
+        assert_eq!(text(&"index out of bounds"), "an error in the program: index out of bounds");
+        assert_eq!(text(&String::from("x")), "an error in the program: x");
+        assert_eq!(text(&1), "an error in the program: (see above)");
+    }
+
+    #[test]
+    fn nested_parallel_work_stays_on_the_background_threads() {
+        let names = block_on(start(|_| {
+            let name = |_| std::thread::current().name().unwrap_or_default().to_owned();
+            (0..64).into_par_iter().map(name).collect::<Vec<_>>()
+        }));
+        let names = names.unwrap_or_default();
+        assert_eq!(names.len(), 64);
+        assert!(names.iter().all(|name| name.starts_with("canopy background ")), "{names:?}");
     }
 
     #[test]

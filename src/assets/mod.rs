@@ -7,7 +7,7 @@
 //! ```
 //!
 //! [`Stage::build`] blocks, reports to a [`Progress`](crate::progress::Progress) and can be cancelled;
-//! [`CanopyScene`](crate::components::CanopyScene) runs it in the background of a Bevy program, on threads of its own.
+//! [`CanopyScene`](crate::components::CanopyScene) runs it in the background of a Bevy program, on the threads that it shares with other loads.
 //!
 //! Programs that build forests in code use Bevy assets: [`PlantAsset`], [`TerrainMap`] and [`SceneAsset`], registered
 //! by [`CanopyAssetPlugin`].

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::{StageError, ground, plants, together, trees::StandPlan};
 use crate::{
-    bake::{BakeSource, BakedPlant, bake_plant, cache::Cache, lighting::SunLight},
+    bake::{BakeSource, BakedPlant, bake_plant, cache::Cache, lighting::SunLight, textures::filter_together},
     light::sun::Observer,
     progress::Progress,
     render::{
@@ -234,16 +234,19 @@ fn bake(
     // A few at a time: in parallel, but with progress.
     for group in species.individuals.chunks(rayon::current_num_threads().max(1)) {
         check_wanted(progress)?;
+        let built: Vec<_> = group.par_iter().map(plants::Individual::build).collect::<Result<_, _>>()?;
+        let textures = filter_together(built.iter().map(|(plant, _)| plant), cache.as_ref());
         let results: Vec<_> = group
             .par_iter()
-            .map(|individual| {
-                let (plant, mut warnings) = individual.build()?;
+            .zip(built)
+            .map(|(individual, (plant, mut warnings))| {
                 let settings = plants::bake_settings(quality, individual.lighting);
                 let baked = bake_plant(Arc::new(plant), &settings, cache.as_ref());
                 warnings.extend(baked.0.lighting.warning().map(|what| format!("{}: {what}", baked.0.plant.name)));
-                Ok((baked, warnings))
+                (baked, warnings)
             })
-            .collect::<Result<_, StageError>>()?;
+            .collect();
+        drop(textures);
         for ((plant, source), warnings) in results {
             for warning in warnings {
                 progress.warn(&warning);

@@ -12,7 +12,7 @@ use crate::{
     progress::Progress,
     scatter::{
         Allometry, Area, Coordinates, Ground, Inventory, InventoryOptions, InventorySpecies, PlacementRules, PlantSize,
-        SizeRule, SpeciesRule, Stand, place, read_inventory, stand_from_inventory,
+        SizeRule, SpeciesRule, Stand, place_trees, read_inventory, stand_from_inventory,
     },
     scene::{Anchor, InventoryTrees, ScatteredTrees, Scene, Species, Trees},
     terrain::{CoordinateSystem, GeoReference, Terrain},
@@ -129,7 +129,7 @@ fn estimate(scene: &Scene, trees: &ScatteredTrees, terrain: &Terrain) -> Result<
     let full = rules.full_count();
     rules.stems_per_hectare *= (SAMPLES / full).min(1.0);
     rules.min_distance_m = 0.0;
-    let report = place(&rules, terrain)?.report;
+    let report = place_trees(&rules, terrain)?.report;
     Ok(full * f64::from(report.placed) / report.candidates.max(1) as f64)
 }
 
@@ -178,7 +178,7 @@ fn scatter(
 ) -> Result<Stand, StageError> {
     let plants = plan.variants.iter().map(|variants| (variants.clone(), plant_heights(variants, sizes)));
     let rules = rules(scene, trees, plants, terrain);
-    let placement = place(&rules, terrain)?;
+    let placement = place_trees(&rules, terrain)?;
     let report = &placement.report;
     if report.placed < report.wanted {
         progress.warn(&format!(

@@ -9,6 +9,7 @@ use super::levels::{
     cross::{Cross, CrossSettings},
 };
 use super::lighting::{BakedLighting, LightingSettings};
+use super::textures::PlantTextures;
 use crate::lod::Representation;
 use crate::plant::{Plant, PlantMesh};
 use crate::scatter::PlantSize;
@@ -23,6 +24,8 @@ pub struct BakedPlant {
     pub lighting: Arc<BakedLighting>,
     /// The baked representations, at most one of each kind.
     pub levels: Vec<BakedLevel>,
+    /// The textures of the full model, filtered; empty if [`Representation::MODEL`] was not listed.
+    pub textures: Arc<PlantTextures>,
 }
 
 impl BakedPlant {

@@ -9,6 +9,7 @@
 //! | [`levels`] | the representations that are baked: | |
 //! | [`levels::cross`] | crossed billboards with colour, normal, ambient term | [Franzke 2005, 4.3] |
 //! | [`levels::shadow_proxy`] | a lighter model with the same projected area | [Cook et al. 2007] |
+//! | [`textures`] | mip levels of the full model's textures | [Castaño 2010] |
 //! | [`cache`] | files on disk, keyed by the content that they were made from | |
 //!
 //! [`bake_plant`] does all of it. Its result depends only on the plant and the settings, bit for bit, not on the number
@@ -19,13 +20,16 @@ pub mod cache;
 mod error;
 pub mod levels;
 pub mod lighting;
+pub mod textures;
 
 use std::sync::Arc;
 
+use crate::lod::Representation;
 use crate::plant::Plant;
 use cache::{Cache, CacheKey};
 use levels::bake_levels;
 use lighting::BakedLighting;
+use textures::PlantTextures;
 
 pub use baked::{BakeSettings, BakedPlant, plant_size};
 pub use error::BakeError;
@@ -52,13 +56,19 @@ pub fn bake_plant(plant: Arc<Plant>, settings: &BakeSettings, cache: Option<&Cac
     if let Some(baked) = entry.as_ref().and_then(|(cache, key)| cache.load(key, &plant)) {
         return (baked, BakeSource::Cache);
     }
-    let baked = bake_fresh(plant, &settings);
+    let (baked, not_stored) = bake_fresh(plant, &settings, cache);
     let warning = entry.and_then(|(cache, key)| cache.store(&key, &baked).err());
-    (baked, BakeSource::Fresh { warning })
+    (baked, BakeSource::Fresh { warning: warning.or(not_stored) })
 }
 
-fn bake_fresh(plant: Arc<Plant>, settings: &BakeSettings) -> BakedPlant {
+/// The bake, and why a texture of it could not be stored.
+fn bake_fresh(plant: Arc<Plant>, settings: &BakeSettings, cache: Option<&Cache>) -> (BakedPlant, Option<BakeError>) {
     let lighting = Arc::new(BakedLighting::bake(&plant, &settings.lighting));
     let levels = bake_levels(&plant, &lighting, settings);
-    BakedPlant { plant, lighting, levels }
+    let (textures, not_stored) = if settings.representations.contains(&Representation::MODEL) {
+        PlantTextures::new(&plant, cache)
+    } else {
+        Default::default()
+    };
+    (BakedPlant { plant, lighting, levels, textures: Arc::new(textures) }, not_stored)
 }

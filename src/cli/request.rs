@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use canopy::{
-    app::{Clock, FlyOptions, LightGroup, Pictures, ReferenceOptions, RenderOptions, Still, View},
+    app::{Clock, FlyOptions, LightGroup, Output, ReferenceOptions, RenderOptions, Still, View},
     scene::{LocalTime, Overrides},
 };
 use clap::CommandFactory;
@@ -48,7 +48,7 @@ pub fn render_options(render: Render, common: &Common) -> Result<RenderOptions, 
         quiet: common.quiet,
         explain: common.explain,
         scene: render.scene.into(),
-        pictures: pictures(render.out, &render.at, render.frames, render.fps, render.from.zip(render.to))?,
+        output: output(render.out, &render.at, render.frames, render.fps, render.from.zip(render.to))?,
     })
 }
 
@@ -83,13 +83,13 @@ pub fn reference_options(reference: Reference, common: &Common) -> Result<Refere
     })
 }
 
-fn pictures(
+fn output(
     mut out: Vec<PathBuf>,
     at: &[LocalTime],
     frames: Option<u32>,
     fps: Option<f64>,
     span: Option<(LocalTime, LocalTime)>,
-) -> Result<Pictures, clap::Error> {
+) -> Result<Output, clap::Error> {
     let Some(frames) = frames else {
         if out.len() != at.len().max(1) {
             return Err(usage(format!(
@@ -102,13 +102,13 @@ fn pictures(
             return Err(usage(format!("--out {}: images are PNG files; the name must end in .png", wrong.display())));
         }
         let times = at.iter().copied().map(Some).chain(std::iter::repeat(None));
-        return Ok(Pictures::Stills(out.into_iter().zip(times).map(|(out, at)| Still { out, at }).collect()));
+        return Ok(Output::Stills(out.into_iter().zip(times).map(|(out, at)| Still { out, at }).collect()));
     };
     if at.len() > 1 {
         return Err(usage("a sequence (--frames) takes one --at, or --from and --to".to_owned()));
     }
     match (out.pop(), out.is_empty()) {
-        (Some(out), true) => Ok(Pictures::Sequence {
+        (Some(out), true) => Ok(Output::Sequence {
             out,
             frames,
             fps,
@@ -176,7 +176,7 @@ mod tests {
     #[test]
     fn stills_pair_files_with_instants() -> Result<(), Box<dyn std::error::Error>> {
         let options = render("--at 2026-06-21T06:00Z --out a.png --at 2026-06-21T12:00Z --out b.PNG --quiet")?;
-        let Pictures::Stills(stills) = options.pictures else { return Err("no stills".into()) };
+        let Output::Stills(stills) = options.output else { return Err("no stills".into()) };
         assert_eq!(stills[1], Still { out: "b.PNG".into(), at: Some("2026-06-21T12:00Z".parse()?) });
         assert!(
             options.quiet
@@ -192,10 +192,10 @@ mod tests {
     fn sequences_and_lapses() -> Result<(), Box<dyn std::error::Error>> {
         let flight = render("--out f --frames 10 --fps 5 --along 12.5s")?;
         let clock = Clock::Standing(None);
-        let expected = Pictures::Sequence { out: "f".into(), frames: 10, fps: Some(5.0), clock };
-        assert_eq!((flight.pictures, flight.view), (expected, View::Along(12.5)));
+        let expected = Output::Sequence { out: "f".into(), frames: 10, fps: Some(5.0), clock };
+        assert_eq!((flight.output, flight.view), (expected, View::Along(12.5)));
         let lapse = render("--out d.png --frames 3 --from 2026-06-21T04:00Z --to 2026-06-21T20:00Z")?;
-        assert!(matches!(lapse.pictures, Pictures::Sequence { clock: Clock::Lapse { .. }, fps: None, .. }));
+        assert!(matches!(lapse.output, Output::Sequence { clock: Clock::Lapse { .. }, fps: None, .. }));
         let west = render("--out a.png --camera -10,2,-30,270,-5")?;
         assert!(matches!(west.view, View::Pose(pose) if pose.position == (-10.0, 2.0, -30.0)));
         Ok(())

@@ -95,7 +95,8 @@ fn sum(maps: &[&Arc<CoverMap>]) -> Option<Arc<CoverMap>> {
         let (column, row) = (first.x as usize, first.y as usize);
         for (line, from) in map.cover.chunks_exact(map.columns as usize).enumerate() {
             let start = (row + line) * columns + column;
-            for (to, from) in cover[start..start + from.len()].iter_mut().zip(from) {
+            let Some(to) = cover.get_mut(start..start + from.len()) else { break };
+            for (to, from) in to.iter_mut().zip(from) {
                 *to = to.saturating_add(*from);
             }
         }

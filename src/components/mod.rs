@@ -28,7 +28,12 @@ use bevy::{
     transform::TransformSystems,
 };
 
-use crate::assets::{PlantAsset, TerrainMap};
+use tracing::error;
+
+use crate::{
+    assets::{CanopyAssetPlugin, PlantAsset, TerrainMap},
+    render::CanopyRenderPlugin,
+};
 pub use daylight::FollowsDaylight;
 pub use forest::{Forest3d, ForestError, ForestFailed, ForestReady, ForestSettings, ForestSpecies, ForestTrees};
 pub use origin::{FloatingOrigin, OriginPlugin};
@@ -58,5 +63,19 @@ impl Plugin for ForestPlugin {
                     .run_if(resource_exists::<Assets<PlantAsset>>)
                     .run_if(resource_exists::<Assets<TerrainMap>>),
             );
+    }
+
+    fn finish(&self, app: &mut App) {
+        let assets = app.is_plugin_added::<CanopyAssetPlugin>();
+        report_missing(app, "ForestPlugin", &[(assets, "CanopyAssetPlugin", "nothing of `Forest3d` is built")]);
+    }
+}
+
+/// Says which of Canopy's plugins are missing beside `plugin`: `needed` has whether one is there, its name, and what
+/// happens without it. The renderer is always needed.
+fn report_missing(app: &App, plugin: &str, needed: &[(bool, &str, &str)]) {
+    let renderer = (app.is_plugin_added::<CanopyRenderPlugin>(), "CanopyRenderPlugin", "nothing is drawn");
+    for (_, name, without) in needed.iter().chain([&renderer]).filter(|(there, ..)| !there) {
+        error!("Canopy's `{plugin}` is there without `{name}`, so {without}: add `{name}`, or all of `CanopyPlugins`");
     }
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use bevy::{
     app::{App, Plugin, PostUpdate, PreUpdate},
     ecs::{
+        change_detection::DetectChangesMut,
         component::Component,
         entity::Entity,
         reflect::ReflectComponent,
@@ -33,7 +34,7 @@ use crate::{
         sun::{Observer, SunPosition},
     },
     math::Range,
-    render::components::{Daylight, SunShadowSettings},
+    render::components::{Daylight, LightUpdates, SunShadowSettings},
     scene::LocalTime,
 };
 
@@ -48,11 +49,12 @@ pub enum SunError {
     Time(String),
 }
 
-/// When the light is computed again for a [`Sun`] that has changed.
+/// When the light is computed again for a [`Sun`] that has changed, and what follows from the light ([`LightUpdates`]).
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Default)]
 pub enum SunRefresh {
-    /// In the same frame, which waits for it: about 25 ms, more if the air has changed. For images and tests.
+    /// In the same frame, which waits for it: about 25 ms, more if the air has changed, and 30 ms for what follows. For
+    /// images and tests.
     Immediate,
     /// In the background. While the clock runs, a new light is started when the drawn one lags by this many seconds of
     /// the clock. When the clock stops, the light catches up.
@@ -82,7 +84,7 @@ impl Default for SunRefresh {
 pub struct Sun {
     /// Location on earth.
     pub observer: Observer,
-    /// Universal Time.
+    /// Universal Time. Reflection does not show it: the type is chrono's, which knows nothing of reflection.
     #[reflect(ignore)]
     pub instant: DateTime<Utc>,
     /// Seconds of the clock per second of the app's virtual time; 0: it is stopped.
@@ -239,6 +241,7 @@ pub struct SunPlugin;
 impl Plugin for SunPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<LightWork>()
+            .init_resource::<LightUpdates>()
             .register_type::<(Sun, SunRefresh, FollowsDaylight)>()
             .add_systems(PreUpdate, run_clocks.in_set(CanopySystems::Clock).run_if(any_with_component::<Sun>))
             .add_systems(
@@ -273,6 +276,7 @@ fn update_light(
     suns: Query<(Entity, &Sun, &SunRefresh)>,
     daylight: Option<Res<Daylight>>,
     mut work: ResMut<LightWork>,
+    mut updates: ResMut<LightUpdates>,
 ) {
     if suns.count() > 1 {
         error_once!("{} entities have a Sun, but there is one light: the first one counts", suns.count());
@@ -291,6 +295,10 @@ fn update_light(
         work.last = None;
         return;
     };
+    updates.set_if_neq(match refresh {
+        SunRefresh::Immediate => LightUpdates::Blocking,
+        SunRefresh::Background { .. } => LightUpdates::Background,
+    });
     if work.is_due(sun, *refresh) {
         let pool = AsyncComputeTaskPool::try_get();
         match (refresh, pool) {

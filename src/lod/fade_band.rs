@@ -1,7 +1,7 @@
 //! The fade band: the range of distances over which one representation replaces the next finer one.
 
 /// The distances over which a representation is replaced by the next coarser one.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, bevy::reflect::Reflect)]
 pub struct FadeBand {
     /// Distance in metres at which the coarser one begins to appear; below it only the finer one is drawn.
     pub start: f32,

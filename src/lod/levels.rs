@@ -9,7 +9,7 @@ pub const MAX_LEVELS: usize = 8;
 
 /// A way to draw a plant, by its name. The renderer has an implementation for each name that it knows
 /// (`render::forest::Representations`); a program can add its own.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, bevy::reflect::Reflect)]
 pub struct Representation(&'static str);
 
 impl Representation {
@@ -30,7 +30,10 @@ impl Representation {
 }
 
 /// The representations of a forest from near to far, and the fade bands between them. Never empty.
-#[derive(Clone, Debug, PartialEq)]
+///
+/// Reflection reaches the lists themselves, so it can break their order and lengths. The renderer draws
+/// [sanitized](Self::sanitize) levels.
+#[derive(Clone, Debug, PartialEq, bevy::reflect::Reflect)]
 pub struct Levels {
     representations: Vec<Representation>,
     /// One less than the representations: `fades[i]` lies between `i` and `i + 1`.
@@ -59,6 +62,24 @@ impl Levels {
             self.representations.push(representation);
         }
         self
+    }
+
+    /// Restores what [`then`](Self::then) guarantees: 1 to [`MAX_LEVELS`] representations, a band between each two
+    /// neighbours, and no band that begins before the one in front of it ends. Levels that were built by the functions
+    /// of this type stay as they are.
+    pub fn sanitize(&mut self) {
+        if self.representations.is_empty() {
+            self.representations.push(Representation::MODEL);
+        }
+        self.representations.truncate(MAX_LEVELS.min(self.fades.len() + 1));
+        self.fades.truncate(self.representations.len() - 1);
+        let mut earliest = 0.0f32;
+        for fade in &mut self.fades {
+            // `max` also replaces values that are not numbers.
+            fade.start = fade.start.max(earliest);
+            fade.end = fade.end.max(fade.start);
+            earliest = fade.end;
+        }
     }
 
     /// The representations, from near to far.
@@ -120,6 +141,13 @@ mod tests {
 
     proptest! {
         #[test]
+        fn sane_levels_stay_as_they_are(levels in three_levels()) {
+            let mut sanitized = levels.clone();
+            sanitized.sanitize();
+            prop_assert_eq!(sanitized, levels);
+        }
+
+        #[test]
         fn one_representation_is_always_whole(levels in three_levels(), distance in 0.0f32..3e4) {
             let thresholds: Vec<f32> = (0..levels.len()).map(|level| levels.threshold(level, distance)).collect();
             prop_assert!(thresholds.iter().all(|t| t.is_finite() && (WHOLE..=1.02).contains(t)));
@@ -157,6 +185,24 @@ mod tests {
             .then(FadeBand::new(10.0, 5.0), Representation::CROSS);
         assert_eq!(levels.fade_out(1), Some(FadeBand { start: 70.0, end: 70.0 }));
         assert_eq!(levels.representations(), [Representation::MODEL, CLOUD, Representation::CROSS]);
+    }
+
+    #[test]
+    fn lists_that_were_edited_are_repaired() {
+        let at = |start, end| FadeBand { start, end };
+        let mut levels = Levels { representations: vec![CLOUD; 20], fades: vec![at(1.0, 2.0); 19] };
+        levels.sanitize();
+        assert_eq!((levels.len(), levels.fades.len()), (MAX_LEVELS, MAX_LEVELS - 1));
+        let mut levels = Levels { representations: Vec::new(), fades: vec![at(1.0, 2.0)] };
+        levels.sanitize();
+        assert_eq!(levels, Levels::only(Representation::MODEL));
+        let mut levels = Levels {
+            representations: vec![Representation::MODEL, CLOUD, Representation::CROSS, CLOUD],
+            fades: vec![at(f32::NAN, -5.0), at(-1.0, f32::NAN)],
+        };
+        levels.sanitize();
+        let expected = Levels::only(Representation::MODEL).then(at(0.0, 0.0), CLOUD);
+        assert_eq!(levels, expected.then(at(0.0, 0.0), Representation::CROSS));
     }
 
     #[test]

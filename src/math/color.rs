@@ -1,4 +1,4 @@
-//! Colours: the sRGB transfer function, luminance, codes of 8 bits.
+//! Colours: the sRGB transfer function, luminance, 8-bit codes.
 
 use glam::Vec3;
 
@@ -22,13 +22,13 @@ pub fn linear_to_srgb(linear: f32) -> f32 {
     if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// The 8-bit code of a value of 0..1, rounded to the nearest; below 0 and NaN give 0, above 1 gives 255.
+/// The 8-bit code of a value in 0..1, rounded to nearest. Values below 0 and NaN give 0, values above 1 give 255.
 pub fn unorm8(value: f32) -> u8 {
     // The conversion saturates, and turns NaN into 0.
     (value * 255.0 + 0.5) as u8
 }
 
-/// The 8-bit sRGB code of a linear value; below 0 and NaN give 0, above 1 gives 255.
+/// The 8-bit sRGB code of a linear value. Values below 0 and NaN give 0, values above 1 give 255.
 pub fn srgb8(linear: f32) -> u8 {
     unorm8(linear_to_srgb(linear))
 }

@@ -1,23 +1,25 @@
-//! The star discrepancy of a point set in the unit square, exact.
+//! The exact star discrepancy of a point set in the unit square.
 //!
-//! `D* = sup |#{points in [0,x)×[0,y)} / n − x y|`, over all boxes at the origin: 0 would be perfectly even. Random
-//! sets have about `sqrt(ln ln n / n)`, Halton and Hammersley sets `O((ln n)² / n)` and `O(ln n / n)`
+//! `D* = sup |#{points in [0,x)×[0,y)} / n − x y|`, over all boxes with a corner at the origin; 0 would be perfectly
+//! even. Random sets have about `sqrt(ln ln n / n)`, Halton and Hammersley sets `O((ln n)² / n)` and `O(ln n / n)`
 //! ([Niederreiter 1992], chapter 3).
 
 use glam::DVec2;
 
 use super::MathError;
 
-/// The star discrepancy of `points`, which are in [0, 1]²; 1 for no points (the whole square is missed).
+/// The star discrepancy of `points`, which must lie in [0, 1]². It is 1 if there are no points, since the whole square
+/// is empty.
 ///
-/// [de Clerck 1986], [Bundschuh & Zhu 1993]: the supremum is reached where both box sides touch a coordinate of a point
-/// (or 1). With the points sorted by x, and ξ the sorted y of the first `i` of them, it is the largest of
-/// `k/n − x_i ξ_k` (closed box, just too many) and `x_{i+1} ξ_{k+1} − k/n` (open box, just too few).
+/// [de Clerck 1986], [Bundschuh & Zhu 1993]: the supremum is reached where each side of the box lies at a coordinate of
+/// a point (or at 1). Sort the points by x, and let ξ be the sorted y of the first `i` of them. Then the discrepancy is
+/// the largest of `k/n − x_i ξ_k` (a closed box, which holds too many points) and `x_{i+1} ξ_{k+1} − k/n` (an open box,
+/// which holds too few).
 ///
-/// Time O(n²) with an O(n) inner loop over contiguous memory (4,000 points: some 50 ms), memory O(n).
+/// It takes O(n²) time, with an inner loop over contiguous memory (about 50 ms for 4,000 points), and O(n) memory.
 ///
 /// # Errors
-/// [`MathError::OutsideUnitSquare`] for a point outside or not a number.
+/// [`MathError::OutsideUnitSquare`] for a point that lies outside or is not a number.
 pub fn star_discrepancy(points: &[DVec2]) -> Result<f64, MathError> {
     let inside = |p: &DVec2| (0.0..=1.0).contains(&p.x) && (0.0..=1.0).contains(&p.y);
     if let Some(index) = points.iter().position(|p| !inside(p)) {

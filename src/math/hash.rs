@@ -1,15 +1,16 @@
-//! Numbers that look random and depend on nothing but a seed, an index and a stream.
+//! Random numbers that depend only on a seed, an index and a stream.
 //!
-//! A counter-based generator: the finaliser of SplitMix64 ([Steele, Lea, Flood 2014], constants "variant 13" of
-//! [Stafford 2011]) over `key(seed, stream) + golden * index`, so each (seed, stream) is a SplitMix64 sequence entered
-//! at any position. Any thread can ask for any tree, and a tree's looks do not change when its neighbours do.
+//! This is a counter-based generator: it applies the finaliser of SplitMix64 ([Steele, Lea, Flood 2014], constants
+//! "variant 13" of [Stafford 2011]) to `key(seed, stream) + golden * index`. So each pair of seed and stream is a
+//! SplitMix64 sequence that can be read at any position. Any thread can compute any tree, and a tree does not change
+//! when its neighbours do.
 
 use std::f64::consts::TAU;
 
-/// 2⁶⁴ over the golden ratio, odd: the increment of Weyl sequences.
+/// 2⁶⁴ divided by the golden ratio, made odd: the increment of a Weyl sequence.
 pub const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
 
-/// SplitMix64's finaliser: a bijection of the 64-bit integers in which each input bit flips each output bit with a
+/// The finaliser of SplitMix64: a bijection of the 64-bit integers. Each input bit flips each output bit with a
 /// probability close to one half.
 pub const fn mix64(mut x: u64) -> u64 {
     x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -17,13 +18,13 @@ pub const fn mix64(mut x: u64) -> u64 {
     x ^ (x >> 31)
 }
 
-/// 64 bits for `index` in `stream` of `seed`. Streams of one seed are independent of each other.
+/// 64 random bits for `index` in `stream` of `seed`. The streams of a seed are independent of each other.
 pub fn hash64(seed: u64, index: u64, stream: impl Into<u64>) -> u64 {
     let key = mix64(seed.wrapping_add(GOLDEN.wrapping_mul(stream.into())));
     mix64(key.wrapping_add(GOLDEN.wrapping_mul(index)))
 }
 
-/// Mixes 32 bits: each input bit flips each output bit with a probability close to one half [Wellons 2018, "Prospecting
+/// Mixes 32 bits. Each input bit flips each output bit with a probability close to one half [Wellons 2018, "Prospecting
 /// for Hash Functions": lowbias32].
 pub const fn mix32(mut x: u32) -> u32 {
     x ^= x >> 16;
@@ -43,13 +44,14 @@ pub fn unit_f64(seed: u64, index: u64, stream: impl Into<u64>) -> f64 {
     (hash64(seed, index, stream) >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
 }
 
-/// An integer below `count`, uniform to within `count / 2⁶⁴` (multiply and shift, [Lemire 2019]); 0 for a count of 0.
+/// An integer below `count`, uniform to within `count / 2⁶⁴` (multiply and shift, [Lemire 2019]). It is 0 if `count` is
+/// 0.
 pub fn below(seed: u64, index: u64, stream: impl Into<u64>, count: u32) -> u32 {
     ((u128::from(hash64(seed, index, stream)) * u128::from(count)) >> 64) as u32
 }
 
-/// A deviate of mean 0 and deviation 1 that is nearly normal and bounded by ±2√3: the sum of four uniform numbers of
-/// 16 bits (Irwin–Hall). Integer arithmetic up to the last step, so it is the same on every machine.
+/// A nearly normal deviate with mean 0 and standard deviation 1, bounded by ±2√3: the sum of four uniform 16-bit
+/// numbers (Irwin–Hall). Only the last step is not integer arithmetic, so the result is the same on every machine.
 pub fn bell_f32(seed: u64, index: u64, stream: impl Into<u64>) -> f32 {
     let bits = hash64(seed, index, stream);
     let sum: u32 = (0..4).map(|k| (bits >> (16 * k)) as u32 & 0xFFFF).sum();
@@ -58,7 +60,7 @@ pub fn bell_f32(seed: u64, index: u64, stream: impl Into<u64>) -> f32 {
 
 /// A uniform angle in [0, 2π) radians.
 pub fn angle_f32(seed: u64, index: u64, stream: impl Into<u64>) -> f32 {
-    // 2π as f32 is above 2π, so the product is formed in f64; 1 - 2⁻²⁴ of a turn still rounds below 2π.
+    // 2π as f32 is above 2π, so the product is computed in f64. Then 1 - 2⁻²⁴ of a turn still rounds to less than 2π.
     (f64::from(unit_f32(seed, index, stream)) * TAU) as f32
 }
 

@@ -1,7 +1,7 @@
-//! From one value to another.
+//! Interpolation between values.
 
 /// Rises smoothly from 0 at `low` to 1 at `high`: the cubic Hermite step of WGSL's `smoothstep`, with the same
-/// arithmetic. Where `low` equals `high` it is a hard step; 0 for a NaN.
+/// arithmetic. If `low` equals `high`, it is a hard step. It is 0 for NaN.
 pub fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
     let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
     if t.is_nan() { 0.0 } else { t * t * (3.0 - 2.0 * t) }

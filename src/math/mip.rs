@@ -2,14 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A texture with its mip levels, RGBA8, ready to be uploaded.
+/// An RGBA8 texture with its mip levels, ready for upload.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MipChain {
     /// Width of level 0 in texels.
     pub width: u32,
     /// Height of level 0 in texels.
     pub height: u32,
-    /// The levels, full size first, down to 1x1. Level `n` holds [`MipChain::level_size`]`(n)` texels of 4 bytes,
+    /// The levels from full size down to 1x1. Level `n` holds [`MipChain::level_size`]`(n)` texels of 4 bytes,
     /// row by row from the top.
     pub levels: Vec<Vec<u8>>,
 }
@@ -21,7 +21,7 @@ impl MipChain {
         (shrink(self.width), shrink(self.height))
     }
 
-    /// Whether every level has the bytes that its size asks for.
+    /// Whether every level has as many bytes as its size requires.
     pub fn is_whole(&self) -> bool {
         self.levels.iter().enumerate().all(|(index, level)| {
             let (width, height) = self.level_size(index);
@@ -29,14 +29,20 @@ impl MipChain {
         })
     }
 
-    /// The levels one after the other in one allocation, full size first: what a GPU upload expects.
+    /// All levels, for an upload.
+    pub fn view(&self) -> MipView<'_> {
+        let levels = self.levels.iter().map(Vec::as_slice).collect();
+        MipView { width: self.width, height: self.height, levels }
+    }
+
+    /// All levels in one allocation, full size first, as a GPU upload expects them.
     pub fn concat(&self) -> Vec<u8> {
         self.levels.concat()
     }
 
     /// The fraction, 0..1, of the texels of `level` whose alpha is at least `threshold` (0..1).
     ///
-    /// 0 for a level that does not exist or has no texels.
+    /// It is 0 for a level that does not exist or has no texels.
     pub fn coverage(&self, level: usize, threshold: f32) -> f32 {
         let Some(texels) = self.levels.get(level).filter(|texels| !texels.is_empty()) else {
             return 0.0;
@@ -44,4 +50,15 @@ impl MipChain {
         let passing = texels.chunks_exact(4).filter(|texel| f32::from(texel[3]) / 255.0 >= threshold).count();
         passing as f32 / (texels.len() / 4) as f32
     }
+}
+
+/// A texture with its mip levels, RGBA8, borrowed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MipView<'a> {
+    /// Width of level 0 in texels.
+    pub width: u32,
+    /// Height of level 0 in texels.
+    pub height: u32,
+    /// The levels as in a [`MipChain`].
+    pub levels: Vec<&'a [u8]>,
 }

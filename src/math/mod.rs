@@ -5,17 +5,19 @@
 //! | [`radical_inverse`](mod@radical_inverse) | the radical inverse in any base, in integers |
 //! | [`sequence`] | Halton and Hammersley points |
 //! | [`discrepancy`] | how evenly a point set fills the unit square |
-//! | [`hash`] | numbers that depend on nothing but a seed, an index and a stream |
+//! | [`hash`] | random numbers that depend only on a seed, an index and a stream |
 //! | [`quadrature`] | Gauss-Legendre nodes, directions and solid angles that integrate over the sphere |
 //! | [`octahedral`] | unit vectors in two coordinates |
 //! | [`color`] | sRGB, luminance, 8-bit codes |
 //! | [`interpolation`] | the smooth step |
 //! | [`mip`] | a texture with its mip levels |
 //! | [`resample`] | images at another size: filtering in linear light with colours weighted by alpha |
-//! | [`digits`] | numbers as people read them |
+//! | [`compute_once`](mod@compute_once) | shared values that parallel work computes |
+//! | [`digits`] | numbers formatted for people |
 //! | [`range`] | the range, steps and unit of a number that people set |
 
 pub mod color;
+pub mod compute_once;
 pub mod digits;
 pub mod discrepancy;
 mod error;
@@ -30,10 +32,11 @@ pub mod resample;
 pub mod sequence;
 
 pub use color::{LUMINANCE_WEIGHTS, linear_to_srgb, luminance, srgb_to_linear};
+pub use compute_once::compute_once;
 pub use discrepancy::star_discrepancy;
 pub use error::MathError;
 pub use interpolation::smoothstep;
-pub use mip::MipChain;
+pub use mip::{MipChain, MipView};
 pub use quadrature::SphereQuadrature;
 pub use radical_inverse::{RadicalInverse, radical_inverse};
 pub use range::Range;

@@ -1,56 +1,56 @@
-//! Unit vectors in two coordinates: the octahedral encoding [Cigolle et al. 2014, "A Survey of Efficient
+//! Unit vectors as two coordinates: the octahedral encoding [Cigolle et al. 2014, "A Survey of Efficient
 //! Representations for Independent Unit Vectors", 3.1; Meyer et al. 2010].
 //!
-//! The sphere is projected onto an octahedron, whose lower half is folded outwards: all directions fill the square
-//! -1..=1 x -1..=1. The axis in the middle of the square is kept exactly; which axis that is depends on what is
-//! encoded.
+//! The sphere is projected onto an octahedron, and the octahedron's lower half is folded outwards, so that all
+//! directions fill the square -1..=1 x -1..=1. The axis in the middle of the square is preserved exactly. Which axis
+//! that is depends on what is encoded.
 
 use glam::{Vec2, Vec3};
 
 /// Sum of absolute coordinates below which a vector has no direction.
 const NO_DIRECTION: f32 = 1e-12;
 
-/// The point of the octahedron in this direction; the origin where there is no direction.
+/// The point of the octahedron in this direction; the origin for a vector without direction.
 fn projected(direction: Vec3) -> Vec3 {
     let point = direction / direction.abs().element_sum().max(NO_DIRECTION);
     if point.is_finite() { point } else { Vec3::ZERO }
 }
 
-/// Folds the lower half of the octahedron outwards: `flat` is the projection without the axis, `below` whether the
+/// Folds the lower half of the octahedron outwards. `flat` is the projection without the axis; `below` says whether the
 /// vector points against the axis.
 fn folded(flat: Vec2, below: bool) -> Vec2 {
     let sign = |value: f32| if value < 0.0 { -1.0 } else { 1.0 };
     if below { Vec2::new((1.0 - flat.y.abs()) * sign(flat.x), (1.0 - flat.x.abs()) * sign(flat.y)) } else { flat }
 }
 
-/// Encodes a direction of any length with +Z in the middle: (x, y) of the square, each -1..=1. A vector without
-/// direction gives the middle.
+/// Encodes a direction of any length as a point (x, y) of the square, each -1..=1, with +Z in the middle. A vector
+/// without direction gives the middle.
 pub fn encode_z(direction: Vec3) -> Vec2 {
     let n = projected(direction);
     folded(n.truncate(), n.z < 0.0)
 }
 
-/// Encodes a direction of any length with +Y in the middle: (x, z) of the square, each -1..=1. A vector without
-/// direction gives the middle.
+/// Encodes a direction of any length as a point (x, z) of the square, each -1..=1, with +Y in the middle. A vector
+/// without direction gives the middle.
 pub fn encode_y(direction: Vec3) -> Vec2 {
     let n = projected(direction);
     folded(Vec2::new(n.x, n.z), n.y < 0.0)
 }
 
-/// The unit vector that [`encode_z`] gave `code` for; each coordinate of `code` in -1..=1.
+/// The unit vector that [`encode_z`] encodes as `code`. Each coordinate of `code` is in -1..=1.
 pub fn decode_z(code: Vec2) -> Vec3 {
     let z = 1.0 - code.x.abs() - code.y.abs();
     let fold = (-z).max(0.0);
     Vec3::new(code.x - fold * code.x.signum(), code.y - fold * code.y.signum(), z).normalize_or(Vec3::Z)
 }
 
-/// The unit vector that [`encode_y`] gave `code` for; each coordinate of `code` in -1..=1.
+/// The unit vector that [`encode_y`] encodes as `code`. Each coordinate of `code` is in -1..=1.
 pub fn decode_y(code: Vec2) -> Vec3 {
     let Vec3 { x, y, z } = decode_z(code);
     Vec3::new(x, z, y)
 }
 
-/// Two coordinates of -1..=1 as snorm16, the first in the lower half word (WGSL's `unpack2x16snorm`).
+/// Two coordinates in -1..=1 as snorm16, the first one in the lower half of the word (WGSL's `unpack2x16snorm`).
 pub fn pack_snorm16(code: Vec2) -> u32 {
     let snorm = |value: f32| ((value.clamp(-1.0, 1.0) * 32767.0).round() as i16) as u16;
     u32::from(snorm(code.x)) | u32::from(snorm(code.y)) << 16

@@ -1,15 +1,15 @@
-//! Quadrature on the sphere: Gauss-Legendre nodes in the height `y`, equidistant azimuths.
+//! Quadrature on the sphere: Gauss-Legendre nodes in the height `y`, equally spaced azimuths.
 //!
-//! The two hemispheres have rules of their own, so that an integrand that jumps at the horizon (sky above, ground
-//! below) is integrated as exactly as a smooth one. With `n` rings a hemisphere and `k` azimuths, polynomials of
-//! degree up to `min(2n - 1, k - 1)` in the direction are integrated exactly (Davis & Rabinowitz 1984, 2.7).
+//! Each hemisphere has its own rule, so that an integrand that jumps at the horizon (sky above, ground below) is
+//! integrated as exactly as a smooth one. With `n` rings per hemisphere and `k` azimuths, polynomials in the direction
+//! are integrated exactly up to degree `min(2n - 1, k - 1)` (Davis & Rabinowitz 1984, 2.7).
 
 use std::f64::consts::{PI, TAU};
 
 use glam::Vec3;
 
-/// Nodes and weights of the Gauss-Legendre rule with `n` nodes on `[-1, 1]`, ascending nodes, weights summing to 2.
-/// Newton's iteration from Chebyshev's estimate (Davis & Rabinowitz 1984, 2.7); exact to about 1e-15.
+/// Nodes and weights of the Gauss-Legendre rule with `n` nodes on `[-1, 1]`. The nodes ascend, and the weights sum to
+/// 2. Found by Newton's method from Chebyshev's estimate (Davis & Rabinowitz 1984, 2.7), accurate to about 1e-15.
 pub fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
     let mut rule = Vec::with_capacity(n);
     for i in (0..n).rev() {
@@ -60,7 +60,7 @@ impl SphereQuadrature {
         Self { upper: rings * azimuths, nodes }
     }
 
-    /// Every direction (unit vector) with its solid angle in steradians; they sum to 4 pi.
+    /// All directions (unit vectors) with their solid angles in steradians, which sum to 4 pi.
     pub fn sphere(&self) -> &[(Vec3, f32)] {
         &self.nodes
     }

@@ -1,35 +1,36 @@
-//! The radical inverse, in integers: the digits of an index, mirrored at the point.
+//! The radical inverse, computed in integers: the digits of an index, mirrored at the radix point.
 //!
 //! `i = Σ dₖ bᵏ  →  Φ_b(i) = Σ dₖ b⁻ᵏ⁻¹` ([van der Corput 1935]; [Halton 1964] for several bases at once).
 //!
-//! The obvious loop adds `dₖ * b⁻ᵏ⁻¹` in floating point: one division and one rounding a digit, and in f32 neighbouring
-//! indices collapse from 2²⁴ on. Here the mirrored digits are first an integer `N`, exact, over `D = bᵏ`, and only the
-//! quotient is rounded, downwards to a multiple of 2⁻⁵³. So for every index and every base
+//! The obvious loop adds `dₖ * b⁻ᵏ⁻¹` in floating point. It divides and rounds once per digit, and in f32 neighbouring
+//! indices collapse from 2²⁴ on. Here the mirrored digits first form an exact integer `N` over `D = bᵏ`, and only the
+//! quotient is rounded, down to a multiple of 2⁻⁵³. So for every index and every base
 //!
 //! `0 <= Φ - result < 2⁻⁵³`, the result is in [0, 1), and a larger Φ never has a smaller result.
 //!
-//! Base 2 is a reversal of bits. Other bases mirror several digits at once by a table (base 3: seven digits, 2187
-//! entries of two bytes, so three look-ups serve every index of 32 bits), after the digit blocks of
-//! [Kollig & Keller 2002] and [Struckmeier 1995].
+//! Base 2 is a bit reversal. Other bases mirror several digits at once through a table, after the digit blocks of
+//! [Kollig & Keller 2002] and [Struckmeier 1995]. For base 3 an entry mirrors seven digits: 2187 entries of two bytes,
+//! so three look-ups are enough for any 32-bit index.
 
 use super::MathError;
 
-/// 2⁻⁵³, the step of all results.
+/// 2⁻⁵³: all results are multiples of it.
 const STEP: f64 = 1.0 / (1u64 << 53) as f64;
 
-/// 3⁷, the indices one table entry mirrors.
+/// 3⁷: the number of indices whose digits one table entry can mirror.
 pub(super) const TERNARY_BLOCK: u64 = 2187;
 
 /// 3¹⁴.
 pub(super) const TERNARY_BLOCK_2: u64 = TERNARY_BLOCK * TERNARY_BLOCK;
 
-/// 3²¹, above every index of 32 bits.
+/// 3²¹, which is above every 32-bit index.
 pub(super) const TERNARY_BLOCK_3: u64 = TERNARY_BLOCK_2 * TERNARY_BLOCK;
 
 /// Mirrors of all numbers of seven ternary digits.
 static TERNARY: [u16; TERNARY_BLOCK as usize] = ternary_table();
 
-/// Largest table of a [`RadicalInverse`]; 8 KiB stay in the first-level cache beside everything else.
+/// Maximum number of entries in the table of a [`RadicalInverse`]. Its 8 KiB stay in the first-level cache beside
+/// everything else.
 const MAX_BLOCK: u32 = 4096;
 
 const fn ternary_table() -> [u16; TERNARY_BLOCK as usize] {
@@ -50,11 +51,11 @@ const fn ternary_table() -> [u16; TERNARY_BLOCK as usize] {
 
 /// `floor(n / d * 2⁵³) * 2⁻⁵³` for `n < d <= 2⁵³`.
 ///
-/// The floating-point quotient is within half a step of the exact one, so its integer part is off by one at most, and
-/// the remainder (taken modulo 2⁶⁴, as it is small) tells which way.
+/// The floating-point quotient is within half a step of the exact one, so its integer part is off by at most one. The
+/// sign of the remainder (computed modulo 2⁶⁴, as it is small) shows the direction.
 #[inline]
 pub(super) fn floor_quotient(n: u64, d: u64) -> f64 {
-    // Signed integers, as processors convert those in one instruction.
+    // Signed integers, because processors convert them in one instruction.
     let (n, d) = (n as i64, d as i64);
     let q = (n as f64 / d as f64 * (1u64 << 53) as f64) as i64;
     let rest = (n << 53).wrapping_sub(q.wrapping_mul(d));
@@ -64,7 +65,8 @@ pub(super) fn floor_quotient(n: u64, d: u64) -> f64 {
 /// `floor(n / 3²¹ * 2⁵³) * 2⁻⁵³` for `n < 3²¹`, without a division.
 ///
 /// Division by an invariant integer ([Granlund & Montgomery 1994]): with `M = (2¹²⁰ + e) / 3²¹`, `0 < e < 3²¹`,
-/// `n M / 2⁶⁷` exceeds the quotient by `n e / 2⁶⁷ < 3⁴² / 2⁶⁷ < 1` parts of 3²¹, too little to reach the next integer.
+/// `n M / 2⁶⁷` exceeds the quotient by `n e / 2⁶⁷ < 3⁴² / 2⁶⁷ < 1` units of 1 / 3²¹, too little to reach the next
+/// integer.
 #[inline]
 pub(super) fn ternary_quotient(n: u64) -> f64 {
     const M: u128 = (1 << 120) / TERNARY_BLOCK_3 as u128 + 1;
@@ -81,13 +83,13 @@ fn floor_quotient_wide(n: u128, d: u128) -> f64 {
     (((upper << 32) | lower) as u64 >> 11) as i64 as f64 * STEP
 }
 
-/// Φ₂: exact for indices below 2⁵³, else the exact value rounded down to a multiple of 2⁻⁵³.
+/// Φ₂. It is exact for indices below 2⁵³; otherwise the exact value is rounded down to a multiple of 2⁻⁵³.
 #[inline]
 pub fn radical_inverse_2(i: u64) -> f64 {
     (i.reverse_bits() >> 11) as i64 as f64 * STEP
 }
 
-/// Mirror of the lowest seven ternary digits of `block`, as a numerator over 3⁷.
+/// The lowest seven ternary digits of `block`, mirrored, as a numerator over 3⁷.
 #[inline]
 pub(super) fn ternary_mirror(block: u64) -> u64 {
     u64::from(TERNARY[(block % TERNARY_BLOCK) as usize])
@@ -111,7 +113,7 @@ pub fn radical_inverse_3(i: u64) -> f64 {
 
 /// Φ in any base, digit by digit in 128-bit integers; `base >= 2`.
 fn mirrored_digits(base: u32, mut i: u64) -> f64 {
-    // d <= i * base < 2⁹⁶, as the leading digit is not zero.
+    // d <= i * base < 2⁹⁶, because the leading digit is not zero.
     let (mut n, mut d, base_wide, base) = (0u128, 1u128, u128::from(base), u64::from(base));
     while i > 0 {
         n = n * base_wide + u128::from(i % base);
@@ -123,7 +125,7 @@ fn mirrored_digits(base: u32, mut i: u64) -> f64 {
 
 /// Φ_base(i) in [0, 1), rounded down to a multiple of 2⁻⁵³.
 ///
-/// For many indices in a base above 3 a [`RadicalInverse`] is faster.
+/// For many indices in a base above 3, a [`RadicalInverse`] is faster.
 ///
 /// # Errors
 /// [`MathError::Base`] for bases 0 and 1.
@@ -140,12 +142,12 @@ pub fn radical_inverse(base: u32, i: u64) -> Result<f64, MathError> {
 #[derive(Clone, Debug)]
 pub struct RadicalInverse {
     base: u32,
-    /// `base` to the number of digits that one table entry mirrors.
+    /// `base` to the power of the number of digits that one table entry mirrors.
     block: u64,
-    /// `ceil(2⁴⁴ / block)`: the product with an index of 32 bits, over 2⁴⁴, has the integer part of the quotient, as
-    /// the rounding adds less than `2³² * block / 2⁴⁴ <= 1` parts of `block`.
+    /// `ceil(2⁴⁴ / block)`. Its product with a 32-bit index, divided by 2⁴⁴, has the integer part of the quotient,
+    /// because the rounding adds less than `2³² * block / 2⁴⁴ <= 1` units of 1 / `block`.
     reciprocal: u64,
-    /// Mirrors of all numbers below `block`; empty where even two digits are too many for a table.
+    /// All numbers below `block`, mirrored; empty if even two digits are too many for a table.
     table: Vec<u16>,
 }
 
@@ -193,7 +195,7 @@ impl RadicalInverse {
         floor_quotient(n, d)
     }
 
-    /// Φ of an index of 32 bits in a base with a table; `D < 2³² * 4096`.
+    /// Φ of a 32-bit index in a base with a table; `D < 2³² * 4096`.
     fn short_value(&self, i: u32) -> f64 {
         let (mut n, mut d, mut rest) = (0u64, 1u64, u64::from(i));
         while rest > 0 {

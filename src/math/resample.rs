@@ -1,8 +1,8 @@
-//! Filtering of images in linear light with colours weighted by alpha.
+//! Resampling of images in linear light, with colours weighted by alpha.
 //!
-//! Texels are kept straight (not premultiplied) and each pass computes the premultiplied average and divides it
-//! out again: `a = sum(w a_i)`, `c = sum(w a_i c_i) / a`. Passes may be chained (columns after rows, mip after mip)
-//! without a change of meaning, and where nothing is visible the colour is still defined: the plain average.
+//! Texels have straight alpha (not premultiplied). Each pass computes the premultiplied average and divides by its
+//! alpha: `a = sum(w a_i)`, `c = sum(w a_i c_i) / a`. So passes can be chained (columns after rows, mip after mip).
+//! Where nothing is visible, the colour is still defined: it is the plain average.
 
 use image::{Rgba, RgbaImage};
 use rayon::prelude::*;
@@ -20,8 +20,8 @@ pub(crate) struct Layer {
     pub texels: Vec<[f32; 4]>,
 }
 
-/// Below this weight a group of texels counts as invisible: half of the smallest alpha of 8 bits, spread over
-/// four million texels.
+/// A group of texels with less weight than this counts as invisible: half of the smallest 8-bit alpha, spread over four
+/// million texels.
 const INVISIBLE: f32 = 0.5 / 255.0 / 4_194_304.0;
 
 impl Layer {
@@ -47,8 +47,8 @@ impl Layer {
         encoded.into_flattened()
     }
 
-    /// The layer at another size (both at least 1): area average where it shrinks, linear interpolation where it
-    /// grows.
+    /// The image at another size (both sides at least 1): by area average where it shrinks, by linear interpolation
+    /// where it grows.
     pub fn resampled(&self, width: usize, height: usize) -> Self {
         let columns = taps(self.width, width);
         let rows = taps(self.height, height);
@@ -69,7 +69,7 @@ impl Layer {
     }
 }
 
-/// The weighted average of straight-alpha texels; the weights add to 1.
+/// The weighted average of straight-alpha texels. The weights sum to 1.
 fn average<'a>(weighted: impl Iterator<Item = (&'a f32, &'a [f32; 4])>) -> [f32; 4] {
     let (mut seen, mut plain, mut alpha) = ([0.0f32; 3], [0.0f32; 3], 0.0f32);
     for (&weight, texel) in weighted {
@@ -90,7 +90,7 @@ struct Tap {
     weights: Vec<f32>,
 }
 
-/// The taps of all `to` output texels over `from` source texels (both at least 1).
+/// The taps of `to` output texels over `from` source texels (both at least 1).
 fn taps(from: usize, to: usize) -> Vec<Tap> {
     let ratio = from as f64 / to as f64;
     (0..to)
@@ -115,8 +115,8 @@ fn taps(from: usize, to: usize) -> Vec<Tap> {
 /// The image (sRGB colours, straight linear alpha) at `width` x `height` texels, filtered in linear light with
 /// colours weighted by alpha: area average where it shrinks, linear interpolation where it grows.
 ///
-/// Serves to bring textures of unequal size into one texture array. The same size gives the same bytes. An image
-/// without texels gives transparent black.
+/// It brings textures of different sizes into one texture array. The same size gives the same bytes. An image without
+/// texels gives transparent black.
 pub fn resize_to(image: &RgbaImage, width: u32, height: u32) -> RgbaImage {
     if (width, height) == image.dimensions() {
         return image.clone();

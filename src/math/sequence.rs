@@ -1,7 +1,8 @@
-//! Point sets in the unit square: Halton, Hammersley (Franzke 2005, figure 4.17).
+//! Point sets in the unit square: Halton and Hammersley (Franzke 2005, figure 4.17).
 //!
-//! - Halton ([Halton 1964]): (Φ₂(i), Φ₃(i)), a sequence: any beginning of it is even, so a stand can grow.
-//! - Hammersley ([Hammersley & Handscomb 1964]): (i/n, Φ₂(i)), a set: more even than Halton, but `n` is fixed.
+//! - Halton ([Halton 1964]): (Φ₂(i), Φ₃(i)). It is a sequence: its first points are even, however many, so a stand can
+//!   grow.
+//! - Hammersley ([Hammersley & Handscomb 1964]): (i/n, Φ₂(i)). It is a set: more even than Halton, but `n` is fixed.
 //!
 //! Star discrepancies are in `benches/sequences.rs`.
 
@@ -21,8 +22,8 @@ pub fn halton(i: u64) -> DVec2 {
     DVec2::new(radical_inverse_2(i), radical_inverse_3(i))
 }
 
-/// The i-th of the `n` Hammersley points; both coordinates in [0, 1). `i` counts modulo `n`; of no points each is the
-/// origin.
+/// The i-th of the `n` Hammersley points; both coordinates in [0, 1). `i` counts modulo `n`. If `n` is 0, the point is
+/// the origin.
 #[inline]
 pub fn hammersley(i: u64, n: u64) -> DVec2 {
     match i.checked_rem(n) {
@@ -31,13 +32,13 @@ pub fn hammersley(i: u64, n: u64) -> DVec2 {
     }
 }
 
-/// The Halton sequence in order, from any index: the same points as [`halton`], bit for bit.
+/// The Halton sequence in order, from any index. The points are those of [`halton`], bit for bit.
 ///
-/// Of the ternary digits only the lowest seven change at every step; the upper ones are mirrored once in 2187 points.
+/// Only the lowest seven ternary digits change at every step. The upper ones are mirrored once every 2187 points.
 #[derive(Clone, Debug)]
 pub struct HaltonSequence {
     next: u64,
-    /// `next % 3⁷`, kept by counting.
+    /// `next % 3⁷`, maintained by counting.
     low: u64,
     /// Mirror of the ternary digits above the seventh, over 3²¹.
     upper: u64,

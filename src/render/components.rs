@@ -78,14 +78,21 @@ impl CanopyOrigin {
 ///
 /// Its global translation, in the scene's frame (not moved by [`CanopyOrigin`]), is added to `origin`; it is drawn if
 /// its inherited visibility and its render layers let the camera see it. Rotation and scale have no effect.
-#[derive(Component, Clone, Debug)]
+///
+/// Reflection does not show the shared lists: nothing in them can be edited one by one, since they belong together and
+/// were packed for the device. A program replaces them as a whole.
+#[derive(Component, Clone, Debug, Reflect)]
+#[reflect(Component, Debug, from_reflect = false)]
 #[require(Transform, Visibility)]
 pub struct Forest {
     /// The trees and their positions.
+    #[reflect(ignore, clone)]
     pub stand: Arc<PackedStand>,
     /// The plants, indexed by the trees' variant; at most 1,024.
+    #[reflect(ignore, clone)]
     pub plants: Arc<Vec<BakedPlant>>,
     /// How the sun lights each plant; [`SunLight::LeafShader`] beyond the end of the list.
+    #[reflect(ignore, clone)]
     pub suns: Arc<[SunLight]>,
     /// Scene position in metres of the stand's own origin.
     pub origin: DVec3,
@@ -98,12 +105,17 @@ pub struct Forest {
 /// The ground under everything. Only one is drawn at a time: the first visible one.
 ///
 /// As for a [`Forest`], its global translation, inherited visibility and render layers take effect.
-#[derive(Component, Clone, Debug)]
+///
+/// Reflection does not show the shared maps, which a program replaces as a whole.
+#[derive(Component, Clone, Debug, Reflect)]
+#[reflect(Component, Debug, from_reflect = false)]
 #[require(Transform, Visibility)]
 pub struct Ground {
     /// Heights; scene metres, origin at the terrain's centre.
+    #[reflect(ignore, clone)]
     pub terrain: Arc<Terrain>,
     /// Canopy cover, if a forest stands on it.
+    #[reflect(ignore, clone)]
     pub cover: Option<Arc<CoverMap>>,
     /// Maximum distance in pixels between the drawn and the true surface, 0.25 to 32. Lower: more triangles.
     pub error_pixels: f64,
@@ -111,9 +123,41 @@ pub struct Ground {
     pub view_distance: f64,
 }
 
-/// The current light. Replace it whenever the sun moves; while it stays the same [`Arc`], nothing is computed again.
+/// The current light. Replace it whenever the sun moves; while it stays the same [`Arc`], nothing is computed again. Two
+/// are equal if they are the same `Arc`.
 #[derive(Resource, Clone, Debug)]
 pub struct Daylight(pub Arc<LightState>);
+
+impl PartialEq for Daylight {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
+/// When the renderer computes what follows from a new [`Daylight`]: the terrain's shadow and the light inside stands. A
+/// [`Sun`](crate::components::Sun) sets it by its [`SunRefresh`](crate::components::SunRefresh); a program that computes
+/// its own light sets it itself.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Resource, Default)]
+pub enum LightUpdates {
+    /// In the frame that draws the new light, which waits for it: about 30 ms. For images and tests.
+    Blocking,
+    /// Beside the frames, which draw the last result meanwhile. It lags behind the light by at most half a degree of the
+    /// sun's or the moon's way, which is the width of their discs: two minutes of a clock, 25 steps of the default
+    /// [`SunRefresh`](crate::components::SunRefresh). A frame whose light is farther away, because an hour was skipped
+    /// or the moon took over from the sun, waits. So does one with another terrain.
+    #[default]
+    Background,
+}
+
+impl LightUpdates {
+    /// Whether what was computed for `old` may still be drawn under `new` (directions to the light, unit vectors): they
+    /// differ by at most half a degree.
+    pub fn is_near(old: Vec3, new: Vec3) -> bool {
+        // The chord is as long as the angle to a millionth, and exact where the cosine is not.
+        old.distance_squared(new) <= 0.5f32.to_radians().powi(2)
+    }
+}
 
 /// Settings of the shadow maps of sun and moon, on the entity of the [`Sun`](crate::components::Sun), which requires
 /// it.
@@ -169,7 +213,10 @@ impl Plugin for ComponentsPlugin {
             ExtractComponentPlugin::<ViewOptions>::default(),
         ))
         .register_type::<(CanopyCamera, CanopyOrigin, SunShadowSettings, ViewOptions, CastsCanopyShadow)>()
-        .init_resource::<CanopyOrigin>();
+        .register_type::<(Forest, Ground)>()
+        .register_type::<LightUpdates>()
+        .init_resource::<CanopyOrigin>()
+        .init_resource::<LightUpdates>();
     }
 }
 
@@ -178,6 +225,14 @@ mod tests {
     use bevy::ecs::world::World;
 
     use super::*;
+
+    #[test]
+    fn light_is_near_within_half_a_degree() {
+        let at = |degrees: f32| Vec3::new(degrees.to_radians().cos(), degrees.to_radians().sin(), 0.0);
+        assert!(LightUpdates::is_near(at(30.0), at(30.0)) && LightUpdates::is_near(at(30.0), at(30.49)));
+        assert!(!LightUpdates::is_near(at(30.0), at(30.51)) && !LightUpdates::is_near(at(30.0), -at(30.0)));
+        assert!(!LightUpdates::is_near(Vec3::NAN, at(30.0)));
+    }
 
     #[test]
     fn a_camera_has_the_tone_curve_of_the_screenshots_unless_the_program_chose_one() {

@@ -23,7 +23,9 @@ use bevy::{
 };
 use glam::{DVec3, Quat, Vec3};
 
-use super::components::{CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, SunShadowSettings};
+use super::components::{
+    CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, LightUpdates, SunShadowSettings,
+};
 
 /// The data of the main world for a frame.
 #[derive(Resource, Default)]
@@ -36,6 +38,8 @@ pub struct ExtractedScene {
     pub ground: Option<(Entity, Ground, DVec3)>,
     /// The light, if it has been set.
     pub daylight: Option<Daylight>,
+    /// When what follows from the light is computed.
+    pub light_updates: LightUpdates,
     /// Meshes that cast onto Canopy's passes, with their transform in the Bevy world.
     pub casters: Vec<(AssetId<Mesh>, Affine3A)>,
     /// How often each mesh was changed.
@@ -58,7 +62,7 @@ pub fn extract_scene(
     grounds: Extract<Query<(Entity, &Ground, Placed)>>,
     casters: Extract<Query<(Entity, &Mesh3d, &GlobalTransform), With<CastsCanopyShadow>>>,
     mut changes: Extract<MessageReader<AssetEvent<Mesh>>>,
-    daylight: Extract<Option<Res<Daylight>>>,
+    (daylight, light_updates): (Extract<Option<Res<Daylight>>>, Extract<Option<Res<LightUpdates>>>),
     shadows: Extract<Query<(Entity, &SunShadowSettings)>>,
     lights: Extract<Query<&DirectionalLight>>,
 ) {
@@ -74,8 +78,9 @@ pub fn extract_scene(
     };
     scene.forests.clear();
     for (entity, forest, placed) in forests.iter().filter(|(.., placed)| seen(placed)) {
-        let origin = forest.origin + translation(placed.0);
-        scene.forests.push((entity, Forest { origin, ..forest.clone() }));
+        let mut forest = Forest { origin: forest.origin + translation(placed.0), ..forest.clone() };
+        forest.levels.sanitize();
+        scene.forests.push((entity, forest));
     }
     scene.forests.sort_by_key(|(entity, _)| *entity);
     let visible = || grounds.iter().filter(|(.., placed)| seen(placed));
@@ -84,7 +89,8 @@ pub fn extract_scene(
     }
     let ground = visible().min_by_key(|(entity, ..)| *entity);
     scene.ground = ground.map(|(entity, ground, placed)| (entity, ground.clone(), translation(placed.0)));
-    scene.daylight = daylight.as_ref().map(|light| Daylight(light.0.clone()));
+    scene.daylight = daylight.as_deref().cloned();
+    scene.light_updates = light_updates.as_deref().copied().unwrap_or_default();
     let mut meshes: Vec<_> = casters.iter().collect();
     meshes.sort_by_key(|(entity, ..)| *entity);
     for event in changes.read() {

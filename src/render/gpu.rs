@@ -15,7 +15,7 @@ use bevy::{
 };
 use bytemuck::Pod;
 
-use crate::math::MipChain;
+use crate::math::MipView;
 
 /// The device, its queue and the pipeline cache: what an upload needs.
 #[derive(SystemParam)]
@@ -122,11 +122,11 @@ pub fn table(device: &RenderDevice, label: &str, size: (u32, u32)) -> (Texture, 
 /// leaves that cover less than half of their texture would vanish in the distance.
 pub const SMALLEST_TESTED_MIP: u32 = 8;
 
-/// Number of levels of `chain` down to `smallest` texels along the shorter side (at least one).
-pub fn levels_down_to(chain: &MipChain, smallest: u32) -> usize {
-    let side = chain.width.min(chain.height).max(1);
+/// Number of levels of `mips` down to `smallest` texels along the shorter side (at least one).
+pub fn levels_down_to(mips: &MipView, smallest: u32) -> usize {
+    let side = mips.width.min(mips.height).max(1);
     let wanted = (side / smallest.max(1)).max(1).ilog2() as usize + 1;
-    wanted.min(chain.levels.len().max(1))
+    wanted.min(mips.levels.len().max(1))
 }
 
 /// A texture array of RGBA8 layers with their mip chains down to `smallest` texels; all chains have the size of the
@@ -136,12 +136,12 @@ pub fn texture_array(
     queue: &RenderQueue,
     label: &str,
     format: TextureFormat,
-    layers: &[&MipChain],
+    layers: &[MipView],
     smallest: u32,
 ) -> (Texture, TextureView) {
     let (width, height, levels) = layers
         .first()
-        .map_or((1, 1, 1), |chain| (chain.width.max(1), chain.height.max(1), levels_down_to(chain, smallest)));
+        .map_or((1, 1, 1), |mips| (mips.width.max(1), mips.height.max(1), levels_down_to(mips, smallest)));
     let texture = device.create_texture(&TextureDescriptor {
         label: Some(label),
         size: Extent3d { width, height, depth_or_array_layers: layers.len().max(1) as u32 },
@@ -152,18 +152,18 @@ pub fn texture_array(
         usage: TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST,
         view_formats: &[],
     });
-    for (layer, chain) in layers.iter().enumerate() {
-        write_layer(queue, &texture, layer as u32, chain);
+    for (layer, mips) in layers.iter().enumerate() {
+        write_layer(queue, &texture, layer as u32, mips);
     }
     let view = texture
         .create_view(&TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..Default::default() });
     (texture, view)
 }
 
-/// Writes all levels that an RGBA8 `texture` has of `chain` into one of its layers; levels of another size are skipped.
-pub fn write_layer(queue: &RenderQueue, texture: &Texture, layer: u32, chain: &MipChain) {
+/// Writes all levels that an RGBA8 `texture` has of `mips` into one of its layers; levels of another size are skipped.
+pub fn write_layer(queue: &RenderQueue, texture: &Texture, layer: u32, mips: &MipView) {
     let (width, height) = (texture.width(), texture.height());
-    for (level, texels) in (0..texture.mip_level_count()).zip(&chain.levels) {
+    for (level, texels) in (0..texture.mip_level_count()).zip(&mips.levels) {
         let (level_width, level_height) = ((width >> level).max(1), (height >> level).max(1));
         if texels.len() == (level_width * level_height * 4) as usize {
             write_level(queue, texture, layer, level, level_width, level_height, 4, texels);
@@ -177,10 +177,10 @@ pub fn texture(
     queue: &RenderQueue,
     label: &str,
     format: TextureFormat,
-    chain: &MipChain,
+    mips: MipView,
     smallest: u32,
 ) -> TextureView {
-    let (texture, _) = texture_array(device, queue, label, format, &[chain], smallest);
+    let (texture, _) = texture_array(device, queue, label, format, &[mips], smallest);
     texture.create_view(&TextureViewDescriptor { dimension: Some(TextureViewDimension::D2), ..Default::default() })
 }
 

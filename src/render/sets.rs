@@ -11,7 +11,8 @@ use bevy::{
     render::{Render, RenderSystems},
 };
 
-/// What happens before a frame is drawn, in this order, within [`RenderSystems::PrepareResources`].
+/// What happens before a frame is drawn, within [`RenderSystems::PrepareResources`]: one set after the other, but `Cull` and
+/// `Light` side by side.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum CanopyRenderSystems {
     /// The view is found: its camera in f64, its frustum, its exposure.
@@ -43,7 +44,10 @@ pub enum CanopyPasses {
 pub(super) fn configure(render_app: &mut SubApp) {
     use CanopyRenderSystems::{Cull, Light, Pipelines, Upload, View};
     render_app
-        .configure_sets(Render, (View, Upload, Cull, Light, Pipelines).chain().in_set(RenderSystems::PrepareResources))
+        .configure_sets(
+            Render,
+            (View, Upload, (Cull, Light), Pipelines).chain().in_set(RenderSystems::PrepareResources),
+        )
         .configure_sets(Core3d, CanopyPasses::SunShadow.after(Core3dSystems::Prepass).before(Core3dSystems::MainPass))
         .configure_sets(
             Core3d,

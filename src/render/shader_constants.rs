@@ -56,7 +56,7 @@ pub fn constants() -> Vec<(&'static str, &'static str, Value)> {
         ("STAND_COVERS", "Canopy covers of the table of light in a stand.", float(stand::COVERS)),
         ("STAND_DEPTHS", "Its depths in the crowns; one more row is the ground's.", float(stand::DEPTHS)),
         ("TILE_SIDE", "Vertices along a side of a terrain tile.", uint(tiles::TILE_QUADS + 1)),
-        ("PLACE_STEPS", "Steps of a tree's position along a cell's side.", packed::PLACE_STEPS.into()),
+        ("POSITION_STEPS", "Steps of a tree's position along a cell's side.", packed::POSITION_STEPS.into()),
         ("YAW_BITS", "Bits of a tree's yaw, the lowest of `look`.", packed::YAW_BITS.into()),
         ("YAWS", "Yaws that a tree can have.", uint(transfer::YAWS)),
         ("SCALE_SHIFT", "First bit of its scale.", packed::SCALE_SHIFT.into()),

@@ -1,4 +1,5 @@
-//! How much of the ground is under crowns, as a map: it darkens the forest floor where trees are too far to be drawn.
+//! Canopy cover as a map: the fraction of the ground under crowns. It darkens the forest floor where trees are too far
+//! away to be drawn.
 
 use std::ops::Range;
 
@@ -9,19 +10,19 @@ use super::ScatterError;
 use super::packed::{PackedStand, PlantSize, check_bounds};
 use super::stand::{Area, MAX_SCALE, MIN_SCALE, Stand, XzPlane};
 
-/// The most texels of a map: 64 MiB.
+/// Maximum number of texels of a map: 64 MiB.
 const MAX_TEXELS: f64 = (1u64 << 26) as f64;
 
-/// Smallest texel, metres: it bounds the work that one crown can cause.
+/// Smallest texel, metres. It limits the work for one crown.
 const MIN_TEXEL_M: f64 = 0.01;
 
 /// Rows that one task fills.
 const BAND: usize = 16;
 
-/// Share of the ground under crowns. Row 0 is the northern one (smallest Z), columns run east.
+/// Fraction of the ground under crowns. Row 0 is the northernmost (smallest Z); columns run east.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CoverMap {
-    /// X and Z of the north-western corner, metres.
+    /// X and Z of the north-west corner, metres.
     pub origin: DVec2,
     /// Side of a texel, metres.
     pub texel: f64,
@@ -29,30 +30,34 @@ pub struct CoverMap {
     pub columns: u32,
     /// Number of rows.
     pub rows: u32,
-    /// Row after row: 0 is open ground, 255 is closed canopy.
+    /// Texels row by row: 0 is open ground, 255 is closed canopy.
     pub cover: Vec<u8>,
 }
 
 impl CoverMap {
-    /// The map of no trees.
+    /// The map without trees.
     fn empty(texel: f64) -> Self {
         Self { origin: DVec2::ZERO, texel, columns: 0, rows: 0, cover: Vec::new() }
     }
 
-    /// Share of the ground under crowns at a point (X, Z), 0 to 1, of the texel it is in; 0 outside of the map.
+    /// Fraction of the ground under crowns at a point (X, Z), 0 to 1: the value of the texel that contains it. It is 0
+    /// outside the map, and where `cover` is too short.
     pub fn at(&self, point: DVec2) -> f32 {
         let location = ((point - self.origin) / self.texel).floor();
         let inside = |value: f64, count: u32| (0.0..f64::from(count)).contains(&value).then_some(value as usize);
         match (inside(location.x, self.columns), inside(location.y, self.rows)) {
-            (Some(column), Some(row)) => f32::from(self.cover[row * self.columns as usize + column]) / 255.0,
+            (Some(column), Some(row)) => {
+                let texel = self.cover.get(row * self.columns as usize + column);
+                f32::from(texel.copied().unwrap_or_default()) / 255.0
+            }
             _ => 0.0,
         }
     }
 }
 
 impl CoverMap {
-    /// The map with the mean of each texel's neighbourhood, weighted 1, 2, 1 along both axes, and a border of one texel
-    /// for what spreads beyond it: the light of a point does not end at a texel's edge.
+    /// The map, blurred with the weights 1, 2, 1 along both axes and enlarged by a border of one texel, because the
+    /// light of a point does not end at the edge of a texel.
     pub fn smoothed(&self) -> Self {
         let (columns, rows) = (self.columns as usize, self.rows as usize);
         if self.cover.len() != columns * rows || self.cover.is_empty() {
@@ -64,7 +69,7 @@ impl CoverMap {
             }
             _ => 0,
         };
-        // Texel `at` of the larger map has the neighbours at - 2, at - 1 and at of this one.
+        // Texel `at` of the larger map averages the texels at - 2, at - 1 and at of this one.
         let taps = |at: usize| [(at.checked_sub(2), 1), (at.checked_sub(1), 2), (Some(at), 1)];
         let sum = |column: usize, row: usize| -> u32 {
             let weighted =
@@ -123,7 +128,7 @@ impl CoverMap {
     pub fn widened(&self, radius: f64) -> Self {
         let (columns, rows) = (self.columns as usize, self.rows as usize);
         let half = (0.5 * radius / self.texel).round();
-        // Two means over boxes of `2 half + 1` texels are a pyramid.
+        // Two box filters of `2 half + 1` texels make a pyramid.
         if self.cover.len() != columns * rows || self.cover.is_empty() || !(1.0..1024.0).contains(&half) {
             return self.clone();
         }
@@ -154,7 +159,7 @@ impl CoverMap {
     }
 }
 
-/// Each value as the mean of those up to `half` places away; nothing lies outside.
+/// Replaces each value by the mean of those up to `half` elements away. Values outside the line are 0.
 fn box_mean(line: &mut [f32], half: usize) {
     let mut sums = Vec::with_capacity(line.len() + 1);
     let mut sum = 0.0f64;
@@ -205,16 +210,16 @@ struct Crown {
 
 /// Maps the crowns of `stand` on texels of `texel` metres.
 ///
-/// A crown is a full disc of its variant's radius, scaled. The share of a texel that one disc covers is exact along X
-/// and from slabs (at least 8 a disc and 4 a texel) along Z; each disc's whole area is kept. Several discs cover
-/// `1 − Π (1 − share)`, as independent ones do. The map spans `extent`, or all crowns where that is `None`, in whole
-/// texels that begin at multiples of `texel`; of no trees it is empty. Time: some 50 ms for 300,000 trees of 3 m radius
-/// on texels of 8 m (two cores).
+/// A crown is a full disc with the radius of its variant, scaled. The fraction of a texel that a disc covers is exact
+/// along X, and integrated over slabs along Z (at least 8 per disc and 4 per texel); the area of each disc is
+/// preserved. Several discs cover `1 − Π (1 − share)`, as if they were independent. The map spans `extent`, or all
+/// crowns if that is `None`, in whole texels that begin at multiples of `texel`. Without trees it is empty. It takes
+/// about 50 ms for 300,000 trees of 3 m radius with texels of 8 m (two cores).
 ///
 /// # Errors
 /// [`ScatterError::PlantSize`], [`ScatterError::TooManyVariants`], [`ScatterError::UnknownVariant`] for the bounds,
-/// [`ScatterError::Unpackable`] for a scale outside of its range, [`ScatterError::Size`] for a texel below 1 cm or so
-/// small that the map has more than 2²⁶.
+/// [`ScatterError::Unpackable`] for a scale out of range, [`ScatterError::Size`] for a texel below 1 cm, or so small
+/// that the map would have more than 2²⁶.
 pub fn cover_map<S: Crowns>(
     stand: &S,
     bounds: &[PlantSize],
@@ -340,25 +345,25 @@ fn crowns_by_band(crowns: &[Crown], origin: DVec2, texel: f64, rows: usize) -> V
     bands
 }
 
-/// A disc of radius 1, cut into chords of equal distance.
+/// A disc of radius 1, cut into equally spaced chords.
 struct UnitDisc {
     /// Distance of each chord from the centre, -1 to 1, and its half length.
     chords: Vec<(f64, f64)>,
-    /// What a chord's length is multiplied with for its share of the disc: the distance of the chords, less the little
-    /// that the midpoint rule has too much.
+    /// Factor from a chord's length to its part of the disc's area: the spacing of the chords, minus the small excess
+    /// of the midpoint rule.
     depth: f64,
 }
 
-/// Chords that the smallest crowns are cut into, as a power of two.
+/// Number of chords of the smallest crowns, as a power of two.
 const MIN_CHORDS_LOG2: u32 = 3;
 
 impl UnitDisc {
-    /// Discs of 8, 16, 32, ... chords, up to what a radius of `largest` texels needs.
+    /// Discs with 8, 16, 32, ... chords, up to as many as a radius of `largest` texels needs.
     fn ladder(largest: f64) -> Vec<Self> {
         (0..=Self::rung(largest)).map(|rung| Self::new(1 << (MIN_CHORDS_LOG2 as usize + rung))).collect()
     }
 
-    /// The index in the ladder of the disc for a radius in texels: at least four chords a texel.
+    /// The index in the ladder of the disc for a radius in texels, which has at least four chords per texel.
     fn rung(radius: f64) -> usize {
         let chords = (8.0 * radius).ceil().max(1.0) as u64;
         chords.next_power_of_two().ilog2().saturating_sub(MIN_CHORDS_LOG2) as usize
@@ -380,7 +385,7 @@ struct BandGrid<'a> {
 }
 
 impl BandGrid<'_> {
-    /// Multiplies the open share of the texels under `crown`. `shares` is a row of zeros, and is so again afterwards.
+    /// Multiplies the open fraction of the texels under `crown`. `shares` is a row of zeros before and afterwards.
     fn splat(&self, crown: Crown, texels: &mut [f32], shares: &mut [f32]) {
         // All in texels from here on.
         let center = (crown.center - self.origin) / self.texel;
@@ -388,7 +393,8 @@ impl BandGrid<'_> {
         let Some(disc) = self.discs.get(UnitDisc::rung(radius)) else { return };
         let rows = texels.len() / self.columns;
         let depth = disc.depth * radius;
-        // Slabs of equal height around the chords; one that a border between rows cuts is shared out between the two.
+        // The chords are the middles of slabs of equal height. A slab that crosses the border between two rows is
+        // divided between them.
         let half_slab = radius / disc.chords.len() as f64;
         let per_slab = 0.5 / half_slab;
         let mut row = None;
@@ -400,8 +406,8 @@ impl BandGrid<'_> {
             if !(bottom >= 0.0 && top < rows as f64 && left < right) {
                 continue;
             }
-            // Truncation instead of rounding functions, which cost more than all else here; `bottom` and `left` are not
-            // negative, and a column that only touches gets a share of 0.
+            // Truncate instead of calling rounding functions, which would cost more than everything else here. `bottom`
+            // and `left` are not negative, and a column that is only touched gets a share of 0.
             let (first, end) = (left as usize, (right as usize + 1).min(self.columns));
             let border = bottom as i64;
             let above = ((border as f64 - top) * per_slab).clamp(0.0, 1.0);
@@ -432,5 +438,17 @@ impl BandGrid<'_> {
             *texel *= (1.0 - *share).max(0.0);
             *share = 0.0;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_with_too_few_texels_is_open_ground_where_they_are_missing() {
+        let map = CoverMap { origin: DVec2::ZERO, texel: 1.0, columns: 2, rows: 2, cover: vec![255] };
+        assert_eq!((map.at(DVec2::new(0.5, 0.5)), map.at(DVec2::new(1.5, 1.5))), (1.0, 0.0));
+        assert_eq!((map.smoothed(), map.widened(10.0)), (map.clone(), map.clone()));
     }
 }

@@ -1,6 +1,6 @@
-//! Tree inventories: CSV tables with a tree in each line.
+//! Tree inventories: CSV tables with one tree per line.
 //!
-//! Columns are found by name, in any order, letter case and punctuation aside (`DBH (cm)` is `dbh_cm`):
+//! Columns are found by name, in any order. Letter case and punctuation do not matter (`DBH (cm)` is `dbh_cm`):
 //!
 //! | quantity | names | unit |
 //! |---|---|---|
@@ -10,24 +10,24 @@
 //! | height | `height`, `h`, `ht`, `tree_height` + `_m`, `_cm`, `_mm` | by suffix, else by option (m) |
 //! | species | `species`, `sp`, `species_name`, `taxon` | |
 //!
-//! Other columns are ignored. The separator (`,` `;` tab) is found from the header; where it is not the comma, numbers
-//! may have a decimal comma. A byte-order mark, CRLF, quotes, empty lines, lines that begin with `#`, and Latin-1 text
-//! are accepted. Empty cells, `NA` and the like are missing values, as is a dbh or height of 0.
+//! Other columns are ignored. The header determines the separator (`,` `;` tab); if it is not the comma, numbers may
+//! have a decimal comma. A byte-order mark, CRLF, quotes, empty lines, lines that begin with `#`, and Latin-1 text are
+//! accepted. Empty cells, `NA` and the like are missing values, and so are a dbh and a height of 0.
 
 use std::path::Path;
 
 use super::{BadValue, ScatterError};
 
-/// Bad cells that an error lists.
+/// Maximum number of bad cells that an error lists.
 const LISTED: usize = 5;
 
-/// Thickest trunk and tallest tree that are believed, metres: beyond them the unit is wrong. (The Árbol del Tule has
-/// 14 m, Hyperion 116 m.)
+/// Thickest plausible trunk and tallest plausible tree, metres. Beyond them the unit is wrong: the Árbol del Tule has
+/// 14 m, Hyperion 116 m.
 const MAX_DBH_M: f64 = 15.0;
 const MAX_HEIGHT_M: f64 = 130.0;
 
 /// Unit of a length column.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Deserialize, bevy::reflect::Reflect)]
 pub enum LengthUnit {
     /// Metres.
     #[default]
@@ -49,12 +49,12 @@ impl LengthUnit {
     }
 }
 
-/// What an inventory's file does not say itself.
+/// What the file of an inventory may leave open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InventoryOptions {
-    /// Unit of a dbh column without a unit in its name; centimetres by default.
+    /// Unit of a dbh column whose name has no unit; centimetres by default.
     pub dbh_unit: LengthUnit,
-    /// Unit of a height column without a unit in its name; metres by default.
+    /// Unit of a height column whose name has no unit; metres by default.
     pub height_unit: LengthUnit,
 }
 
@@ -64,12 +64,12 @@ impl Default for InventoryOptions {
     }
 }
 
-/// What the positions of an inventory are.
+/// Kind of the positions in an inventory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Coordinates {
-    /// Metres, x to the east and y to the north, in the plot's or a projected system.
+    /// Metres: x to the east and y to the north, in the coordinate system of the plot or in a projected one.
     Planar,
-    /// x is the longitude and y the latitude, degrees.
+    /// Degrees: x is the longitude, y the latitude.
     Geographic,
 }
 
@@ -84,9 +84,9 @@ pub struct InventoryTree {
     pub dbh_m: Option<f64>,
     /// Height, metres, > 0.
     pub height_m: Option<f64>,
-    /// Species as the file writes it, not empty.
+    /// Species as written in the file; not empty.
     pub species: Option<String>,
-    /// Line of the file, from 1.
+    /// Line in the file, from 1.
     pub line: u64,
 }
 
@@ -95,7 +95,7 @@ pub struct InventoryTree {
 pub struct Inventory {
     /// The trees in the order of the file.
     pub rows: Vec<InventoryTree>,
-    /// What `x` and `y` of the rows are.
+    /// Kind of the `x` and `y` of the rows.
     pub coordinates: Coordinates,
 }
 
@@ -112,8 +112,8 @@ pub fn read_inventory(path: &Path, options: InventoryOptions) -> Result<Inventor
 ///
 /// # Errors
 /// [`ScatterError::NoPosition`], [`ScatterError::AmbiguousColumn`] for the header, [`ScatterError::Record`] for lines
-/// of the wrong number of cells, [`ScatterError::BadValues`] for text, infinities, negative sizes and impossible values
-/// in number columns.
+/// with the wrong number of cells, [`ScatterError::BadValues`] for text, infinities, negative sizes and impossible
+/// values in number columns.
 pub fn parse_inventory(bytes: &[u8], name: &str, options: InventoryOptions) -> Result<Inventory, ScatterError> {
     let text = decode(bytes, name)?;
     let separator = separator(&text);
@@ -144,16 +144,16 @@ pub fn parse_inventory(bytes: &[u8], name: &str, options: InventoryOptions) -> R
     Ok(Inventory { rows, coordinates: columns.coordinates })
 }
 
-/// A column of an inventory, for people.
+/// A column of an inventory, for display.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Column {
-    /// Its name as the file writes it.
+    /// Its name as written in the file.
     pub name: String,
-    /// What is read from it, with its unit; `None` where it is ignored.
+    /// The quantity that is read from it, with its unit; `None` if it is ignored.
     pub meaning: Option<String>,
 }
 
-/// The columns of an inventory in the order of the file; `bytes`, `name` and `options` as for [`parse_inventory`].
+/// The columns of an inventory, in the order of the file. `bytes`, `name` and `options` are as for [`parse_inventory`].
 ///
 /// # Errors
 /// Those of [`parse_inventory`] that concern the header.
@@ -174,7 +174,7 @@ fn table(text: &str, separator: u8) -> csv::Reader<&[u8]> {
     csv::ReaderBuilder::new().delimiter(separator).comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes())
 }
 
-/// UTF-8 with or without a byte-order mark, else Latin-1.
+/// The text: UTF-8 with or without a byte-order mark, otherwise Latin-1.
 fn decode(bytes: &[u8], name: &str) -> Result<String, ScatterError> {
     if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
         let message = "the file is UTF-16: save it as UTF-8 (in a spreadsheet, \"CSV UTF-8\")".to_owned();
@@ -183,11 +183,11 @@ fn decode(bytes: &[u8], name: &str) -> Result<String, ScatterError> {
     let bytes = bytes.strip_prefix(&[0xEF, 0xBB, 0xBF]).unwrap_or(bytes);
     let text =
         std::str::from_utf8(bytes).map_or_else(|_| bytes.iter().map(|&b| char::from(b)).collect(), str::to_owned);
-    // One kind of line end, as the reader would count the halves of CRLF to different records.
+    // Use one kind of line end: the reader would assign the two halves of CRLF to different records.
     Ok(if text.contains('\r') { text.replace("\r\n", "\n").replace('\r', "\n") } else { text })
 }
 
-/// The separator that the header has most of, outside quotes; a comma if it has none.
+/// The most frequent separator in the header, outside quotes; a comma if there is none.
 fn separator(text: &str) -> u8 {
     let header = text.lines().find(|line| !line.trim().is_empty() && !line.starts_with('#')).unwrap_or("");
     let mut counts = [(b',', 0), (b'\t', 0), (b';', 0)];
@@ -198,11 +198,11 @@ fn separator(text: &str) -> u8 {
             *count += u32::from(!quoted && byte == *separator);
         }
     }
-    // `max_by_key` takes the last of equals: the semicolon before the tab before the comma.
+    // `max_by_key` returns the last of equal elements, so the semicolon wins over the tab, and the tab over the comma.
     counts.into_iter().max_by_key(|&(_, count)| count).filter(|&(_, count)| count > 0).map_or(b',', |(s, _)| s)
 }
 
-/// Line of a record. The reader's position is before the empty lines and comments that it skips on the way to it.
+/// Line of a record. The reader reports the position before the empty lines and comments that it skips to get there.
 fn line_of(position: Option<&csv::Position>, text: &str) -> u64 {
     let Some(position) = position else { return 0 };
     let rest = usize::try_from(position.byte()).ok().and_then(|byte| text.get(byte..)).unwrap_or("");
@@ -236,11 +236,11 @@ struct LengthColumn {
 #[derive(Clone, Copy)]
 struct Limit {
     largest: f64,
-    /// What a cell beyond it is.
+    /// What is wrong with a cell beyond the limit.
     reason: &'static str,
 }
 
-/// Where the quantities are.
+/// The columns of the quantities.
 struct Columns {
     x: usize,
     y: usize,
@@ -250,7 +250,7 @@ struct Columns {
     species: Option<usize>,
 }
 
-/// Names of the columns of a position; the first pair that a file has counts.
+/// Names of the two columns of a position. The first pair that a file has is used.
 const POSITIONS: [(&str, &str, Coordinates); 9] = [
     ("x_m", "y_m", Coordinates::Planar),
     ("x", "y", Coordinates::Planar),
@@ -263,7 +263,7 @@ const POSITIONS: [(&str, &str, Coordinates); 9] = [
     ("longitude", "latitude", Coordinates::Geographic),
 ];
 
-/// Lower case, with each run of other characters than letters and digits as one `_` between words.
+/// The name in lower case, with each run of characters other than letters and digits replaced by one `_`.
 fn normalised(name: &str) -> String {
     let lower = name.to_lowercase();
     lower.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect::<Vec<_>>().join("_")
@@ -278,7 +278,7 @@ impl Columns {
             let found = header.iter().collect::<Vec<_>>().join(", ");
             return Err(ScatterError::NoPosition { name: name.to_owned(), found });
         };
-        // The only column that `select` accepts; two are an error, as either could be meant.
+        // The only column that `select` accepts. Two are an error, because either could be meant.
         let only = |quantity, select: &dyn Fn(&str) -> bool| {
             let mut matches = names.iter().enumerate().filter(|(_, name)| select(name)).map(|(index, _)| index);
             match (matches.next(), matches.next()) {
@@ -306,7 +306,7 @@ impl Columns {
         })
     }
 
-    /// What the column `index`, called `name` in lower case, is read for.
+    /// The quantity that is read from column `index`, whose name in lower case is `name`.
     fn meaning(&self, index: usize, name: &str) -> Option<String> {
         let length = |quantity: &str, column: LengthColumn| {
             let unit = match column.unit {
@@ -336,7 +336,7 @@ impl Columns {
         dbh.map(|column| length("diameter at breast height", column)).or(height.map(|column| length("height", column)))
     }
 
-    /// Possible values of x and y.
+    /// Limits of x and y.
     fn position_limits(&self) -> (Limit, Limit) {
         match self.coordinates {
             Coordinates::Planar => {
@@ -389,7 +389,7 @@ impl Cells<'_> {
         plain.ok()
     }
 
-    /// A number that must be there, within the limit on both sides of 0.
+    /// A required number, within plus or minus the limit.
     fn required(&mut self, record: &csv::StringRecord, line: u64, column: usize, limit: Limit) -> Option<f64> {
         let cell = record.get(column).unwrap_or("");
         if is_missing(cell) {
@@ -404,7 +404,7 @@ impl Cells<'_> {
         }
     }
 
-    /// A length above 0 in metres, at most `limit`; `None` where it is missing or bad.
+    /// A length in metres, above 0 and at most `limit`; `None` if it is missing or bad.
     fn length(&mut self, record: &csv::StringRecord, line: u64, column: LengthColumn, limit: f64) -> Option<f64> {
         let cell = record.get(column.index).unwrap_or("");
         if is_missing(cell) {

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! sequence (Halton, Hammersley, random) ─┐
-//! rules (density, slope, height, ...)  ──┼─ place() ──────────┐
+//! rules (density, slope, height, ...)  ──┼─ place_trees() ────┐
 //! ground (anything that is a Ground)   ──┤                    ├─ Stand ─┬─ PackedStand (GPU: trees by cell)
 //! inventory (CSV) ───────────────────────┴─ stand_from_inventory()       └─ cover_map() (shade of the far floor)
 //! ```
@@ -37,7 +37,7 @@ pub use inventory::{
 };
 pub use inventory_stand::{InventorySpecies, InventoryStand, InventoryWarnings, stand_from_inventory};
 pub use packed::{Cell, CellGrid, PackedStand, PackedTree, PlantSize};
-pub use placement::{Placement, PlacementReport, place};
+pub use placement::{Placement, PlacementReport, place_trees};
 pub use rules::{ClearingNoise, PlacementRules, Sequence, SizeRule, SpeciesRule};
 pub use stand::{Area, Ground, MAX_COORDINATE_M, MAX_SCALE, MIN_SCALE, Stand, Tree};
 pub use stream::{Stream, random};

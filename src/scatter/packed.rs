@@ -49,7 +49,7 @@ pub const MAX_HEIGHT_M: f64 = 100_000.0;
 pub const MAX_PLANT_M: f32 = 1000.0;
 
 /// Steps of a position along a cell's side.
-pub const PLACE_STEPS: f32 = 65535.0;
+pub const POSITION_STEPS: f32 = 65535.0;
 /// Bits of the yaw, the lowest of [`PackedTree::look`].
 pub const YAW_BITS: u32 = 8;
 /// First bit of the scale.
@@ -160,7 +160,7 @@ impl PackedTree {
         let DVec3 { x, y, z } = tree.position;
         let axis = |value: f64, base: i32| {
             let (cell, share) = grid.locate(value)?;
-            let inside = ((share * f64::from(PLACE_STEPS)).round() as u32).min(PLACE_STEPS as u32);
+            let inside = ((share * f64::from(POSITION_STEPS)).round() as u32).min(POSITION_STEPS as u32);
             let cell = cell.checked_sub(base).filter(|cell| (-MAX_CELLS / 2..MAX_CELLS / 2).contains(cell))?;
             Some((cell as u32 & mask(CELL_BITS), inside))
         };
@@ -211,7 +211,7 @@ impl PackedTree {
     /// Scene-local position of the foot, metres.
     pub fn position(&self, grid: &CellGrid) -> DVec3 {
         let (ix, iz) = self.cell_index(grid);
-        let axis = |cell: i32, step: u32| (f64::from(cell) + f64::from(step) / f64::from(PLACE_STEPS)) * grid.size;
+        let axis = |cell: i32, step: u32| (f64::from(cell) + f64::from(step) / f64::from(POSITION_STEPS)) * grid.size;
         DVec3::new(axis(ix, self.xz & 0xFFFF), self.y.into(), axis(iz, self.xz >> 16))
     }
 

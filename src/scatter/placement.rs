@@ -1,15 +1,17 @@
-//! From rules to a stand.
+//! Places trees by rules.
 //!
-//! Candidates are the points of the sequence, mapped to the area and, for a low-discrepancy sequence, shifted by the
-//! seed modulo one ([Cranley & Patterson 1976]: the points stay as even). A candidate is dropped where the rules forbid
-//! a tree; what stays has the wanted density wherever trees may stand, since the candidates have it everywhere.
+//! Candidates are the points of the sequence, mapped to the area. Those of a low-discrepancy sequence are also shifted
+//! by the seed, modulo one, which leaves them as even as they were [Cranley & Patterson 1976]. A candidate is dropped
+//! where the rules forbid a tree. Since the candidates have the wanted density everywhere, the remaining ones have it
+//! wherever trees may stand.
 //!
-//! A least distance drops further ones, the lower index wins (dart throwing, [Cook 1986]). More candidates then follow
-//! until the density is met again: Halton and random points go on where they ended. Hammersley points cannot go on, so
-//! a larger set is taken, and what it has in excess is drawn by lot.
+//! A minimum distance drops more candidates: of two that are too close, the one with the lower index stays (dart
+//! throwing, [Cook 1986]). Then more candidates follow until the density is met again. Halton and random points
+//! continue where they ended. Hammersley points cannot continue, so a larger set replaces them, and its surplus is
+//! removed at random.
 //!
-//! Cost: the points and rules run on all threads, the distance on one. One million trees with ground look-ups take some
-//! 0.2 s on two cores, with a least distance some 0.5 s.
+//! Cost: the points and rules run on all threads, the minimum distance on one. One million trees with ground look-ups
+//! take about 0.2 s on two cores, with a minimum distance about 0.5 s.
 
 use std::ops::Range;
 
@@ -27,11 +29,11 @@ use crate::math::{
     hash::{self, hash64, unit_f32, unit_f64},
 };
 
-/// Points that one task evaluates: two rounds of the ternary table.
+/// Points per task: two rounds of the ternary table.
 const CHUNK: u64 = 4374;
 
-/// Candidates for each tree of the full area before a least distance is given up. 64 times 32 million trees still have
-/// indices of 32 bits.
+/// Maximum number of candidates per tree of the full area; then a minimum distance leaves trees out. 64 times 32
+/// million trees still fit into 32-bit indices.
 const MAX_EFFORT: u64 = 64;
 
 /// A stand and how its rules were met.
@@ -52,19 +54,19 @@ pub struct PlacementReport {
     pub placed: u32,
     /// Candidates tried.
     pub candidates: u64,
-    /// Hectares of the area where the rules allow trees, margins of clearings by their density; known from the
-    /// candidates, so to about one part in the square root of the wanted trees, or better.
+    /// Hectares on which the rules allow trees; margins of clearings count by their density. Estimated from the
+    /// candidates, with a relative error of about one over the square root of the wanted trees, or less.
     pub allowed_hectares: f64,
-    /// Trees placed on a hectare of allowed ground; 0 where there is none.
+    /// Trees placed per hectare of allowed ground; 0 if there is none.
     pub stems_per_hectare: f64,
 }
 
-/// Places trees by `rules` on `ground`. The result depends on the arguments only, not on the number of threads.
+/// Places trees on `ground` by `rules`. The result depends only on the arguments, not on the number of threads.
 ///
 /// # Errors
 /// [`ScatterError::Rule`] and [`ScatterError::TooManyTrees`] for rules that cannot be met, see
-/// [`PlacementRules::validate`]. Rules that merely leave no allowed ground give an empty stand.
-pub fn place<G: Ground + ?Sized>(rules: &PlacementRules, ground: &G) -> Result<Placement, ScatterError> {
+/// [`PlacementRules::validate`]. Rules that allow no ground at all give an empty stand.
+pub fn place_trees<G: Ground + ?Sized>(rules: &PlacementRules, ground: &G) -> Result<Placement, ScatterError> {
     rules.validate()?;
     let placer = Placer {
         rules,
@@ -99,12 +101,12 @@ struct Placer<'a, G: ?Sized> {
     ground: &'a G,
     clearings: Option<ClearingMask>,
     total_weight: f64,
-    /// No species has limits of its own.
+    /// Whether no species has its own limits.
     unrestricted: bool,
 }
 
 impl<G: Ground + ?Sized> Placer<'_, G> {
-    /// The allowed trees among the candidates `range` of a set of `count`, in order.
+    /// The allowed trees among the candidates in `range` of a set of `count`, in order.
     fn candidates(&self, range: Range<u64>, count: u64) -> Vec<Tree> {
         let chunks = (range.end - range.start).div_ceil(CHUNK);
         let parts: Vec<Vec<Tree>> = (0..chunks)
@@ -171,7 +173,7 @@ impl<G: Ground + ?Sized> Placer<'_, G> {
         })
     }
 
-    /// Draws a species among those that grow at this height and slope.
+    /// Chooses a species at random among those that grow at this height and slope.
     fn species(&self, index: u64, height: f64, slope: f32) -> Option<&SpeciesRule> {
         let grows = |species: &&SpeciesRule| {
             species.height_range_m.is_none_or(|(low, high)| (low..=high).contains(&height))
@@ -202,7 +204,7 @@ impl<G: Ground + ?Sized> Placer<'_, G> {
         SpacingGrid::new(self.rules.area, self.rules.min_distance_m, wanted as f64)
     }
 
-    /// Least distance for a sequence: goes on with further candidates until as many trees stand as `first` has.
+    /// Applies the minimum distance to a sequence: adds candidates until there are as many trees as in `first`.
     fn space_sequence(&self, first: Vec<Tree>, full: u64) -> (Vec<Tree>, u64) {
         let wanted = first.len();
         let mut grid = self.grid(wanted);
@@ -210,7 +212,7 @@ impl<G: Ground + ?Sized> Placer<'_, G> {
         trees.retain(|tree| grid.insert(tree.position.xz_plane()));
         let mut tried = full;
         while trees.len() < wanted && tried < full.saturating_mul(MAX_EFFORT) {
-            // The missing trees at the rate of allowed ground, twice over as some will be too near.
+            // Twice as many as the missing trees need at the current rate of allowed ground: some will be too close.
             let missing = (wanted - trees.len()) as f64 / wanted as f64 * full as f64;
             let batch = ((2.0 * missing) as u64).clamp(CHUNK.min(full), full.saturating_mul(2));
             let end = (tried + batch).min(full.saturating_mul(MAX_EFFORT));
@@ -224,7 +226,8 @@ impl<G: Ground + ?Sized> Placer<'_, G> {
         (trees, tried)
     }
 
-    /// Least distance for a set of fixed size: takes larger sets until enough trees stand, then thins by lot.
+    /// Applies the minimum distance to a set of fixed size: takes larger sets until there are enough trees, then thins
+    /// them at random.
     fn space_set(&self, first: Vec<Tree>, full: u64) -> (Vec<Tree>, u64) {
         let wanted = first.len();
         let (mut trees, mut count) = (first, full);

@@ -20,7 +20,7 @@ pub const MAX_TREES: u32 = 32_000_000;
 pub const MAX_DISC_COVER: f64 = 0.45;
 
 /// The point sequence of candidate positions for trees.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, bevy::reflect::Reflect)]
 pub enum Sequence {
     /// Halton points in bases 2 and 3: even, with a natural look. The default.
     #[default]
@@ -32,7 +32,7 @@ pub enum Sequence {
 }
 
 /// Meadows: ground that a smooth noise keeps free of trees.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, bevy::reflect::Reflect)]
 #[serde(deny_unknown_fields, default)]
 pub struct ClearingNoise {
     /// Typical distance from one clearing to the next, metres, 1 to 100000. In a scene file: `wavelength`. Default 400.

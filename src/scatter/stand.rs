@@ -47,7 +47,7 @@ impl<G: Ground + ?Sized> Ground for &G {
 ///
 /// A scene file writes its sides, `(west: -100, south: -90, east: 80, north: 70)`: see
 /// [`from_sides`](Self::from_sides).
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, bevy::reflect::Reflect)]
 #[serde(from = "Sides")]
 pub struct Area {
     /// Smallest X and Z.
@@ -106,7 +106,7 @@ impl Area {
 }
 
 /// One tree of a stand.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, bevy::reflect::Reflect)]
 pub struct Tree {
     /// The foot of the trunk: on the ground, or a little below it on a slope (see `sink`). Scene-local metres.
     pub position: DVec3,

@@ -43,6 +43,8 @@ pub struct GroundFile {
 }
 
 /// A greyscale height image; its top is north. It has no location on earth: `place` must state one.
+///
+/// Its values beside `path` are an [`ImageScale`], written without brackets of their own.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GroundImage {
@@ -58,6 +60,9 @@ pub struct GroundImage {
 }
 
 /// Ground made of fractal noise. It has no location on earth: `place` must state one.
+///
+/// A scene gives the size in metres; [`NoiseTerrain`](crate::terrain::NoiseTerrain) has the number of samples instead,
+/// which follows from size and spacing.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct GroundNoise {

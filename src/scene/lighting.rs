@@ -18,14 +18,16 @@ use crate::{
 pub enum Lighting {
     /// Each leaf by its own normal, without occlusion of the sky: nothing is baked. For comparison.
     Local,
-    /// By the implicit surface of the crown [Luft 2007]: light follows the crown's shape, its inside is dark. By default with
-    /// constants that are fitted to traced plants; `Expressive(ambient: Published, weighting: Primitives)` is as published.
+    /// By the implicit surface of the crown [Luft 2007]: light follows the crown's shape, its inside is dark. By
+    /// default with constants that are fitted to traced plants; `Expressive(ambient: Published, weighting: Primitives)`
+    /// is as published.
     Expressive(ImplicitSettings),
     /// The sky by radiance transfer, the sun by shadow maps [Franzke 2005]: closest to the ground truth.
     Transfer(Transfer),
 }
 
-/// Radiance transfer, in a user's terms: [`TransferSettings`] has more options than a scene needs.
+/// Radiance transfer, in a user's terms: [`TransferSettings`] has more options than a scene needs, and how the sun
+/// lights full models is no part of a bake.
 #[derive(Clone, Debug, PartialEq, Deserialize, Reflect)]
 #[reflect(Default)]
 #[serde(deny_unknown_fields, default)]

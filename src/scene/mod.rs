@@ -79,7 +79,7 @@ use serde::Deserialize;
 use check::Check;
 
 /// A scene: terrain, trees, location, camera and quality.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, bevy::reflect::TypePath)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// Name for titles and messages. Default: the file's name without its ending.

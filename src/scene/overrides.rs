@@ -3,7 +3,7 @@
 use super::{Lighting, Scene};
 
 /// Values that replace a scene's own. The default replaces nothing.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, bevy::reflect::Reflect)]
 pub struct Overrides {
     /// The seed.
     pub seed: Option<u64>,
@@ -11,6 +11,7 @@ pub struct Overrides {
     pub msaa: Option<u32>,
     /// The lighting of all species. A species that already has this kind of lighting keeps its own values, except for
     /// how the sun lights it.
+    #[reflect(ignore)]
     pub lighting: Option<Lighting>,
 }
 

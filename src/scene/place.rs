@@ -7,7 +7,10 @@ use super::ground::Ground;
 use super::time::LocalTime;
 use crate::light::MoonSetting;
 
-/// Location and time of a scene.
+/// Location and time of a scene, as far as the scene states them.
+///
+/// An [`Observer`](crate::light::sun::Observer) has a location in any case, that of the terrain file if need be, and a
+/// height and an air pressure, which follow from the terrain.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Place {

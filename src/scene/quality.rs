@@ -14,7 +14,8 @@ const REPRESENTATIONS: [Representation; 2] = [Representation::MODEL, Representat
 pub struct QualityLevel {
     /// Name of the representation: `"model"` or `"cross"`.
     pub draw: String,
-    /// Distance in metres at which it begins to give way to the next level, 0 to 200000. Without effect in the last level.
+    /// Distance in metres at which it begins to give way to the next level, 0 to 200000. Without effect in the last
+    /// level.
     #[serde(default)]
     pub until: f64,
     /// Width in metres of the band over which it does, 0.1 to 1000. Default 20.
@@ -26,7 +27,10 @@ fn default_fade() -> f64 {
     20.0
 }
 
-/// Drawing quality.
+/// Drawing quality: the few values that a user trades against run time.
+///
+/// The passes' own settings ([`Levels`], [`SunShadowSettings`](crate::render::components::SunShadowSettings), ...)
+/// belong to different entities and have further values, which follow from these or are constants.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Quality {
@@ -38,20 +42,20 @@ pub struct Quality {
     /// Distance in metres up to which the sun casts shadows, 10 to 20000. Higher: farther, coarser. Default 800.
     pub shadow_distance: f64,
     /// Distance in metres up to which trees are drawn as full models, 0 to 5000. Higher: truer, slower. Default 60.
-    /// Beyond are crosses, which are lit with constants of their own, set by eye (bulge, shadow of the own crown, bias) and,
-    /// with radiance transfer, the hot spot fitted to traced dense stands of oaks and of grown trees: the stands that
-    /// `docs/measurements/near-trees-against-ground-truth.md` judges crosses by.
+    /// Beyond are crosses, which are lit with constants of their own, set by eye (bulge, shadow of the own crown, bias)
+    /// and, with radiance transfer, the hot spot fitted to traced dense stands of oaks and of grown trees: the stands
+    /// that `docs/measurements/near-trees-against-ground-truth.md` judges crosses by.
     pub near_distance: f64,
     /// Width in metres of the band behind `near_distance` in which models fade into crosses, 0.1 to 1000.
     /// Wider: softer change, more trees drawn twice. Default 20.
     pub fade_band: f64,
-    /// The levels of detail from near to far, at most 8. Default: empty, which is `"model"` until `near_distance` and `"cross"`
-    /// behind it; a list replaces both values.
+    /// The levels of detail from near to far, at most 8. Default: empty, which is `"model"` until `near_distance` and
+    /// `"cross"` behind it; a list replaces both values.
     pub levels: Vec<QualityLevel>,
     /// Samples per pixel, 1 or 4. 4: smooth leaf edges, slower. Default 4.
     pub msaa: u32,
-    /// Edge of a cross plane's picture in texels, 64 to 1024, rounded up to a power of two. Higher: sharper far trees, memory.
-    /// Default 256.
+    /// Edge of a cross plane's texture in texels, 64 to 1024, rounded up to a power of two. Higher: sharper far trees,
+    /// memory. Default 256.
     pub cross_resolution: u32,
     /// Distance in metres beyond which no tree is drawn, 100 to 200000. Default 20000.
     pub view_distance: f64,

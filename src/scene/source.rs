@@ -9,11 +9,11 @@ use std::{
 use super::{Scene, SceneError};
 
 /// The source of a scene: a file to read, or an existing scene.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, bevy::reflect::Reflect)]
 pub enum SceneSource {
     /// A scene file.
     File(PathBuf),
-    /// A scene that was built in code or read before.
+    /// A scene that was built in code or read before. Reflection takes it as one value.
     Value(Arc<Scene>),
 }
 

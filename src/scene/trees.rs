@@ -23,8 +23,11 @@ pub enum Trees {
     Inventory(InventoryTrees),
 }
 
-/// Placement rules.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+/// Placement rules for all species of a scene.
+///
+/// [`PlacementRules`](crate::scatter::PlacementRules) are the same for known ground and plants: angles in radians, the
+/// area cut to the terrain, and the scene's seed and species.
+#[derive(Clone, Debug, PartialEq, Deserialize, bevy::reflect::Reflect)]
 #[serde(deny_unknown_fields, default)]
 pub struct ScatteredTrees {
     /// Stems per hectare of ground where trees stand (clearings, cliffs and the like not counted), 0.01 to 100000.
@@ -39,8 +42,8 @@ pub struct ScatteredTrees {
     pub slope_limit: f64,
     /// Range of wooded ground heights in metres above the terrain's datum. Default: everywhere.
     pub elevation: Option<(f64, f64)>,
-    /// The wooded part of the terrain, `(west: ..., south: ..., east: ..., north: ...)` in metres from its centre, east and
-    /// north positive. Default: all of it.
+    /// The wooded part of the terrain, `(west: ..., south: ..., east: ..., north: ...)` in metres from its centre, east
+    /// and north positive. Default: all of it.
     pub area: Option<Area>,
     /// Treeless patches where smooth noise is high: `(wavelength: 400, share: 0.1, edge: 0.15)`. Default: none.
     pub clearings: Option<ClearingNoise>,
@@ -62,7 +65,7 @@ impl Default for ScatteredTrees {
 
 /// Trees from a CSV file with a header line. Columns are found by name: `x` and `y` in metres (required), `dbh`,
 /// `height` and `species`; a unit in a column's name (`dbh_cm`, `height_m`) overrides the one stated here.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, bevy::reflect::Reflect)]
 #[serde(deny_unknown_fields)]
 pub struct InventoryTrees {
     /// The file, relative to the scene file. Required.
@@ -93,7 +96,7 @@ pub struct InventoryTrees {
 }
 
 /// What an inventory's coordinates are measured from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, bevy::reflect::Reflect)]
 pub enum Anchor {
     /// From the terrain's centre. Older scene files call it `Centre`.
     #[default]

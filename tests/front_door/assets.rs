@@ -5,7 +5,10 @@ use bevy::{
     prelude::*,
 };
 use canopy::{
-    bake::lighting::LightingSettings, components::ForestPlugin, plant::grow::GrowParameters, prelude::*,
+    bake::{BakedPlant, lighting::LightingSettings},
+    components::ForestPlugin,
+    plant::{LeafKind, PartKind, grow::GrowParameters},
+    prelude::*,
     terrain::Terrain,
 };
 
@@ -41,6 +44,48 @@ fn a_glb_is_one_plant_and_is_scaled_by_its_settings() {
     assert_eq!((plant.name.as_str(), plant.individuals.len()), ("oak", 1));
     assert!((plant.individuals[0].size().height - 20.0).abs() < 0.01);
     assert!(plant.warnings.is_empty(), "{:?}", plant.warnings);
+}
+
+/// Light through the leaves of a plant's individuals.
+fn transmission(plant: &PlantAsset) -> Vec<Vec3> {
+    let foliage = |baked: &BakedPlant| {
+        let parts = baked.plant.parts.iter().filter(|part| part.kind == PartKind::Foliage);
+        parts.map(|part| part.material.transmission).next()
+    };
+    plant.individuals.iter().filter_map(foliage).collect()
+}
+
+#[test]
+fn the_kind_of_leaf_decides_how_much_light_passes() {
+    let species = species(1, (8.0, 12.0));
+    let needles = species.replacen("lighting", "leaf: Needle, lighting", 1);
+    let grown = "(name: \"bush\", plant: Grown(form: Broadleaf, individuals: 1, triangles: 5000), lighting: Local, \
+                 leaf: Leathery, height: (3, 5))";
+    let mut program = Program::new(&[
+        ("tree.glb", &tree()),
+        ("broad.species.ron", species.as_bytes()),
+        ("needles.species.ron", needles.as_bytes()),
+        ("grown.species.ron", grown.as_bytes()),
+    ]);
+    let mut load = |path: &'static str, leaf: LeafKind| {
+        let settings = move |settings: &mut PlantSettings| {
+            quick(settings);
+            settings.leaf = leaf;
+        };
+        let handle = program.server().load_builder().with_settings(settings).load(path);
+        let plant = program.loaded::<PlantAsset>(&handle).expect("a plant");
+        // Another load of the same path would get the same asset, with the settings of the first.
+        drop(handle);
+        program.app.update();
+        program.app.update();
+        transmission(&plant)
+    };
+    for leaf in [LeafKind::Thin, LeafKind::Needle] {
+        assert_eq!(load("tree.glb", leaf), [leaf.transmission()]);
+        assert_eq!(load("broad.species.ron", leaf), [leaf.transmission()], "a species that does not say");
+    }
+    assert_eq!(load("needles.species.ron", LeafKind::Young), [LeafKind::Needle.transmission()]);
+    assert_eq!(load("grown.species.ron", LeafKind::Young), [LeafKind::Leathery.transmission()]);
 }
 
 #[test]

@@ -27,7 +27,7 @@ fn row(fields: &str) -> Stage {
 }
 
 /// The light of the row's crowns, from the south (0) and towards the sun (1).
-fn crowns(stage: &Stage, name: &str) -> [(canopy::app::Picture, f64); 2] {
+fn crowns(stage: &Stage, name: &str) -> [(canopy::app::RenderedImage, f64); 2] {
     let mut renderer = showing(stage);
     let views = [view(stage, (0.0, 6.0, 15.0), 0.0, 4.0), view(stage, (14.0, 5.0, 4.0), 285.0, 8.0)];
     [0, 1].map(|side| {
@@ -79,7 +79,7 @@ fn gloss_moves_light_and_makes_none() {
         }
     }
     // Matt leaves have the light from behind of their whole colour; what gloss takes from it is its own light.
-    let ratios = |light: &[(canopy::app::Picture, f64); 2]| [0, 1].map(|side| light[side].1 / matt[side].1);
+    let ratios = |light: &[(canopy::app::RenderedImage, f64); 2]| [0, 1].map(|side| light[side].1 / matt[side].1);
     for ratio in ratios(&leaf).into_iter().chain(ratios(&wax)) {
         assert!((0.6..1.3).contains(&ratio), "{:?} {:?}", ratios(&leaf), ratios(&wax));
     }

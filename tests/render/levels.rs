@@ -7,7 +7,7 @@ use bevy::{
     render::{RenderApp, renderer::RenderDevice},
 };
 use canopy::{
-    app::{Picture, Renderer},
+    app::{RenderedImage, Renderer},
     bake::{BakedLevel, BakedPlant},
     prelude::*,
     render::forest::{ForestStatistics, LevelStatistics},
@@ -45,7 +45,7 @@ fn a_program_adds_a_level_of_its_own() {
     let built = trees_at(&[near.as_slice(), &far].concat(), 1);
     let stage = &built.stage;
     let from = view(stage, (0.0, 9.0, 60.0), 0.0, -5.0);
-    let at = |picture: &Picture, tree: DVec2| -> Vec<u8> {
+    let at = |picture: &RenderedImage, tree: DVec2| -> Vec<u8> {
         let foot = stage.terrain.height(tree.x, tree.y);
         let pixel = project(&from, SIZE, DVec3::new(tree.x, foot + 5.0, tree.y)).expect("before the camera");
         let first = 3 * (pixel.y as u32 * SIZE.0 + pixel.x as u32) as usize;

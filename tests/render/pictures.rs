@@ -1,7 +1,7 @@
 //! Whole images: against references, against each other, and that each depends on its arguments alone.
 
 use canopy::{
-    app::Picture,
+    app::RenderedImage,
     assets::Stage,
     lod::{FadeBand, Levels},
     render::components::{CanopyOrigin, Forest, SunShadowSettings},
@@ -22,7 +22,7 @@ pub fn over_the_grove(stage: &Stage) -> Viewpoint {
 }
 
 #[track_caller]
-fn whole(picture: &Picture) -> f64 {
+fn whole(picture: &RenderedImage) -> f64 {
     luminance(mean_color(picture, |_, _| true))
 }
 
@@ -44,7 +44,7 @@ fn noon_dusk_and_night_look_like_their_references() {
     let [r, _, b] = mean_color(&night, |_, _| true);
     assert!(b > 1.2 * r, "red {r} blue {b}");
     // The rim of the sky is warm at dusk, not at noon.
-    let warmth = |picture: &Picture| {
+    let warmth = |picture: &RenderedImage| {
         let [r, _, b] = mean_color(picture, |_, row| row < SIZE.1 / 5);
         r / b
     };
@@ -135,7 +135,7 @@ fn crowns_are_lit_and_the_ground_below_them_is_dark() {
 }
 
 /// The grove from afar, with its change from models to crosses at `distance` metres.
-fn changing_at(stage: &Stage, distance: f32, at: &str) -> Picture {
+fn changing_at(stage: &Stage, distance: f32, at: &str) -> RenderedImage {
     let mut renderer = renderer(1);
     renderer.set_instant(stage, instant(at));
     renderer.set_view(&view(stage, (0.0, 12.0, 170.0), 0.0, -3.0));
@@ -163,7 +163,7 @@ fn crosses_have_the_light_of_their_models() {
         keep(&models, &format!("models-{hour}"));
         keep(&crosses, &format!("crosses-{hour}"));
         // What is green in both, and not the same: leaves, without the sky between them.
-        let pixel = |picture: &Picture, column: u32, row: u32| {
+        let pixel = |picture: &RenderedImage, column: u32, row: u32| {
             let first = 3 * (row * picture.width + column) as usize;
             [0, 1, 2].map(|channel| u32::from(picture.pixels[first + channel]))
         };
@@ -171,7 +171,7 @@ fn crosses_have_the_light_of_their_models() {
             let [a, b] = [&models, &crosses].map(|picture| pixel(picture, column, row));
             a != b && [a, b].iter().all(|[_, green, blue]| 4 * green > 5 * blue)
         };
-        let light = |picture: &Picture| luminance(mean_color(picture, is_leaf));
+        let light = |picture: &RenderedImage| luminance(mean_color(picture, is_leaf));
         let [same, other] = [&crosses, &night].map(|picture| light(picture) / light(&models));
         assert!((0.85..1.15).contains(&same), "{at}: {same} of the models' light");
         assert!(!(0.85..1.15).contains(&other), "{at}: {other} of the models' light at night");
@@ -185,7 +185,7 @@ fn an_image_depends_on_its_arguments_alone() {
     let stage = &built.stage;
     let here = over_the_grove(stage);
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let bytes = |picture: &Picture, name: &str| {
+    let bytes = |picture: &RenderedImage, name: &str| {
         let path = folder.path().join(name);
         picture.save(&path, &[("Software", "test".to_owned())]).expect("an image on disk");
         std::fs::read(path).expect("the image")
@@ -205,7 +205,7 @@ fn an_image_depends_on_its_arguments_alone() {
 
 /// An image of the grove's trees alone, with the whole scene moved by `offset` metres.
 #[track_caller]
-fn moved(stage: &Stage, offset: DVec3, cascades: usize) -> Picture {
+fn moved(stage: &Stage, offset: DVec3, cascades: usize) -> RenderedImage {
     let mut renderer = renderer(4);
     let mut view = over_the_grove(stage);
     view.position += offset;

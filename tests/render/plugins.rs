@@ -9,10 +9,11 @@ use bevy::{
 };
 use canopy::{
     CanopyPlugins,
+    components::{Forest3d, ForestPlugin, ScenePlugin, Sun, SunPlugin, Terrain3d},
     render::{forest::GpuForests, shaders::CanopyShaders},
 };
 
-use crate::support::gpu::gpu;
+use crate::support::gpu::{Gpu, gpu};
 
 #[test]
 fn canopy_may_stand_before_bevys_own_plugins() {
@@ -59,4 +60,61 @@ fn without_a_renderer_canopy_says_what_is_missing() {
     assert!(messages.iter().any(|message| message.contains("draws nothing")), "{messages:?}");
     assert!(messages.iter().any(|message| message.contains("assets cannot be loaded")), "{messages:?}");
     assert!(messages.iter().all(|message| message.contains("DefaultPlugins")), "{messages:?}");
+}
+
+/// The messages of an app with these plugins after some frames.
+fn messages_of(gpu: &Gpu, add: impl FnOnce(&mut App)) -> Vec<String> {
+    let mut app = App::new();
+    add(&mut app);
+    app.finish();
+    app.cleanup();
+    for _ in 0..3 {
+        app.update();
+    }
+    gpu.messages()
+}
+
+#[test]
+fn beside_the_minimal_plugins_canopy_says_what_is_missing_in_either_order() {
+    for first in [true, false] {
+        let gpu = gpu();
+        let messages = messages_of(&gpu, |app| {
+            if first {
+                app.add_plugins((CanopyPlugins, MinimalPlugins));
+            } else {
+                app.add_plugins((MinimalPlugins, CanopyPlugins));
+            }
+            // What a program spawns is there, and waits.
+            app.world_mut().spawn(Sun::default());
+            app.world_mut().spawn(Forest3d::scatter(10.0));
+            app.world_mut().spawn(Terrain3d::default());
+        });
+        assert_eq!(messages.len(), 2, "{messages:?}");
+        assert!(messages.iter().all(|message| message.contains("Canopy") && message.contains("DefaultPlugins")));
+        for missing in ["AssetPlugin", "RenderPlugin", "CorePipelinePlugin"] {
+            assert!(messages.iter().any(|message| message.contains(missing)), "{missing} is not named: {messages:?}");
+        }
+    }
+}
+
+#[test]
+fn one_plugin_alone_names_those_that_it_needs() {
+    let cases: [(fn(&mut App), &[&str]); 3] = [
+        (|app| _ = app.add_plugins(ScenePlugin), &["CanopyRenderPlugin", "SunPlugin"]),
+        (|app| _ = app.add_plugins((ScenePlugin, SunPlugin)), &["CanopyRenderPlugin"]),
+        (|app| _ = app.add_plugins(ForestPlugin), &["CanopyRenderPlugin", "CanopyAssetPlugin"]),
+    ];
+    for (number, (add, missing)) in cases.into_iter().enumerate() {
+        let gpu = gpu();
+        let messages = messages_of(&gpu, |app| {
+            app.add_plugins(MinimalPlugins);
+            add(app);
+        });
+        assert_eq!(messages.len(), missing.len(), "{number}: {messages:?}");
+        for name in missing {
+            let named =
+                |message: &String| message.contains(&format!("without `{name}`")) && message.contains("CanopyPlugins");
+            assert!(messages.iter().any(named), "{number}: {name} is not named: {messages:?}");
+        }
+    }
 }

@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use canopy::{
-    app::{Picture, Renderer},
+    app::{RenderedImage, Renderer},
     assets::Stage,
     light::{Atmosphere, AtmosphereParams, LightSettings, LightState, SunPosition},
     render::components::{Daylight, Forest, SunShadowSettings},
@@ -32,7 +32,7 @@ fn from_above(stage: &Stage) -> Viewpoint {
 }
 
 #[track_caller]
-fn lit(renderer: &mut Renderer, view: &Viewpoint, light: Daylight, shadow: SunShadowSettings) -> Picture {
+fn lit(renderer: &mut Renderer, view: &Viewpoint, light: Daylight, shadow: SunShadowSettings) -> RenderedImage {
     renderer.set_view(view);
     renderer.app().world_mut().insert_resource(light);
     renderer.set_shadow(shadow);
@@ -44,7 +44,7 @@ fn settings(cascades: usize) -> SunShadowSettings {
 }
 
 #[track_caller]
-fn patch(picture: &Picture, view: &Viewpoint, point: DVec3) -> f64 {
+fn patch(picture: &RenderedImage, view: &Viewpoint, point: DVec3) -> f64 {
     let at = project(view, SIZE, point).expect("before the camera");
     luminance(mean_color(picture, |column, row| {
         (DVec2::new(f64::from(column), f64::from(row)) + 0.5 - at).abs().max_element() <= 2.5

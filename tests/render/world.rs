@@ -11,7 +11,7 @@ use bevy::{
     render::{RenderApp, render_resource::TextureFormat, view::Msaa},
 };
 use canopy::{
-    app::{Picture, Renderer},
+    app::{RenderedImage, Renderer},
     assets::Stage,
     bake::{
         BakeSettings, BakedLevel, BakedPlant, bake_plant,
@@ -45,7 +45,7 @@ fn cube(renderer: &mut Renderer, size: f32, place: DVec3) -> Entity {
 }
 
 /// Pixels that are red as nothing in a forest is.
-fn red(picture: &Picture) -> usize {
+fn red(picture: &RenderedImage) -> usize {
     let is_red = |pixel: &&[u8]| f32::from(pixel[0]) > 2.0 * f32::from(pixel[1].max(pixel[2])) && pixel[0] > 60;
     picture.pixels.chunks(3).filter(is_red).count()
 }
@@ -63,7 +63,7 @@ fn despawn_forests(renderer: &mut Renderer) {
 
 /// Draws what is there twice: what was spawned is on the device in the second frame.
 #[track_caller]
-fn settled(renderer: &mut Renderer, stage: &Stage, view: &Viewpoint) -> Picture {
+fn settled(renderer: &mut Renderer, stage: &Stage, view: &Viewpoint) -> RenderedImage {
     renderer.set_instant(stage, instant(NOON));
     renderer.set_view(view);
     again(renderer);
@@ -126,7 +126,7 @@ fn a_mesh_casts_its_shadow_onto_the_ground() {
     let spot = DVec3::new(0.0, 12.0, 0.0) - sun * (12.0 / sun.y);
     let share = |point: DVec3| {
         let at = project(&from, SIZE, point).expect("before the camera");
-        let mean = |picture: &Picture| {
+        let mean = |picture: &RenderedImage| {
             luminance(mean_color(picture, |column, row| {
                 (DVec2::new(f64::from(column), f64::from(row)) + 0.5 - at).abs().max_element() <= 1.5
             }))
@@ -267,7 +267,7 @@ fn motion_vectors_are_refused() {
 }
 
 /// The grove's trees alone, with `place` on the forest's entity.
-fn placed(stage: &Stage, place: impl Bundle) -> Picture {
+fn placed(stage: &Stage, place: impl Bundle) -> RenderedImage {
     let mut renderer = super::renderer(1);
     renderer.set_instant(stage, instant(NOON));
     renderer.set_view(&super::pictures::over_the_grove(stage));
@@ -350,7 +350,7 @@ fn an_ordinary_mesh_receives_the_shadow_of_trees() {
     let (shaded, open) = (seen(true, true), seen(true, false));
     keep(&shaded, "shaded-plate");
     // Where the plate lies far from the tree both are alike; in the tree's shadow the plate is darker.
-    let darker = |a: &Picture, b: &Picture| {
+    let darker = |a: &RenderedImage, b: &RenderedImage| {
         let dark = |(a, b): (&[u8], &[u8])| luminance(linear(a)) < 0.7 * luminance(linear(b));
         a.pixels.chunks(3).zip(b.pixels.chunks(3)).filter(|(a, b)| dark((a, b))).count()
     };

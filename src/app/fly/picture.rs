@@ -18,7 +18,7 @@ use chrono::{DateTime, Utc};
 
 use super::{session::Session, settings::SettingsPanel};
 use crate::{
-    app::{error::AppError, notes::notes, picture::Picture},
+    app::{error::AppError, notes::notes, rendered_image::RenderedImage},
     components::DrawnSun,
     render::components::ViewOptions,
 };
@@ -57,10 +57,10 @@ pub fn save_image(
     commands.spawn(Screenshot::primary_window()).observe(save);
 }
 
-fn picture(image: &Image) -> Result<Picture, AppError> {
+fn picture(image: &Image) -> Result<RenderedImage, AppError> {
     let failed = |error: &dyn std::fmt::Display| AppError::Render(format!("the image could not be read back: {error}"));
     let pixels = image.clone().try_into_dynamic().map_err(|error| failed(&error))?.to_rgb8();
-    Ok(Picture { width: pixels.width(), height: pixels.height(), pixels: pixels.into_raw() })
+    Ok(RenderedImage { width: pixels.width(), height: pixels.height(), pixels: pixels.into_raw() })
 }
 
 /// An unused file name in the working directory: date, time (UTC) and a number.

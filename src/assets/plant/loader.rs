@@ -26,9 +26,9 @@ use crate::{
 
 /// Loads [`PlantAsset`]s: glTF files (.glb, .gltf) and species files (.species.ron).
 ///
-/// A species file has its own lighting and gloss; the other bake values of [`PlantSettings`] apply to it too. The
-/// loader is registered only for the ending `species.ron`, because `glb` belongs to Bevy's own loader; any file can be
-/// loaded as a [`PlantAsset`] by its type.
+/// A species file has its own lighting, gloss and kind of leaf; the other bake values of [`PlantSettings`] apply to it
+/// too. The loader is registered only for the ending `species.ron`, because `glb` belongs to Bevy's own loader; any
+/// file can be loaded as a [`PlantAsset`] by its type.
 #[derive(Clone, Copy, Debug, Default, TypePath)]
 pub struct PlantLoader;
 
@@ -74,7 +74,7 @@ async fn species(
     let species = Species::parse(&text(bytes, path)?, path)?;
     let individuals = match &species.plant {
         PlantSource::Grown(grown) => {
-            let (parameters, from) = match &grown.form {
+            let (mut parameters, from) = match &grown.form {
                 GrownForm::Broadleaf => (GrowParameters::broadleaf(), path.to_owned()),
                 GrownForm::Conifer => (GrowParameters::conifer(), path.to_owned()),
                 GrownForm::File(file) => {
@@ -84,6 +84,9 @@ async fn species(
                     (parameters, file.clone())
                 }
             };
+            if let Some(leaf) = species.leaf {
+                parameters.leaves.transmission = leaf.transmission().to_array();
+            }
             let individual = |number: u32| Individual::Grown {
                 parameters: Box::new(parameters.clone()),
                 from: from.clone(),
@@ -101,6 +104,8 @@ async fn species(
                     height: Some(species.mean_height() as f32),
                     foliage_materials: plants.foliage.clone(),
                     wood_materials: plants.wood.clone(),
+                    leaf: species.leaf.unwrap_or(settings.leaf),
+                    gloss: Some(species.gloss.sanitized()),
                     ..settings.gltf_options()
                 };
                 individuals.push(Individual::Gltf { path: file.clone(), bytes, files, options });

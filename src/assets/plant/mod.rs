@@ -20,9 +20,11 @@ pub use loader::PlantLoader;
 
 use super::StageError;
 use crate::{
-    bake::{BakeSettings, BakeSource, BakedPlant, bake_plant, cache::Cache, lighting::SunLight},
+    bake::{
+        BakeSettings, BakeSource, BakedPlant, bake_plant, cache::Cache, lighting::SunLight, textures::filter_together,
+    },
     plant::{
-        Gloss, Plant,
+        Gloss, LeafKind, Plant,
         gltf::GltfOptions,
         grow::{GrowError, GrowParameters, grow},
     },
@@ -90,6 +92,9 @@ pub struct PlantSettings {
     pub foliage_materials: Vec<String>,
     /// Names of a glTF file's materials that are wood whatever their alpha mode.
     pub wood_materials: Vec<String>,
+    /// The kind of a glTF file's leaves, which decides how much light passes through them where neither the file nor
+    /// `transmission` says so.
+    pub leaf: LeafKind,
     /// Light through the leaves of a glTF file, as [`GltfOptions::transmission`].
     pub transmission: Option<Vec3>,
     /// The gloss of leaves.
@@ -106,6 +111,7 @@ impl Default for PlantSettings {
             height: None,
             foliage_materials: Vec::new(),
             wood_materials: Vec::new(),
+            leaf: LeafKind::default(),
             transmission: None,
             gloss: Gloss::LEAF,
             bake: BakeSettings::default(),
@@ -121,7 +127,9 @@ impl PlantSettings {
             height: self.height,
             foliage_materials: self.foliage_materials.clone(),
             wood_materials: self.wood_materials.clone(),
+            leaf: self.leaf,
             transmission: self.transmission,
+            gloss: Some(self.gloss),
             ..GltfOptions::default()
         }
     }
@@ -163,6 +171,7 @@ impl PlantAsset {
         wanted: &(dyn Fn() -> bool + Sync),
     ) -> Self {
         let cache = Cache::of_user();
+        let textures = wanted().then(|| filter_together(plants.iter().map(|(plant, _)| plant), cache.as_ref()));
         let baked: Vec<(BakedPlant, Vec<String>)> = plants
             .into_par_iter()
             .filter_map(|(mut plant, mut warnings)| {
@@ -178,6 +187,7 @@ impl PlantAsset {
                 Some((baked, warnings))
             })
             .collect();
+        drop(textures);
         let (individuals, warnings): (Vec<_>, Vec<_>) = baked.into_iter().unzip();
         Self { name, individuals, sun: settings.sun, growth: Growth::default(), warnings: warnings.concat() }
     }

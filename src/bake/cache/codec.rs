@@ -1,5 +1,6 @@
-//! The file format of a baked plant: a head of fixed size, and the plant's lighting and levels as `serde` and
-//! `postcard` write them. All numbers of the head are little-endian.
+//! The file format of a baked plant or texture: a head of fixed size and a payload. That of a plant has its lighting and
+//! levels as `serde` and `postcard` write them, that of a texture the bytes of its mip levels (`texture.rs`). All numbers
+//! of the head are little-endian.
 //!
 //! ```text
 //!   offset  size  content
@@ -8,7 +9,7 @@
 //!       12    32  key: hash of what it was made from
 //!       44     8  length of the payload
 //!       52    32  BLAKE3 of bytes 0..52 and the payload
-//!       84        payload: lighting, list of levels
+//!       84        payload
 //! ```
 //!
 //! A new level of detail is a new variant of [`BakedLevel`], at the end.
@@ -25,7 +26,7 @@ use crate::bake::lighting::BakedLighting;
 use crate::plant::Plant;
 
 /// Version of the format *and* of the bakes: to be raised whenever either gives other bytes for the same input.
-pub(super) const VERSION: u32 = 14;
+pub(super) const VERSION: u32 = 15;
 
 const MAGIC: [u8; 8] = *b"CANOPYBK";
 const HEAD: usize = 52;
@@ -45,7 +46,7 @@ pub(super) fn encode(baked: &BakedPlant, key: &[u8; 32]) -> Option<Vec<u8>> {
 }
 
 /// The file with this payload.
-fn sealed(payload: &[u8], key: &[u8; 32]) -> Vec<u8> {
+pub(super) fn sealed(payload: &[u8], key: &[u8; 32]) -> Vec<u8> {
     let mut file = Vec::with_capacity(PAYLOAD + payload.len());
     file.extend_from_slice(&MAGIC);
     file.extend_from_slice(&VERSION.to_le_bytes());
@@ -57,18 +58,22 @@ fn sealed(payload: &[u8], key: &[u8; 32]) -> Vec<u8> {
     file
 }
 
-/// Reads a file that should hold `plant` baked under `key`. `None` if anything is wrong with it.
-pub(super) fn decode(file: &[u8], key: &CacheKey, plant: &Arc<Plant>) -> Option<BakedPlant> {
+/// The payload of a file that should have been sealed under `key`. `None` if anything is wrong with it.
+pub(super) fn opened<'a>(file: &'a [u8], key: &[u8; 32]) -> Option<&'a [u8]> {
     let (head, rest) = file.split_at_checked(HEAD)?;
     let (sum, payload) = rest.split_at_checked(PAYLOAD - HEAD)?;
     let agrees = head[..8] == MAGIC
         && head[8..12] == VERSION.to_le_bytes()
-        && head[12..44] == key.hash
+        && head[12..44] == *key
         && head[44..] == (payload.len() as u64).to_le_bytes()
         && *sum == checksum(head, payload);
-    if !agrees {
-        return None;
-    }
+    agrees.then_some(payload)
+}
+
+/// Reads a file that should hold `plant` baked under `key`, without the textures, which have their own files. `None` if
+/// anything is wrong with it.
+pub(super) fn decode(file: &[u8], key: &CacheKey, plant: &Arc<Plant>) -> Option<BakedPlant> {
+    let payload = opened(file, &key.hash)?;
     let (Payload { lighting, levels }, rest) = postcard::take_from_bytes(payload).ok()?;
     let lighting: BakedLighting = lighting.into_owned();
     if !rest.is_empty() || !lighting.fits(plant) {
@@ -82,7 +87,8 @@ pub(super) fn decode(file: &[u8], key: &CacheKey, plant: &Arc<Plant>) -> Option<
     }
     let levels = levels.into_owned();
     let fits = levels.iter().all(|level| level.fits(plant, &lighting));
-    fits.then(|| BakedPlant { plant: Arc::clone(plant), lighting: Arc::new(lighting), levels })
+    let (plant, lighting, textures) = (Arc::clone(plant), Arc::new(lighting), Arc::default());
+    fits.then_some(BakedPlant { plant, lighting, levels, textures })
 }
 
 fn checksum(head: &[u8], payload: &[u8]) -> [u8; 32] {
@@ -131,6 +137,7 @@ mod tests {
                     isotropic_fraction: [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 1.0],
                 })),
             ],
+            textures: Arc::default(),
         }
     }
 

@@ -6,20 +6,28 @@
 //! is computed and written again. Files appear whole or not at all (written to a temporary name, then renamed), so any
 //! number of processes may share a folder.
 //!
+//! The textures of full models are files of their own, keyed by image and use: plants that share an image share its file.
+//!
 //! Files of plants that are no longer used stay; the folder may be deleted at any time.
 
 mod codec;
+mod texture;
 
 use std::ffi::OsString;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use image::RgbaImage;
+
 use super::baked::{BakeSettings, BakedPlant};
 use super::error::BakeError;
+use super::textures::PlantTextures;
+use super::textures::filtered::FilteredTexture;
 use crate::files;
 use crate::lod::Representation;
 use crate::plant::Plant;
+pub use texture::TextureKey;
 
 /// Identifier of a baked plant: a hash of all inputs of the bake.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -81,25 +89,57 @@ impl Cache {
     }
 
     /// Loads the baked plant with `key`, the key of `plant`. `None` if there is none that is whole and of this version.
+    /// Of its textures, those that are not in the cache are filtered again and stored.
     pub fn load(&self, key: &CacheKey, plant: &Arc<Plant>) -> Option<BakedPlant> {
         let bytes = files::read_ordinary(&self.file(key)).ok()?;
-        codec::decode(&bytes, key, plant)
+        let baked = codec::decode(&bytes, key, plant)?;
+        let textures = if key.representations.contains(&Representation::MODEL) {
+            PlantTextures::new(plant, Some(self)).0
+        } else {
+            PlantTextures::default()
+        };
+        Some(BakedPlant { textures: Arc::new(textures), ..baked })
     }
 
-    /// Stores a baked plant under `key`.
+    /// Stores a baked plant under `key`, without its textures.
     ///
     /// # Errors
     /// [`BakeError::CacheFolder`] or [`BakeError::CacheWrite`] where the folder or the file cannot be written.
     pub fn store(&self, key: &CacheKey, baked: &BakedPlant) -> Result<(), BakeError> {
-        let path = self.file(key);
+        let bytes = codec::encode(baked, &key.hash).ok_or_else(|| io::Error::other("it cannot be written as bytes"));
+        self.write(self.file(key), bytes)
+    }
+
+    /// The file that holds, or would hold, the texture with `key`.
+    pub fn texture_file(&self, key: &TextureKey) -> PathBuf {
+        self.folder.join(key.to_hex()).with_extension("texture")
+    }
+
+    /// Loads the texture with `key`, the key of `image`. `None` if there is none that is whole and of this version.
+    pub fn load_texture(&self, key: &TextureKey, image: &Arc<RgbaImage>) -> Option<FilteredTexture> {
+        let bytes = files::read_ordinary(&self.texture_file(key)).ok()?;
+        texture::decode(&bytes, key, image)
+    }
+
+    /// Stores a texture, filtered from `image`, under `key`.
+    ///
+    /// # Errors
+    /// As [`store`](Self::store).
+    pub fn store_texture(
+        &self,
+        key: &TextureKey,
+        texture: &FilteredTexture,
+        image: &RgbaImage,
+    ) -> Result<(), BakeError> {
+        self.write(self.texture_file(key), Ok(texture::encode(key, texture, image)))
+    }
+
+    fn write(&self, path: PathBuf, bytes: io::Result<Vec<u8>>) -> Result<(), BakeError> {
         std::fs::create_dir_all(&self.folder)
             .map_err(|source| BakeError::CacheFolder { path: self.folder.clone(), source })?;
-        let write = || {
-            let bytes =
-                codec::encode(baked, &key.hash).ok_or_else(|| io::Error::other("it cannot be written as bytes"))?;
-            files::replace(&path, |writer| writer.write_all(&bytes))
-        };
-        write().map_err(|source| BakeError::CacheWrite { path: path.clone(), source })
+        bytes
+            .and_then(|bytes| files::replace(&path, |writer| writer.write_all(&bytes)))
+            .map_err(|source| BakeError::CacheWrite { path, source })
     }
 }
 

@@ -198,7 +198,37 @@ fn level_ground() -> Result<Arc<Terrain>, StageError> {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
+    use crate::{assets::background, scatter::Tree};
+
+    #[test]
+    fn more_trees_than_the_device_holds_are_an_error_before_the_build() {
+        let tree = Tree { position: DVec3::ZERO, yaw: 0.0, scale: 1.0, variant: 0, tint: 0.0, index: 0 };
+        let refused = |trees: ForestTrees, most_trees| -> Result<(), ForestError> {
+            let forest = Forest3d { trees, ..Forest3d::default() };
+            let ingredients = Ingredients { forest, plants: Vec::new(), terrain: None, most_trees };
+            let work = background::start(move |wanted| ingredients.build(wanted).map(|_| ()));
+            loop {
+                if let Some(built) = work.finished() {
+                    return built.map_err(|error| StageError::Background(error.to_string()).into()).flatten();
+                }
+                std::thread::yield_now();
+            }
+        };
+        let given = || ForestTrees::Given(vec![tree; 11]);
+        let error = refused(given(), Some(10));
+        assert!(
+            matches!(error, Err(ForestError::Trees(StageError::TooManyTrees { count: 11, limit: 10 }))),
+            "{error:?}"
+        );
+        // With room for them the next complaint is that they have no plant.
+        for most_trees in [None, Some(11)] {
+            let error = refused(given(), most_trees);
+            assert!(matches!(error, Err(ForestError::Trees(StageError::Stand(_)))), "{error:?}");
+        }
+    }
 
     #[test]
     fn names_of_species_are_unique() {

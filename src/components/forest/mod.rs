@@ -50,7 +50,7 @@ pub const DEFAULT_WIDTH: f64 = 200.0;
 /// A forest on a terrain uses the terrain's coordinates, metres from its centre. A forest without a terrain stands on
 /// level ground at the position and height of its own transform, whose rotation and scale have no effect.
 #[derive(Component, Clone, Debug, PartialEq, Reflect)]
-#[reflect(opaque, Component, Clone, Debug, Default, PartialEq)]
+#[reflect(Component, Clone, Debug, Default, PartialEq)]
 #[require(Transform, Visibility, ForestSettings, ForestWork)]
 pub struct Forest3d {
     /// Where the trees stand.
@@ -65,7 +65,8 @@ pub struct Forest3d {
 }
 
 /// Where the trees of a forest stand.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Reflect)]
+#[reflect(Clone, Debug, PartialEq)]
 pub enum ForestTrees {
     /// By rule.
     Scattered(ScatteredTrees),
@@ -78,7 +79,8 @@ pub enum ForestTrees {
 }
 
 /// One species of a forest.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Reflect)]
+#[reflect(Clone, Debug, PartialEq)]
 pub struct ForestSpecies {
     /// Its plants.
     pub plant: Handle<PlantAsset>,
@@ -192,7 +194,7 @@ impl Forest3d {
 
 /// How a forest is drawn. A change takes effect at once, without a rebuild.
 #[derive(Component, Clone, Debug, PartialEq, Reflect)]
-#[reflect(opaque, Component, Clone, Debug, Default, PartialEq)]
+#[reflect(Component, Clone, Debug, Default, PartialEq)]
 pub struct ForestSettings {
     /// The representations of the trees, from near to far.
     pub levels: Levels,

@@ -1,63 +1,40 @@
-//! Builds a scene in the background, on threads of its own.
-//!
-//! Bevy's task pools are not used: a bake would block their threads for seconds. Neither is rayon's global pool: the
-//! frames' own work (the sky's tables, the tiles) would queue up behind the bake.
+//! Builds a scene in the background.
 
-use std::{
-    any::Any,
-    sync::{
-        Arc, Mutex, PoisonError,
-        atomic::{AtomicBool, Ordering},
-        mpsc::{Receiver, Sender, channel},
-    },
-    thread::{self, JoinHandle},
+use std::sync::{
+    Mutex, PoisonError,
+    mpsc::{Receiver, Sender, channel},
 };
 
 use bevy::ecs::component::Component;
 
 use super::{CanopyScene, progress::BuildEvent};
 use crate::{
-    assets::{Stage, StageError, threads::spare_cores},
+    assets::{
+        Stage, StageError,
+        background::{self, Background, Wanted},
+    },
     progress::Progress,
 };
 
-/// A scene that is being built. Dropping it cancels the build without waiting: the threads end after their current
-/// plants.
+/// A scene that is being built. Dropping it cancels the build without waiting: the build ends after its current plants.
 #[derive(Component)]
 pub struct Job {
     /// Events that were not read yet. The mutex only makes the receiver `Sync`; nobody locks it.
     events: Mutex<Receiver<BuildEvent>>,
-    /// Set when the job is dropped.
-    cancelled: Arc<AtomicBool>,
-    /// `None` once its result was taken.
-    thread: Option<JoinHandle<Result<Stage, StageError>>>,
+    work: Background<Result<Stage, StageError>>,
 }
 
 impl Job {
     /// Starts to build the scene of `request`, for a device that holds at most `most_trees` trees.
-    ///
-    /// # Errors
-    /// [`StageError::Background`] if the system cannot create a thread.
-    pub fn start(request: &CanopyScene, most_trees: Option<usize>) -> Result<Self, StageError> {
-        let (sender, events) = channel();
-        let cancelled = Arc::<AtomicBool>::default();
-        let mut reporter = Reporter { events: sender, cancelled: cancelled.clone() };
-        let CanopyScene { source, overrides } = request.clone();
-        let work = move || {
-            let name = |index| format!("canopy bake {index}");
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(spare_cores()).thread_name(name).build();
-            let pool =
-                pool.map_err(|error| StageError::Background(format!("cannot create threads for bakes: {error}")))?;
-            pool.install(|| Stage::build_within(&overrides.applied(source.read()?), most_trees, &mut reporter))
-        };
-        let thread = thread::Builder::new().name("canopy scene".to_owned()).spawn(work);
-        let thread = thread.map_err(|error| StageError::Background(format!("cannot create a thread: {error}")))?;
-        Ok(Self { events: Mutex::new(events), cancelled, thread: Some(thread) })
+    pub fn start(request: &CanopyScene, most_trees: Option<usize>) -> Self {
+        let request = request.clone();
+        Self::run(move |progress| build(&request, most_trees, progress))
     }
 
-    /// Whether [`finish`](Self::finish) returns at once.
-    pub fn is_finished(&self) -> bool {
-        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
+    fn run(work: impl FnOnce(&mut Reporter) -> Result<Stage, StageError> + Send + 'static) -> Self {
+        let (sender, events) = channel();
+        let work = background::start(move |wanted| work(&mut Reporter { events: sender, wanted }));
+        Self { events: Mutex::new(events), work }
     }
 
     /// The events since the last call.
@@ -65,43 +42,36 @@ impl Job {
         self.events.get_mut().unwrap_or_else(PoisonError::into_inner).try_iter().collect()
     }
 
-    /// The result of the build. Waits for the thread.
+    /// The result of the build, once; `None` while the build goes on, and after the result was taken. All events of a
+    /// finished build can be read.
     ///
     /// # Errors
-    /// Those of [`Stage::build`]; [`StageError::Background`] if the thread panicked; [`StageError::Cancelled`] if the
-    /// result was taken before.
-    pub fn finish(&mut self) -> Result<Stage, StageError> {
-        let Some(thread) = self.thread.take() else { return Err(StageError::Cancelled) };
-        thread.join().unwrap_or_else(|panic| Err(StageError::Background(panic_message(&*panic))))
+    /// Those of [`Stage::build`]; [`StageError::Background`] if the build panicked, or if the system cannot create
+    /// threads.
+    pub fn finished(&self) -> Option<Result<Stage, StageError>> {
+        let result = self.work.finished()?;
+        Some(result.unwrap_or_else(|error| Err(StageError::Background(error.to_string()))))
     }
 }
 
-impl Drop for Job {
-    fn drop(&mut self) {
-        self.cancelled.store(true, Ordering::Relaxed);
-    }
-}
-
-fn panic_message(panic: &(dyn Any + Send)) -> String {
-    let text = panic.downcast_ref::<&str>().copied();
-    let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
-    format!("an error in the program: {}", text.unwrap_or("(see above)"))
+fn build(request: &CanopyScene, most_trees: Option<usize>, progress: &mut Reporter) -> Result<Stage, StageError> {
+    Stage::build_within(&request.overrides.applied(request.source.read()?), most_trees, progress)
 }
 
 /// Reports the progress of the build to its [`Job`].
-struct Reporter {
+struct Reporter<'a> {
     events: Sender<BuildEvent>,
-    cancelled: Arc<AtomicBool>,
+    wanted: &'a Wanted<'a>,
 }
 
-impl Reporter {
+impl Reporter<'_> {
     fn report(&self, event: BuildEvent) {
         // The send fails only when the job was dropped: nobody needs the event then.
         let _ = self.events.send(event);
     }
 }
 
-impl Progress for Reporter {
+impl Progress for Reporter<'_> {
     fn begin(&mut self, what: &str, steps: u64) {
         self.report(BuildEvent::Begin(what.to_owned(), steps));
     }
@@ -123,7 +93,7 @@ impl Progress for Reporter {
     }
 
     fn is_cancelled(&self) -> bool {
-        self.cancelled.load(Ordering::Relaxed)
+        !self.wanted.is_wanted()
     }
 }
 
@@ -145,38 +115,55 @@ mod tests {
 
     #[test]
     fn a_build_is_cancelled_when_its_job_is_dropped() -> Result<(), Box<dyn std::error::Error>> {
-        let mut job = Job::start(&many(), None)?;
-        let thread = job.thread.take().ok_or("no thread")?;
+        let (sender, outcome) = channel();
+        let job = Job::run(move |progress| {
+            sender.send(build(&many(), None, progress).map(drop)).ok();
+            Err(StageError::Cancelled)
+        });
         let at_plants = |event: &BuildEvent| matches!(event, BuildEvent::Begin(step, _) if step == "Plants");
-        while !job.events().iter().any(at_plants) && !thread.is_finished() {
-            thread::yield_now();
-        }
+        let events = job.events.lock().map_err(|_| "a panic")?;
+        assert!(events.iter().any(|event| at_plants(&event)), "the build ended before its plants");
+        drop(events);
         drop(job);
-        let outcome = thread.join().map_err(|_| "a panic")?;
+        let outcome = outcome.recv()?;
         assert!(matches!(outcome, Err(StageError::Cancelled)), "{:?}", outcome.err());
         Ok(())
     }
 
     #[test]
-    fn dropping_a_job_does_not_wait_for_its_thread() -> Result<(), Box<dyn std::error::Error>> {
+    fn dropping_a_job_does_not_wait_for_its_work() -> Result<(), Box<dyn std::error::Error>> {
+        let (begun, at_work) = channel();
         let (release, released) = channel::<()>();
-        let thread = thread::spawn(move || {
+        let (sender, cancelled) = channel();
+        let job = Job::run(move |progress| {
+            begun.send(()).ok();
             released.recv().ok();
+            sender.send(progress.is_cancelled()).ok();
             Err(StageError::Cancelled)
         });
-        let (_, events) = channel();
-        let cancelled = Arc::<AtomicBool>::default();
-        drop(Job { events: Mutex::new(events), cancelled: cancelled.clone(), thread: Some(thread) });
-        assert!(cancelled.load(Ordering::Relaxed));
-        // The receiver still exists, so the thread still runs.
+        at_work.recv()?;
+        drop(job);
+        // The receiver still exists, so the work still runs.
         release.send(())?;
+        assert!(cancelled.recv()?);
         Ok(())
     }
 
     #[test]
-    fn a_panic_becomes_a_message() {
-        assert_eq!(panic_message(&"index out of bounds"), "an error in the program: index out of bounds");
-        assert_eq!(panic_message(&String::from("x")), "an error in the program: x");
-        assert_eq!(panic_message(&1), "an error in the program: (see above)");
+    fn a_panic_becomes_an_error_of_the_build() {
+        let mut job = Job::run(|progress| {
+            progress.warn("w");
+            panic!("index out of bounds")
+        });
+        let error = loop {
+            match job.finished() {
+                Some(outcome) => break outcome.err().map(|error| error.to_string()),
+                None => std::thread::yield_now(),
+            }
+        };
+        let message = "the scene could not be built: an error in the program: index out of bounds";
+        assert_eq!(error.as_deref(), Some(message));
+        assert_eq!(job.events(), [BuildEvent::Warning("w".to_owned())]);
+        assert!(job.finished().is_none());
     }
 }

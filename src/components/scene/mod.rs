@@ -1,6 +1,6 @@
 //! Scenes in a Bevy program: built in the background, shown as children of their entity when they are ready.
 //!
-//! The bakes run in parallel on threads of their own, on all cores but one; bakes that are in the cache are loaded from
+//! The bakes run in parallel on background threads, on all cores but one; bakes that are in the cache are loaded from
 //! it. Until a scene is ready, a frame only reads a list of events; then it uploads the scene. A program that closes
 //! meanwhile does not wait: the build is cancelled. The cache stays valid, because its files appear whole or not at
 //! all.
@@ -22,16 +22,19 @@ use bevy::{
         lifecycle::Remove,
         observer::On,
         query::{Changed, Has, With},
+        reflect::ReflectComponent,
         schedule::IntoScheduleConfigs,
         system::{Commands, Query, Res},
         world::Ref,
     },
+    prelude::ReflectDefault,
+    reflect::Reflect,
     render::renderer::RenderDevice,
     transform::components::Transform,
 };
 use tracing::{error, info, warn};
 
-use super::{Sun, sets::CanopySystems};
+use super::{Sun, SunPlugin, report_missing, sets::CanopySystems};
 use crate::{
     assets::{Stage, StageError, most_trees},
     scene::{Overrides, SceneSource},
@@ -50,7 +53,8 @@ pub use progress::{SceneProgress, SceneState};
 ///
 /// A new value on the same entity replaces the scene once the new one is ready, not before. The entity's transform and
 /// visibility apply to the whole scene. A world can hold several scenes; only one ground is drawn at a time.
-#[derive(Component, Clone, Debug, Default, PartialEq)]
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, Clone, Debug, Default, PartialEq)]
 #[require(Transform, Visibility, SceneProgress)]
 pub struct CanopyScene {
     /// The scene: a file, or a value.
@@ -92,16 +96,18 @@ impl fmt::Display for SceneFailed {
 }
 
 /// The scene that an entity shows. Added next to its [`CanopyScene`] when the scene is ready.
-#[derive(Component, Clone)]
+#[derive(Component, Clone, Reflect)]
+#[reflect(Component, from_reflect = false)]
 pub struct LoadedScene {
-    /// The built scene.
+    /// The built scene. Reflection does not show it: it is the shared result of a build.
+    #[reflect(ignore, clone)]
     pub stage: Arc<Stage>,
     /// Its entities, children of this one.
     pub shown: Shown,
 }
 
 /// Entities that show a stage.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 pub struct Shown {
     /// Its ground.
     pub ground: Entity,
@@ -147,9 +153,16 @@ pub struct ScenePlugin;
 
 impl Plugin for ScenePlugin {
     fn build(&self, app: &mut App) {
-        app.register_type::<SceneProgress>()
+        app.register_type::<CanopyScene>()
+            .register_type::<LoadedScene>()
+            .register_type::<SceneProgress>()
             .add_systems(First, (begin, follow).chain().in_set(CanopySystems::Load))
             .add_observer(remove_scene);
+    }
+
+    fn finish(&self, app: &mut App) {
+        let sun = app.is_plugin_added::<SunPlugin>();
+        report_missing(app, "ScenePlugin", &[(sun, "SunPlugin", "a scene has no light")]);
     }
 }
 
@@ -164,18 +177,7 @@ fn begin(
         if building && !scene.is_added() {
             info!("the build of another scene is cancelled in favour of {}", scene.source);
         }
-        let mut entity_commands = commands.entity(entity);
-        entity_commands.remove::<Job>();
-        match Job::start(&scene, limit) {
-            Ok(job) => {
-                entity_commands.insert((job, SceneProgress::default()));
-            }
-            Err(error) => {
-                let progress = SceneProgress { state: SceneState::Failed, ..SceneProgress::default() };
-                entity_commands.insert(progress);
-                fail(&mut commands, entity, &scene, error);
-            }
-        }
+        commands.entity(entity).insert((Job::start(&scene, limit), SceneProgress::default()));
     }
 }
 
@@ -189,9 +191,8 @@ fn follow(
     // Two scenes may become ready in the same frame.
     let mut lit = false;
     for (entity, scene, mut job, mut progress, loaded) in &mut scenes {
-        // Check for the end before reading the events: the build reports its last event before it ends, so none is
-        // lost.
-        let finished = job.is_finished();
+        // Take the result before reading the events: the build reports its last event before it ends, so none is lost.
+        let result = job.finished();
         for event in job.events() {
             match &event {
                 BuildEvent::Note(note) => info!("{}: {note}", scene.source),
@@ -200,11 +201,9 @@ fn follow(
             }
             progress.apply(event);
         }
-        if !finished {
-            continue;
-        }
+        let Some(result) = result else { continue };
         commands.entity(entity).remove::<Job>();
-        let checked = job.finish().and_then(|stage| {
+        let checked = result.and_then(|stage| {
             device.as_ref().map_or(Ok(()), |device| stage.check_device(device))?;
             Ok(Arc::new(stage))
         });

@@ -1,4 +1,4 @@
-//! The light of the sky on the horizontal ground, as a table over the sun's elevation.
+//! Illuminance of horizontal ground by the sky, as a table over the sun's elevation.
 
 use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
@@ -18,7 +18,7 @@ pub(super) struct GroundTable {
 }
 
 impl GroundTable {
-    /// A table without light, for the time before the real one is there.
+    /// A table without light, used until the real one is computed.
     pub fn dark() -> Self {
         Self { logarithm: vec![ln(Vec3::ZERO); SunAxis::LEN] }
     }
@@ -26,7 +26,7 @@ impl GroundTable {
     pub fn new(atmosphere: &Atmosphere) -> Self {
         let rule = SphereQuadrature::new(RINGS, AZIMUTHS);
         let r = atmosphere.params.ground_radius_m + LOWEST_OBSERVER_M;
-        // All directions of a ring share their segments.
+        // All directions of a ring have the same segments.
         let rings: Vec<_> = rule
             .upper()
             .chunks(AZIMUTHS)
@@ -40,7 +40,7 @@ impl GroundTable {
                 let mut sum = Vec3::ZERO;
                 for (ring, segments) in &rings {
                     for &(direction, solid_angle) in *ring {
-                        // The sun lies in the plane x = 0: the other half of the ring is the mirror image.
+                        // The sun lies in the plane x = 0, so the other half of the ring is a mirror image.
                         if direction.x > 0.0 {
                             let weight = 2.0 * solid_angle * direction.y;
                             sum += atmosphere.in_scatter(segments, r, direction, sun) * weight;

@@ -1,22 +1,23 @@
-//! The radiance of the sky: one model that the processor evaluates, for the shader, the light and the fog alike.
+//! Radiance of the sky: one model, evaluated on the CPU, for the shader, the light and the fog.
 //!
 //! S. Hillaire 2020, "A Scalable and Production Ready Sky and Atmosphere Rendering Technique", Computer Graphics Forum
-//! 39(4): single scattering is integrated along the view ray in spherical geometry; all higher orders come from a
-//! table in which scattering is isotropic and each point's neighbourhood is lit as the point is (section 5.5).
+//! 39(4). Single scattering is integrated along the view ray in spherical geometry. All higher orders come from a table
+//! that assumes isotropic scattering, and that the neighbourhood of a point is lit as the point itself (section 5.5).
 //!
-//! What differs from the paper, and why: this runs on the processor only when the sun has moved, so
-//! - the multiple-scattering table has 64 x 32 texels, dense at the horizon, from 256 directions a texel, and both it
-//!   and the transmittance table interpolate logarithms: the paper's 32 x 32 linear ones smear twilight over 4
-//!   degrees;
-//! - the sun is a disc for the shadow of the Earth, too, so that no radiance jumps anywhere;
-//! - below the horizon the ground, lit by sun and sky, shows through a haze that starts as the horizon's own radiance.
+//! It differs from the paper, because it runs only when the sun has moved, on the CPU:
+//! - The multiple-scattering table has 64 x 32 texels, dense at the horizon, computed from 256 directions per texel.
+//!   This table and the transmittance table interpolate logarithms. The paper's linear tables of 32 x 32 blur twilight
+//!   over 4 degrees.
+//! - The sun is a disc for the shadow of the Earth, too, so that radiance is continuous everywhere.
+//! - Below the horizon, the ground, lit by sun and sky, shows through a haze that starts with the radiance of the
+//!   horizon.
 //!
 //! # Known errors
-//! The isotropic, local assumption is weak where illumination changes over a mean free path, in twilight. Against
-//! published horizontal illuminances of clear skies (this room's tests) the model is right within 6 % for a sun above
-//! 30 degrees, 20 % high at 10, 30 % high at 0, 50 % high at -6 and 15 % high at -12; below -15 nearly all light is
-//! that of the night sky. Refraction bends no ray in the air; the sun's own position includes it. The polarisation of
-//! light is ignored (up to 10 % of Rayleigh radiance).
+//! The assumption of isotropic and local scattering is weak where illumination changes over a mean free path, in
+//! twilight. Compared with published horizontal illuminances of clear skies (the tests of this room), the model is
+//! within 6 % for a sun above 30 degrees, and too bright by 20 % at 10 degrees, 30 % at 0, 50 % at -6 and 15 % at -12.
+//! Below -15 degrees nearly all light is that of the night sky. Rays in the air are not refracted; the position of the
+//! sun includes refraction. Polarisation is ignored (up to 10 % of Rayleigh radiance).
 
 mod ground;
 mod multiple;
@@ -36,15 +37,15 @@ use self::transmittance::{Level, TransmittanceLut};
 use super::error::LightError;
 use super::sun::{SUN_ANGULAR_RADIUS, disc_fraction};
 
-/// Steps along a view ray. Quadratically spaced; error of a clear sky's radiance against 800 steps: below 0.5 % by day,
-/// below 7 % at dusk (worst with the sun 8 degrees down, where few steps straddle the Earth's shadow). Half as many
-/// steps: half the time, about three times the error.
+/// Steps along a view ray, quadratically spaced. The error of a clear sky's radiance against 800 steps is below 0.5 %
+/// by day and below 7 % at dusk (worst with the sun 8 degrees below the horizon, where few steps straddle the Earth's
+/// shadow). Half as many steps take half the time and have about three times the error.
 const VIEW_STEPS: usize = 40;
 
-/// Over this angle below the horizon, radians, haze gives way to the ground by 1 - 1/e.
+/// Angle below the horizon, radians, over which the haze decreases to 1/e.
 const HAZE_ANGLE: f32 = 0.035;
 
-/// Heights at which the model is evaluated, metres: the observer is kept between these and the top of the air.
+/// Lowest height of an observer, metres. The observer is clamped between it and the top of the atmosphere.
 const LOWEST_OBSERVER_M: f64 = 1.0;
 
 /// An atmosphere with its tables. Building it takes about a quarter of a second; evaluating it needs no state.
@@ -56,12 +57,12 @@ pub struct Atmosphere {
     ground: GroundTable,
 }
 
-/// One segment of a view ray: everything that does not depend on where the light comes from.
+/// A segment of a view ray: everything that does not depend on the direction of the light.
 #[derive(Debug, Clone, Copy)]
 struct Segment {
     /// Distance from the observer to the segment's middle, metres.
     t: f64,
-    /// How far from the planet's centre.
+    /// Distance from the planet's centre.
     level: Level,
     /// Rayleigh and aerosol scattering of the segment times the transmittance to the observer.
     rayleigh: Vec3,
@@ -83,20 +84,20 @@ impl Atmosphere {
         Ok(atmosphere)
     }
 
-    /// The parameters it was built from.
+    /// The parameters from which it was built.
     pub fn params(&self) -> &AtmosphereParams {
         &self.params
     }
 
     /// Radiance in nits that arrives from the unit direction `view` at an observer `observer_height_m` above the sea
-    /// (clamped to 1 m and the top of the air), with the sun in the unit direction `sun`. The sun's disc itself is not
-    /// included. Never negative, never NaN; directions that are not finite are read as +Y.
+    /// (clamped between 1 m and the top of the atmosphere), with the sun in the unit direction `sun`, without the sun's
+    /// disc. Never negative, never NaN. A direction that is not finite counts as +Y.
     pub fn radiance(&self, view: Vec3, sun: Vec3, observer_height_m: f64) -> Vec3 {
         self.radiance_with_steps(view, sun, observer_height_m, VIEW_STEPS)
     }
 
-    /// [`Atmosphere::radiance`] with another number of steps along the ray, 1 to 10,000: the knob by which the error of
-    /// the default (40) is measured.
+    /// [`Atmosphere::radiance`] with another number of steps along the ray, 1 to 10,000, to measure the error of the
+    /// default (40).
     pub fn radiance_with_steps(&self, view: Vec3, sun: Vec3, observer_height_m: f64, steps: usize) -> Vec3 {
         let (view, sun) = (unit(view), unit(sun));
         let steps = steps.clamp(1, 10_000);
@@ -114,14 +115,14 @@ impl Atmosphere {
     }
 
     /// Illuminance in lux, per channel, of the sun's disc on a surface at the observer that faces it: above-air
-    /// illuminance times transmittance times the part of the disc above the horizontal. The transmittance is that of
-    /// the middle of the visible part, so that everything goes smoothly to zero as the disc sets.
+    /// illuminance times transmittance times the fraction of the disc above the horizontal. The transmittance is that
+    /// of the middle of the visible part, so that the illuminance decreases smoothly to zero while the disc sets.
     pub fn sun_illuminance(&self, sun: Vec3, observer_height_m: f64) -> Vec3 {
         self.params.solar_illuminance * self.disc_transmittance(sun, observer_height_m)
     }
 
-    /// The factor, 0 to 1 per channel, that the air and the horizon leave of the light of a disc as large as the sun
-    /// (the moon's differs by 3 %) in the unit direction `light`.
+    /// Transmittance, 0 to 1 per channel, of air and horizon for the light of a disc as large as the sun (the moon's
+    /// size differs by 3 %) in the unit direction `light`.
     pub fn disc_transmittance(&self, light: Vec3, observer_height_m: f64) -> Vec3 {
         let elevation = f64::from(unit(light).y).clamp(-1.0, 1.0).asin();
         let fraction = disc_fraction(elevation, SUN_ANGULAR_RADIUS);
@@ -136,19 +137,19 @@ impl Atmosphere {
         self.transmittance.sample(&self.observer_level(observer_height_m), middle.sin()) * fraction as f32
     }
 
-    /// Transmittance, 0 to 1 per channel, from the observer to space along the unit direction `view`; below the
-    /// horizontal that of the horizontal.
+    /// Transmittance, 0 to 1 per channel, from the observer to space along the unit direction `view`. A direction below
+    /// the horizontal has that of the horizontal.
     pub fn transmittance(&self, view: Vec3, observer_height_m: f64) -> Vec3 {
         self.transmittance.sample(&self.observer_level(observer_height_m), f64::from(unit(view).y).max(0.0))
     }
 
-    /// Illuminance in lux, per channel, of the sky alone (no disc) on the horizontal ground at sea level, from a table
-    /// over the sun's elevation. Never negative; continuous.
+    /// Illuminance in lux, per channel, of horizontal ground at sea level by the sky alone (without the disc), from a
+    /// table over the sun's elevation. Never negative; continuous.
     pub fn diffuse_illuminance(&self, sun: Vec3) -> Vec3 {
         self.ground.sample(f64::from(unit(sun).y)) * self.params.solar_illuminance
     }
 
-    /// Illuminance in lux, per channel, of sun and sky on the horizontal ground at sea level.
+    /// Illuminance in lux, per channel, of horizontal ground at sea level by sun and sky.
     pub fn horizontal_illuminance(&self, sun: Vec3) -> Vec3 {
         self.sun_illuminance(sun, 0.0) * unit(sun).y.max(0.0) + self.diffuse_illuminance(sun)
     }
@@ -167,8 +168,8 @@ impl Atmosphere {
         self.transmittance.level(self.observer_radius(height_m))
     }
 
-    /// The part of the sun's light, 0 to 1 per channel, that reaches a point where the sun's zenith
-    /// cosine is `mu`. The edge of the Earth's shadow is as wide as the disc.
+    /// Fraction of the sun's light, 0 to 1 per channel, that reaches a point where the cosine of the sun's zenith angle
+    /// is `mu`. The edge of the Earth's shadow is as wide as the disc.
     fn sunlight(&self, level: &Level, mu: f64) -> Vec3 {
         let sin_horizon = level.sin_horizon;
         let mu_horizon = -(1.0 - sin_horizon * sin_horizon).max(0.0).sqrt();
@@ -180,15 +181,15 @@ impl Atmosphere {
         self.transmittance.sample(level, mu) * (x * x * (3.0 - 2.0 * x)) as f32
     }
 
-    /// Segments from radius `r` with zenith cosine `mu >= 0` to the top, and the transmittance of all of them.
+    /// Segments from radius `r` with zenith cosine `mu >= 0` to the top, and their total transmittance.
     fn march_sky(&self, r: f64, mu: f64, steps: usize) -> (Vec<Segment>, Vec3) {
         let top = self.params.top_radius();
         let length = -r * mu + (r * r * (mu * mu - 1.0) + top * top).max(0.0).sqrt();
         self.march(r, mu, length, steps)
     }
 
-    /// Segments from radius `r` with zenith cosine `mu < 0` to the ground; a ray that passes above the curved ground
-    /// ends where it is nearest to it, as on a plain.
+    /// Segments from radius `r` with zenith cosine `mu < 0` to the ground. A ray that misses the curved ground ends at
+    /// its nearest point to it, as on a plain.
     fn march_ground(&self, r: f64, mu: f64, steps: usize) -> (Vec<Segment>, Vec3) {
         let ground = self.params.ground_radius_m;
         let length = -r * mu - (r * r * (mu * mu - 1.0) + ground * ground).max(0.0).sqrt();
@@ -205,7 +206,7 @@ impl Atmosphere {
             let here = (r * r + t * t + 2.0 * r * t * mu).max(0.0).sqrt();
             let medium = self.params.medium(here - self.params.ground_radius_m);
             let through = (-medium.extinction * (far - near) as f32).exp();
-            // The integral of the transmittance over the segment, exact for constant extinction (Hillaire 2015).
+            // Integral of the transmittance over the segment, exact for constant extinction (Hillaire 2015).
             let weight = Vec3::select(
                 medium.extinction.cmpgt(Vec3::splat(1e-15)),
                 (Vec3::ONE - through) / medium.extinction.max(Vec3::splat(1e-15)),
@@ -223,7 +224,7 @@ impl Atmosphere {
         (segments, transmittance)
     }
 
-    /// Radiance per unit of above-air illuminance that the segments of the ray from radius `r` towards `view` scatter
+    /// Radiance, per unit of above-air illuminance, that the segments of the ray from radius `r` towards `view` scatter
     /// to the observer.
     fn in_scatter(&self, segments: &[Segment], r: f64, view: Vec3, sun: Vec3) -> Vec3 {
         let cosine = f64::from(view.dot(sun)).clamp(-1.0, 1.0);
@@ -239,7 +240,8 @@ impl Atmosphere {
         sum
     }
 
-    /// Radiance per unit of above-air illuminance of the lit ground behind `segments` that let `through` pass.
+    /// Radiance, per unit of above-air illuminance, of the lit ground behind `segments`, whose transmittance is
+    /// `through`.
     fn ground_seen(&self, segments: &[Segment], through: Vec3, r: f64, view: Vec3, sun: Vec3) -> Vec3 {
         let direct = self.disc_transmittance(sun, 0.0) * sun.y.max(0.0);
         let ground = self.params.ground_albedo / PI * (direct + self.ground.sample(f64::from(sun.y)));
@@ -247,12 +249,12 @@ impl Atmosphere {
     }
 }
 
-/// The share of the ground, 0 to 1, in what is seen at `elevation < 0` radians; the rest is the horizon's haze.
+/// Weight of the ground, 0 to 1, in the radiance at `elevation < 0` radians. The rest is the haze of the horizon.
 pub(crate) fn haze_weight(elevation: f32) -> f32 {
     1.0 - (elevation.min(0.0) / HAZE_ANGLE).exp()
 }
 
-/// A unit vector along `v`, or +Y when there is none.
+/// The unit vector along `v`, or +Y if there is none.
 pub(crate) fn unit(v: Vec3) -> Vec3 {
     v.normalize_or(Vec3::Y)
 }

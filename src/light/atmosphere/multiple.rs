@@ -1,8 +1,8 @@
-//! Light that was scattered more than once: Hillaire 2020, section 5.5, eq. 5 to 10.
+//! Multiple scattering: Hillaire 2020, section 5.5, eq. 5 to 10.
 //!
-//! For a point at a height and a sun at a zenith angle, the table holds `L_2nd / (1 - f_ms)`: the light that
-//! reaches the point after one scattering in, or reflection by, its surroundings, times the sum of the geometric
-//! series of all further scatterings. Scattering is isotropic in it.
+//! The table holds `L_2nd / (1 - f_ms)` by the height of a point and the zenith angle of the sun: the light that
+//! reaches the point after its surroundings scattered or reflected it once, times the sum of the geometric series of
+//! all further scatterings. It assumes isotropic scattering.
 
 use std::f32::consts::PI;
 
@@ -14,7 +14,7 @@ use super::transmittance::{Level, SunAxis, bilinear};
 use crate::math::SphereQuadrature;
 
 const HEIGHTS: usize = 32;
-/// 8 rings in each hemisphere, 16 azimuths: the directions are many because the light of dusk comes from few of them.
+/// 8 rings in each hemisphere, 16 azimuths. There are many directions, because at dusk only few of them have light.
 const RINGS: usize = 8;
 const AZIMUTHS: usize = 16;
 const STEPS: usize = 20;
@@ -26,7 +26,7 @@ pub(super) struct MultipleScatteringLut {
 }
 
 impl MultipleScatteringLut {
-    /// A table without light, for the time before the real one is there.
+    /// A table without light, used until the real one is computed.
     pub fn dark() -> Self {
         Self { logarithm: vec![ln(Vec3::ZERO); SunAxis::LEN * HEIGHTS] }
     }
@@ -50,12 +50,13 @@ impl MultipleScatteringLut {
     }
 }
 
-/// A logarithm that is defined for black, too.
+/// A logarithm that is also defined for black.
 pub(super) fn ln(v: Vec3) -> Vec3A {
     v.max(Vec3::splat(1e-30)).map(f32::ln).into()
 }
 
-/// The rays of one point in all directions of half the sphere (the other half mirrors it, the sun being in the plane).
+/// The rays of a point in all directions of half the sphere. The other half is its mirror image, because the sun lies
+/// in the plane between them.
 struct Rays {
     r: f64,
     rays: Vec<Ray>,
@@ -65,10 +66,10 @@ struct Rays {
 
 struct Ray {
     direction: Vec3,
-    /// Share of the whole sphere.
+    /// Fraction of the whole sphere.
     weight: f32,
     segments: Vec<super::Segment>,
-    /// Distance to the ground and transmittance up to there, for rays that hit it.
+    /// Distance to the ground and transmittance of the ray up to it, if the ray hits it.
     ground: Option<(f64, Vec3)>,
 }
 

@@ -1,18 +1,18 @@
-//! What the air is made of: the coefficients of the atmosphere, per metre and per colour channel.
+//! Coefficients of the atmosphere, per metre and per colour channel.
 
 use glam::Vec3;
 
 use crate::light::error::{LightError, check_range};
 
-/// Coefficients of a clear atmosphere, one for each of the Rec. 709 primaries.
+/// Coefficients of an atmosphere, one for each of the Rec. 709 primaries. The default is clear air.
 ///
-/// The usual coefficients (Bruneton & Neyret 2008, Hillaire 2020) are those at 680, 550 and 440 nm. But 680 nm is not
-/// where a Rec. 709 red sees, and it lies beside ozone's absorption, which peaks at 600 nm: dusk turns purple with
-/// them. Here the default coefficients are means over the spectrum, weighted by sunlight (Planck, 5778 K) times the
-/// response of each primary (CIE 1931 observer as fitted by Wyman, Sloan & Shirley 2013, through the matrix of
-/// BT.709), of Rayleigh scattering (13.558e-6 at 550 nm, exponent -4.08) and of ozone (Serdyuchenko et al. 2014;
-/// 1.881e-6 at 550 nm). They give the exact colour of thin air; through five air masses the error of the mean is
-/// below 3 %.
+/// The usual coefficients (Bruneton & Neyret 2008, Hillaire 2020) are those at 680, 550 and 440 nm. But the red primary
+/// of Rec. 709 does not respond at 680 nm, and that wavelength misses the absorption of ozone, which peaks at 600 nm:
+/// dusk turns purple. The default coefficients here are means over the spectrum of Rayleigh scattering (13.558e-6 at
+/// 550 nm, exponent -4.08) and of ozone absorption (Serdyuchenko et al. 2014; 1.881e-6 at 550 nm). The weights are
+/// sunlight (Planck, 5778 K) times the response of each primary (CIE 1931 observer as fitted by Wyman, Sloan & Shirley
+/// 2013, through the matrix of BT.709). They give the exact colour of thin air. Through five air masses, the error of
+/// the mean is below 3 %.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AtmosphereParams {
     /// Radius of the planet in metres, 1e6 to 1e8.
@@ -21,23 +21,24 @@ pub struct AtmosphereParams {
     pub top_height_m: f64,
     /// Rayleigh scattering at sea level, 1/m, 0 to 1e-2.
     pub rayleigh_scattering: Vec3,
-    /// Height in metres over which air thins to 1/e, 100 to 50,000.
+    /// Height in metres over which the density of the air falls to 1/e, 100 to 50,000.
     pub rayleigh_scale_height_m: f64,
     /// Aerosol scattering at sea level, 1/m, 0 to 1e-2.
     pub mie_scattering: Vec3,
     /// Aerosol absorption at sea level, 1/m, 0 to 1e-2.
     pub mie_absorption: Vec3,
-    /// Height in metres over which the aerosol thins to 1/e, 100 to 50,000.
+    /// Height in metres over which the density of the aerosol falls to 1/e, 100 to 50,000.
     pub mie_scale_height_m: f64,
-    /// Asymmetry `g` of the aerosol's phase function (Cornette & Shanks 1992), -0.95 to 0.95; up: a tighter glow.
+    /// Asymmetry `g` of the aerosol's phase function (Cornette & Shanks 1992), -0.95 to 0.95. Higher: a narrower
+    /// glow.
     pub mie_anisotropy: f32,
-    /// Ozone absorption at the layer's centre, 1/m, 0 to 1e-2. It makes the zenith of dusk blue.
+    /// Ozone absorption at the layer's centre, 1/m, 0 to 1e-2. It makes the zenith blue at dusk.
     pub ozone_absorption: Vec3,
     /// Height in metres of the ozone layer's centre, 0 to 100,000.
     pub ozone_center_m: f64,
     /// Half width in metres of the ozone layer's tent profile, 100 to 50,000.
     pub ozone_half_width_m: f64,
-    /// Diffuse albedo of the ground, 0 to 1: it brightens the sky and is seen below the horizon.
+    /// Diffuse albedo of the ground, 0 to 1. It brightens the sky and is visible below the horizon.
     pub ground_albedo: Vec3,
     /// Illuminance of the sun above the atmosphere on a surface that faces it, lux per channel, 0 to 1e7.
     pub solar_illuminance: Vec3,
@@ -51,11 +52,11 @@ impl Default for AtmosphereParams {
 }
 
 impl AtmosphereParams {
-    /// The Earth (profiles: Hillaire 2020, table 1; Bruneton 2017) with as much aerosol as leaves a meteorological
-    /// visibility of `km` kilometres at sea level, clamped to 2 to 250. Koschmieder's law (1924): extinction at 550
-    /// nm = 3.912 / visibility; what Rayleigh scattering does not explain is aerosol with single-scattering albedo
-    /// 0.9 and Angstrom exponent
-    /// 1.3 (continental). 50 km gives an aerosol optical depth of 0.077: a clear day; 250 km almost none.
+    /// The Earth (profiles: Hillaire 2020, table 1; Bruneton 2017) with the aerosol for a meteorological visibility of
+    /// `km` kilometres at sea level, clamped to 2 to 250. By Koschmieder's law (1924) the extinction at 550 nm is
+    /// 3.912 / visibility. What remains after Rayleigh scattering is aerosol with a single-scattering albedo of 0.9 and an
+    /// Angstrom exponent of 1.3 (continental). 50 km is a clear day, with an aerosol optical depth of 0.077; 250 km
+    /// means almost no aerosol.
     pub fn with_visibility_km(km: f64) -> Self {
         let rayleigh_scattering = Vec3::new(7.112e-6, 13.755e-6, 33.06e-6);
         let km = if km.is_finite() { km.clamp(2.0, 250.0) } else { 50.0 };
@@ -75,7 +76,7 @@ impl AtmosphereParams {
             ozone_center_m: 25_000.0,
             ozone_half_width_m: 15_000.0,
             ground_albedo: Vec3::new(0.13, 0.15, 0.10),
-            // The luminous solar constant of 1.28e5 lux in the colour of a black body of 5778 K, of luminance 1.
+            // The luminous solar constant, 1.28e5 lux, times the colour of a black body of 5778 K with luminance 1.
             solar_illuminance: 1.28e5 * Vec3::new(1.110, 0.976, 0.912),
         }
     }
@@ -83,7 +84,7 @@ impl AtmosphereParams {
     /// Checks every field against its range.
     ///
     /// # Errors
-    /// [`LightError::OutOfRange`] for the first field that is outside of it.
+    /// [`LightError::OutOfRange`] for the first field that is out of range.
     pub fn validate(&self) -> Result<(), LightError> {
         check_range("planet radius", self.ground_radius_m, "m", 1e6, 1e8, "the Earth has 6,360,000 m")?;
         check_range("top of the atmosphere", self.top_height_m, "m", 2e4, 2e5, "the Earth's is at 100,000 m")?;
@@ -120,7 +121,7 @@ impl AtmosphereParams {
         self.ground_radius_m + self.top_height_m
     }
 
-    /// The air at a height in metres above the ground (Hillaire 2020, section 4).
+    /// Coefficients at a height in metres above the ground (Hillaire 2020, section 4).
     pub(super) fn medium(&self, height_m: f64) -> Medium {
         let h = height_m.max(0.0);
         let rayleigh = self.rayleigh_scattering * (-h / self.rayleigh_scale_height_m).exp() as f32;

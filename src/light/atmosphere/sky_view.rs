@@ -1,12 +1,12 @@
 //! The sky as a texture: radiance over azimuth and elevation, for the sky pass, the fog and the light.
 //!
 //! # Parametrisation (the shader repeats it)
-//! `W = 129` columns, `H = 97` rows, row-major, texel CENTRES on the grid: the first and last columns and rows lie on
-//! the ends of their ranges. With `a` the horizontal unit vector `(x, z)` towards the sun ([`SkyView::axis`]) and a
-//! unit view direction `d`:
+//! `W = 129` columns and `H = 97` rows, row-major, with texel centres on the grid: the first and last columns and rows
+//! lie at the ends of their ranges. With `a` the horizontal unit vector `(x, z)` towards the sun ([`SkyView::axis`])
+//! and a unit view direction `d`:
 //!
 //! ```text
-//! h   = d.xz                                        (no need to normalise; at the zenith any azimuth serves)
+//! h   = d.xz                                        (need not be normalised; at the zenith any azimuth will do)
 //! phi = atan2(a.x * h.y - a.y * h.x, dot(h, a))     -pi..pi, positive clockwise seen from above (guard (0, 0))
 //! u   = sign(phi) * sqrt(|phi| / pi)                -1..1, dense around the sun
 //! e   = asin(d.y)                                   -pi/2..pi/2
@@ -16,10 +16,10 @@
 //! uv     = (vec2(column, row) + 0.5) / vec2(129, 97),   bilinear filter, clamp to edge
 //! ```
 //!
-//! The horizon is the horizontal, whatever the observer's height. (Hillaire 2020, 5.3, has the same square root in
-//! elevation, and keeps azimuths linear.) One texel is 0.02 degrees high at the horizon and 2.5 at the zenith,
-//! 0.04 degrees wide at the sun's azimuth and 5.6 opposite;
-//! the interpolation's error in radiance is below 0.1 % in the mean and 1.3 % at worst, at dusk.
+//! The horizon is the horizontal, whatever the height of the observer. (Hillaire 2020, 5.3, has the same square root in
+//! elevation, but linear azimuths.) A texel is 0.02 degrees high at the horizon and 2.5 degrees at the zenith. It is
+//! 0.04 degrees wide at the sun's azimuth and 5.6 degrees opposite. The error of the interpolated radiance is below
+//! 0.1 % on average and 1.3 % at worst, at dusk.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -54,7 +54,7 @@ impl SkyView {
         Vec2::new(direction.x, direction.z).normalize_or(Vec2::new(0.0, -1.0))
     }
 
-    /// Elevation in radians of a row (also between rows), 0 to 96.
+    /// Elevation in radians of a row, 0 to 96, which may be a fraction.
     pub fn row_elevation(row: f32) -> f32 {
         let horizon = Self::HORIZON_ROW as f32;
         if row <= horizon {
@@ -64,7 +64,7 @@ impl SkyView {
         }
     }
 
-    /// The unit direction of a texel (also between texels).
+    /// The unit direction of a position in texels, which may be fractions.
     pub fn direction(&self, column: f32, row: f32) -> Vec3 {
         let u = 2.0 * column / (Self::WIDTH - 1) as f32 - 1.0;
         let (sin_phi, cos_phi) = (PI * u * u.abs()).sin_cos();
@@ -75,7 +75,7 @@ impl SkyView {
         Vec3::new(h.x, sin_e, h.y)
     }
 
-    /// Column and row, in texels, of a direction.
+    /// Column and row of a direction, in texels.
     pub fn coordinates(&self, direction: Vec3) -> Vec2 {
         let d = unit(direction);
         let (h, a) = (Vec2::new(d.x, d.z), self.axis);
@@ -91,7 +91,7 @@ impl SkyView {
         Vec2::new((0.5 + 0.5 * u) * (Self::WIDTH - 1) as f32, row)
     }
 
-    /// Radiance in nits in a direction, bilinear as the shader has it.
+    /// Radiance in nits in a direction, interpolated bilinearly as in the shader.
     pub fn sample(&self, direction: Vec3) -> Vec3 {
         let at = self.coordinates(direction);
         let (x, y) = (at.x.clamp(0.0, (Self::WIDTH - 1) as f32), at.y.clamp(0.0, (Self::HEIGHT - 1) as f32));
@@ -102,7 +102,7 @@ impl SkyView {
         row(y0).lerp(row(y1), y - y0 as f32)
     }
 
-    /// Adds the radiance `f` (nits) of the unit direction to every texel.
+    /// Adds the radiance `f` (nits), a function of the unit direction, to every texel.
     pub fn add(&mut self, f: impl Fn(Vec3) -> Vec3 + Sync) {
         let frame = Self { axis: self.axis, texels: Vec::new() };
         self.texels.par_chunks_mut(Self::WIDTH).enumerate().for_each(|(row, texels)| {
@@ -112,8 +112,8 @@ impl SkyView {
         });
     }
 
-    /// The texels times `scale` (an exposure, so that nothing overflows half precision) as RGBA with alpha 1, for a
-    /// texture of the format `Rgba16Float`. Values beyond 65,504 are clamped to it.
+    /// The texels times `scale` as RGBA with alpha 1, for a texture of format `Rgba16Float`. `scale` is an exposure
+    /// that keeps values within half precision; values beyond 65,504 are clamped to it.
     pub fn to_rgba16f(&self, scale: f32) -> Vec<[f16; 4]> {
         let half = |v: f32| f16::from_f32((v * scale).clamp(0.0, 65_504.0));
         self.texels.iter().map(|t| [half(t[0]), half(t[1]), half(t[2]), f16::ONE]).collect()
@@ -121,9 +121,9 @@ impl SkyView {
 }
 
 impl Atmosphere {
-    /// The sky with the sun, or the moon, of the above-air illuminance `light_illuminance` (lux per channel) in the
-    /// unit direction `light`, without the disc. The same values as [`Atmosphere::radiance`] at the texels, except
-    /// for coarser steps towards the ground.
+    /// The sky, without the disc, lit by the sun or the moon in the unit direction `light` with the above-air
+    /// illuminance `light_illuminance` (lux per channel). Its texels have the values of [`Atmosphere::radiance`],
+    /// except for coarser steps towards the ground.
     pub fn sky_view(&self, light: Vec3, light_illuminance: Vec3, observer_height_m: f64) -> SkyView {
         self.sky_view_with_steps(light, light_illuminance, observer_height_m, VIEW_STEPS)
     }
@@ -141,7 +141,8 @@ impl Atmosphere {
         let r = self.observer_radius(observer_height_m);
         let mut view = SkyView { axis: SkyView::axis_of(light), texels: Vec::new() };
         let middle = (SkyView::WIDTH - 1) / 2;
-        // The sky is symmetric about the plane of the sun: only the middle column and those to its right are computed.
+        // The sky is symmetric about the plane of the sun, so only the middle column and those to its right are
+        // computed.
         let half: Vec<Vec3> = (0..=SkyView::HORIZON_ROW)
             .into_par_iter()
             .flat_map_iter(|row| {

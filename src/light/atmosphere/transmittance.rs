@@ -1,8 +1,8 @@
-//! How much light passes from a point of the atmosphere to its top: a table of 256 by 64 optical depths.
+//! Transmittance from a point of the atmosphere to its top, as a table of 256 by 64 optical depths.
 //!
-//! Parametrisation by distances, after Bruneton & Neyret 2008 in the form of Bruneton 2017 (4.1), which Hillaire 2020
-//! (5.2) takes over. The table holds optical depths, not transmittances: they interpolate well where transmittance
-//! falls by orders of magnitude, at the horizon, and that is where twilight is made.
+//! It is parametrised by distances, after Bruneton & Neyret 2008 in the form of Bruneton 2017 (4.1), as in Hillaire
+//! 2020 (5.2). The table holds optical depths instead of transmittances, because they interpolate well at the horizon,
+//! where transmittance falls by orders of magnitude. That is where the light of twilight passes.
 
 use glam::{FloatExt, Vec3, Vec3A};
 use rayon::prelude::*;
@@ -40,7 +40,7 @@ impl TransmittanceLut {
         Self { ground, top, horizon, optical_depth }
     }
 
-    /// What the tables need to know of a distance `r` from the planet's centre, metres.
+    /// The level of a distance `r` from the planet's centre, metres.
     pub fn level(&self, r: f64) -> Level {
         let r = r.clamp(self.ground, self.top);
         let rho = (r * r - self.ground * self.ground).max(0.0).sqrt();
@@ -53,8 +53,8 @@ impl TransmittanceLut {
         }
     }
 
-    /// Transmittance from a level to the top along a ray with the zenith cosine `mu`. A ray that would hit the
-    /// ground is given the transmittance of the horizon: visibility is the caller's concern.
+    /// Transmittance from a level to the top along a ray with the zenith cosine `mu`. A ray that would hit the ground
+    /// has the transmittance of the horizon: the caller is responsible for visibility.
     pub fn sample(&self, level: &Level, mu: f64) -> Vec3 {
         let Level { r, rho, row, .. } = *level;
         let distance = -r * mu + (r * r * (mu * mu - 1.0) + self.top * self.top).max(0.0).sqrt();
@@ -64,7 +64,7 @@ impl TransmittanceLut {
     }
 }
 
-/// A distance from the planet's centre, in the terms of the tables.
+/// A distance from the planet's centre, with what the tables derive from it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Level {
     /// Distance from the centre, metres, within the atmosphere.
@@ -75,7 +75,7 @@ pub(super) struct Level {
     row: f64,
     /// Sine of the zenith angle of the horizon.
     pub sin_horizon: f64,
-    /// Height above the ground as a part of the atmosphere's, 0 to 1.
+    /// Height above the ground as a fraction of the atmosphere's height, 0 to 1.
     pub height: f64,
 }
 
@@ -90,7 +90,8 @@ fn integrate_optical_depth(params: &AtmosphereParams, r: f64, mu: f64, distance:
     sum * step as f32
 }
 
-/// Bilinear interpolation in a row-major table of `width` columns at texel coordinates `x`, `y`, which must lie inside.
+/// Bilinear interpolation in a row-major table of `width` columns at texel coordinates `x`, `y`, which must lie inside
+/// the table.
 pub(super) fn bilinear(table: &[Vec3A], width: usize, x: f64, y: f64) -> Vec3 {
     let height = table.len() / width;
     let (x0, y0) = ((x as usize).min(width - 1), (y as usize).min(height - 1));
@@ -100,9 +101,9 @@ pub(super) fn bilinear(table: &[Vec3A], width: usize, x: f64, y: f64) -> Vec3 {
     row(y0).lerp(row(y1), fy).into()
 }
 
-/// A coordinate on the table axis that resolves twilight: the cosine of the sun's zenith angle in 64 texels, 40 of them
-/// linear from -0.42 (the sun 25 degrees below the horizon, where nothing of it reaches the air) to 0, the rest as the
-/// square root of the cosine above.
+/// The table axis that resolves twilight: the cosine of the sun's zenith angle in 64 texels. 40 of them are linear from
+/// -0.42 (the sun 25 degrees below the horizon, where its light does not reach the air) to 0. Above, the rest follow
+/// the square root of the cosine.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SunAxis;
 

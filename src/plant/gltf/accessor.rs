@@ -1,4 +1,4 @@
-//! Reading accessors: every length, offset, index and type is checked before a byte is touched.
+//! Reads accessors. Every length, offset, index and type is checked before a byte is read.
 //!
 //! [glTF 2.0 specification, section 3.6.2 "Accessors"]. The `gltf` crate's iterators trust the file; these do not.
 
@@ -8,13 +8,13 @@ use gltf::json::validation::Checked;
 use super::container::Document;
 use super::error::{EXPORT_AGAIN, Fault, WarningKind, Warnings};
 
-/// Most elements that one accessor may have: 33 million, far beyond any plant, so that a forged count cannot ask for
+/// Maximum number of elements of an accessor: 33 million, far beyond any plant, so that a forged count cannot request
 /// more than a gigabyte.
 pub(super) const MOST_ELEMENTS: u64 = 1 << 25;
 
 /// The elements of an accessor, decoded.
 pub(super) struct Elements {
-    /// Values of one element after the other, integers converted (and normalised where the accessor says so).
+    /// The values, element by element. Integers are converted, and normalised if the accessor says so.
     pub values: Vec<f32>,
     /// Values per element.
     pub width: usize,
@@ -32,17 +32,17 @@ impl Elements {
     }
 }
 
-/// What an attribute may be made of.
+/// The types that an attribute may have.
 pub(super) struct Expected {
-    /// For messages: "POSITION".
+    /// Name for messages, such as "POSITION".
     pub name: &'static str,
-    /// Scalar, vector; a matrix is never expected.
+    /// Scalar or vector; never a matrix.
     pub shape: Type,
-    /// Whether 8 and 16 bit integers are allowed although not normalised (KHR_mesh_quantization).
+    /// Whether 8-bit and 16-bit integers are allowed without normalisation (KHR_mesh_quantization).
     pub integers: bool,
 }
 
-/// The declared facts of an accessor.
+/// The declared layout of an accessor.
 struct Layout {
     view: Option<usize>,
     offset: u64,
@@ -142,7 +142,7 @@ fn layout(document: &Document, index: usize, warnings: &mut Warnings) -> Result<
     Ok(layout)
 }
 
-/// The accessor's bytes, tightly packed, sparse substitutions done.
+/// The bytes of an accessor, tightly packed, with sparse substitutions applied.
 fn read_raw(document: &mut Document, index: usize, layout: &Layout) -> Result<Vec<u8>, Fault> {
     let size = layout.element_size();
     let (wide, count) = (size as usize, layout.count as usize);
@@ -177,7 +177,7 @@ fn read_raw(document: &mut Document, index: usize, layout: &Layout) -> Result<Ve
     Ok(raw)
 }
 
-/// The part of `bytes` that `count` elements of `size` bytes span, `stride` apart, from `offset`.
+/// The part of `bytes` that `count` elements of `size` bytes occupy, `stride` bytes apart, from `offset` on.
 fn strided(bytes: &[u8], offset: u64, stride: u64, size: u64, count: u64) -> Option<&[u8]> {
     if count == 0 {
         return Some(&[]);
@@ -230,7 +230,7 @@ fn substitute(
 fn read_values(document: &mut Document, index: usize, layout: &Layout) -> Result<Vec<f32>, Fault> {
     let raw = read_raw(document, index, layout)?;
     let component = layout.component;
-    // Normalisation of the specification, section 3.6.2.2: c / 127 clamped below, c / 255 and so on.
+    // Normalisation as in section 3.6.2.2 of the specification: c / 127 clamped from below, c / 255 and so on.
     let scale = match (layout.normalized, component) {
         (true, ComponentType::I8) => 127.0,
         (true, ComponentType::U8) => 255.0,

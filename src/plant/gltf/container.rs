@@ -1,7 +1,7 @@
-//! The containers of glTF: GLB chunks, JSON, data URIs, files beside the file.
+//! The containers of glTF: GLB chunks, JSON, data URIs, external files.
 //!
-//! [glTF 2.0 specification, section 4 "GLB File Format Specification"]. The `gltf` crate's own GLB reader is
-//! not used: it subtracts the header size from an unchecked length.
+//! [glTF 2.0 specification, section 4 "GLB File Format Specification"]. The GLB reader of the `gltf` crate is not used,
+//! because it subtracts the size of the header from an unchecked length.
 
 use std::fs::File;
 use std::io::Read;
@@ -12,7 +12,7 @@ use gltf::json;
 use super::ExternalFiles;
 use super::error::{EXPORT_AGAIN, Fault, PlantError, WarningKind, Warnings};
 
-/// Where the files beside a file are.
+/// Where external files come from.
 pub(super) enum Beside<'a> {
     /// In the folder of the file.
     Folder(&'a Path),
@@ -25,11 +25,11 @@ pub(super) struct Document<'a> {
     pub root: json::Root,
     beside: Beside<'a>,
     blob: Option<Vec<u8>>,
-    /// The buffers that have been asked for.
+    /// The buffers that were read so far.
     buffers: Vec<Option<Vec<u8>>>,
 }
 
-/// Parses `bytes`, those of the file `path` (.gltf or .glb, told apart by content).
+/// Parses `bytes`, the content of the file `path`. The content tells .gltf and .glb apart.
 pub(super) fn open<'a>(
     bytes: &[u8],
     path: &Path,
@@ -52,8 +52,8 @@ fn read_root<'a>(
     Ok((parse(text, path)?, blob))
 }
 
-/// The files beside `path` that its `bytes` name for their buffers and images, each once, as relative paths with
-/// forward slashes as written.
+/// The external files that the `bytes` of `path` name for buffers and images, each once: relative paths with forward
+/// slashes, as written.
 pub(super) fn external_files(bytes: &[u8], path: &Path) -> Result<Vec<String>, PlantError> {
     let (root, _) = read_root(bytes, path, &mut Warnings::default())?;
     let buffers = root.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
@@ -65,12 +65,12 @@ pub(super) fn external_files(bytes: &[u8], path: &Path) -> Result<Vec<String>, P
     Ok(files)
 }
 
-/// GLB by its magic number; a file of that name without it is damaged GLB rather than JSON.
+/// Whether a file is GLB, by its magic number. A .glb file without it is damaged GLB rather than JSON.
 fn looks_binary(bytes: &[u8], path: &Path) -> bool {
     bytes.starts_with(b"glTF") || path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("glb"))
 }
 
-/// The little-endian word at `at`, if the slice reaches that far.
+/// The little-endian word at `at`; `None` beyond the end.
 fn word(bytes: &[u8], at: usize) -> Option<usize> {
     let word: [u8; 4] = bytes.get(at..at.checked_add(4)?)?.try_into().ok()?;
     usize::try_from(u32::from_le_bytes(word)).ok()
@@ -135,8 +135,8 @@ fn split_glb<'a>(
     }
 }
 
-/// Parses the JSON part. Whole numbers written as 1.0 and scenes without a node list, which glTF allows and the
-/// `gltf` crate does not, are put right in a second attempt.
+/// Parses the JSON part. A second attempt corrects whole numbers written as 1.0 and scenes without a node list, which
+/// glTF allows and the `gltf` crate does not.
 fn parse(text: &[u8], path: &Path) -> Result<json::Root, PlantError> {
     let failed = |error: json::Error| PlantError::Json {
         path: path.to_path_buf(),
@@ -165,7 +165,7 @@ fn without_position(message: &str) -> &str {
     message.rsplit_once(" at line ").map_or(message, |(text, _)| text)
 }
 
-/// Integral floats become integers, scenes get a node list.
+/// Turns integral floats into integers, and gives scenes a node list.
 fn normalize(value: &mut json::Value) {
     if let Some(scenes) = value.get_mut("scenes").and_then(json::Value::as_array_mut) {
         for scene in scenes.iter_mut().filter_map(json::Value::as_object_mut) {
@@ -236,7 +236,7 @@ impl Document<'_> {
         Ok(slot.as_deref().unwrap_or_default())
     }
 
-    /// The bytes of image `index` as they are encoded.
+    /// The encoded bytes of image `index`.
     pub fn image(&mut self, index: usize) -> Result<Vec<u8>, Fault> {
         let location = format!("/images/{index}");
         let Some(image) = self.root.images.get(index) else {
@@ -250,7 +250,7 @@ impl Document<'_> {
     }
 }
 
-/// The bytes behind `uri`: a data URI or a path relative to the file. At most `limit` bytes are read.
+/// The bytes of `uri`, which is a data URI or a path relative to the file. At most `limit` bytes are read.
 fn read_uri(uri: &str, beside: &Beside, location: &str, limit: Option<u64>) -> Result<Vec<u8>, Fault> {
     if let Some(data) = uri.strip_prefix("data:") {
         let Some((kind, payload)) = data.split_once(',') else {
@@ -284,15 +284,15 @@ fn read_uri(uri: &str, beside: &Beside, location: &str, limit: Option<u64>) -> R
     })
 }
 
-/// The path beside the file that `uri` stands for; `Err` with the text if it is not a path, such as a data URI or the
-/// address of a page.
+/// The relative path that `uri` encodes; `Err` with the decoded text if it is not a path but, for instance, a data URI
+/// or a web address.
 fn relative_path(uri: &str) -> Result<String, String> {
     let path = String::from_utf8_lossy(&decode_percent(uri)).into_owned();
     let scheme = path.split_once(':').is_some_and(|(scheme, _)| scheme.len() > 1 && !scheme.contains(['/', '\\']));
     if scheme || Path::new(&path).has_root() { Err(path) } else { Ok(path) }
 }
 
-/// At most `limit` bytes of `file`; why not, otherwise.
+/// At most `limit` bytes of `file`, or the reason why it cannot be read.
 fn read_file(file: &Path, limit: Option<u64>) -> Result<Vec<u8>, String> {
     if !std::fs::metadata(file).map_err(|error| error.to_string())?.is_file() {
         return Err("it is not a file".into());
@@ -304,7 +304,7 @@ fn read_file(file: &Path, limit: Option<u64>) -> Result<Vec<u8>, String> {
     Ok(bytes)
 }
 
-/// At most 80 characters of a text from a file, for messages.
+/// The first 80 characters of a text from a file, for messages.
 fn shortened(text: &str) -> String {
     match text.char_indices().nth(80) {
         Some((end, _)) => format!("{}...", &text[..end]),
@@ -312,7 +312,7 @@ fn shortened(text: &str) -> String {
     }
 }
 
-/// Decodes `%20` and the like (RFC 3986, section 2.1); what is not an escape stays.
+/// Decodes percent escapes such as `%20` (RFC 3986, section 2.1). Anything else stays as it is.
 fn decode_percent(text: &str) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(text.len());
     let mut rest = text.as_bytes();
@@ -330,7 +330,7 @@ fn decode_percent(text: &str) -> Vec<u8> {
     bytes
 }
 
-/// Decodes base64 (RFC 4648, section 4), padded or not; `None` where a character does not belong.
+/// Decodes base64 (RFC 4648, section 4), with or without padding; `None` if a character is invalid.
 fn decode_base64(text: &str) -> Option<Vec<u8>> {
     let digits = text.trim_end_matches('=').as_bytes();
     let mut bytes = Vec::with_capacity(digits.len() / 4 * 3 + 2);

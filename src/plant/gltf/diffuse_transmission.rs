@@ -1,16 +1,18 @@
-//! KHR_materials_diffuse_transmission (Khronos, glTF 2.0 extension): how much light passes through a leaf, by the file.
+//! KHR_materials_diffuse_transmission (Khronos, glTF 2.0 extension): how much light passes through a leaf, as stated in
+//! the file.
 //!
-//! The extension shares out the diffuse light of a surface: `f` of it passes and takes the colour `c`, the rest is
-//! reflected and takes the base colour. `f` is a factor times a texture's alpha, `c` a factor times a texture's colour.
+//! The extension divides the diffuse light of a surface: the fraction `f` is transmitted with the colour `c`, the rest
+//! is reflected with the base colour. `f` is a factor times a texture's alpha, `c` is a factor times a texture's
+//! colour.
 //!
 //! ```text
 //!  reflected = (1 - f) base colour        transmitted = f c
 //! ```
 //!
-//! A plant's material has one number a channel for the light that passes, a factor on what the inside of the leaf
-//! reflects ([`PlantMaterial::transmission`]). So `f` and `c` are taken in the mean over the leaf, and the factor is
-//! the one with which the leaf transmits `f c` in the mean; where on the leaf more passes and where less, the base
-//! colour tells. Where the base colour leaves no room for it, less is transmitted, and a warning says how much.
+//! The material of a plant has one factor per channel for transmitted light, relative to what the inside of the leaf
+//! reflects ([`PlantMaterial::transmission`]). So `f` and `c` are averaged over the leaf, and the factor is chosen so
+//! that the leaf transmits `f c` on average. The base colour then decides where on the leaf more light passes, and
+//! where less. If the base colour leaves no room for so much light, less is transmitted, and a warning says how much.
 
 use glam::Vec3;
 use gltf::json::Value;
@@ -25,10 +27,10 @@ use crate::plant::optics::{mean_over_leaf, mean_texel};
 /// The name of the extension.
 pub(super) const NAME: &str = "KHR_materials_diffuse_transmission";
 
-/// A share of the light that may be missing without a word.
+/// Fraction of the light that may be missing without a warning.
 const UNSEEN: f32 = 0.01;
 
-/// The extension as it stands in the file.
+/// The extension as written in the file.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct DiffuseTransmission {
@@ -49,10 +51,10 @@ impl Default for DiffuseTransmission {
 }
 
 impl DiffuseTransmission {
-    /// The extension of `material`; `None` where it has none or one that cannot be read, with a warning.
+    /// The extension of `material`; `None` if there is none, or, with a warning, if it cannot be read.
     pub fn of(material: &Material, location: &str, warnings: &mut Warnings) -> Option<Self> {
         let value: &Value = material.extensions.as_ref()?.others.get(NAME)?;
-        // A list would be taken for its members in their order.
+        // Serde would read a list as the fields in their order.
         let read = if value.is_object() {
             Self::deserialize(value).map_err(|error| error.to_string())
         } else {
@@ -68,8 +70,8 @@ impl DiffuseTransmission {
         }
     }
 
-    /// Gives `material`, which has its base colour, mask and gloss, the transmission of the extension, whose decoded
-    /// textures are those given.
+    /// Sets the transmission of `material`, whose base colour, mask and gloss are known. The two textures are those of
+    /// the extension, decoded.
     pub fn apply(
         &self,
         material: &mut PlantMaterial,

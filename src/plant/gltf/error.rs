@@ -1,11 +1,11 @@
-//! What can go wrong, and what was wrong but could be lived with.
+//! Errors and warnings of an import.
 
 use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
 use std::fmt;
 use std::path::PathBuf;
 
-/// Why a plant could not be read. Every message names the file, the location in it and a remedy.
+/// Why a plant cannot be read. Every message names the file, the location in it, and a remedy.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlantError {
@@ -14,7 +14,7 @@ pub enum PlantError {
     Io {
         /// The file.
         path: PathBuf,
-        /// The system's reason.
+        /// The reason that the system gives.
         source: std::io::Error,
     },
     /// The binary container (GLB) is damaged or is not glTF.
@@ -22,14 +22,14 @@ pub enum PlantError {
     Container {
         /// The file.
         path: PathBuf,
-        /// Position of the damage in bytes.
+        /// Position of the damage, in bytes.
         offset: usize,
         /// What is wrong.
         what: String,
         /// What to do.
         remedy: &'static str,
     },
-    /// The JSON part cannot be parsed, or misses something that glTF demands.
+    /// The JSON part cannot be parsed, or lacks something that glTF requires.
     #[error("{path}: JSON line {line}, column {column}: {what}; export the file again or correct it in a text editor", path = path.display())]
     Json {
         /// The file.
@@ -41,7 +41,7 @@ pub enum PlantError {
         /// What is wrong.
         what: String,
     },
-    /// The file demands a version or an extension that is not understood.
+    /// The file requires a version or an extension that is not supported.
     #[error("{path}: needs {what}, which is not supported; {remedy}", path = path.display())]
     Unsupported {
         /// The file.
@@ -56,14 +56,14 @@ pub enum PlantError {
     Data {
         /// The file.
         path: PathBuf,
-        /// JSON pointer to the object at fault, such as `/accessors/3`.
+        /// JSON pointer to the faulty object, such as `/accessors/3`.
         location: String,
         /// What is wrong.
         what: String,
         /// What to do.
         remedy: &'static str,
     },
-    /// There is not a single triangle to draw.
+    /// There is no triangle to draw.
     #[error(
         "{path}: contains no triangles to draw ({scanned}); export the tree as a mesh, in the default scene, with its triangles",
         path = path.display()
@@ -79,30 +79,30 @@ pub enum PlantError {
     Option {
         /// The file.
         path: PathBuf,
-        /// Which option, its value and its range.
+        /// The option, its value and its range.
         what: String,
     },
 }
 
-/// What kind of a [`Warning`] this is.
+/// Kind of a [`Warning`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum WarningKind {
-    /// Something in the file is valid and is not used.
+    /// Something in the file is valid, but is not used.
     Ignored,
-    /// Something was wrong and has been put right.
+    /// Something was wrong and has been corrected.
     Repaired,
-    /// Something is absent and the plant looks different for it.
+    /// Something is missing, which changes how the plant looks.
     Missing,
 }
 
-/// Something about a file that its user should know, though the plant can be drawn.
+/// Something that the user of a file should know, although the plant can be drawn.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Warning {
-    /// What kind of a warning this is.
+    /// Kind of the warning.
     pub kind: WarningKind,
     /// JSON pointer to the object (`/materials/2`), or empty for the file as a whole.
     pub location: String,
-    /// What, and where it helps what to do.
+    /// What is wrong, and, where it helps, what to do.
     pub message: String,
 }
 
@@ -120,10 +120,10 @@ impl fmt::Display for Warning {
     }
 }
 
-/// Distinct warnings that one import keeps; what comes after them is counted.
+/// Maximum number of different warnings of an import. Further ones are only counted.
 const MOST_WARNINGS: usize = 200;
 
-/// The warnings of one import. Those that differ only in location are kept once, with the number of locations.
+/// The warnings of an import. Warnings that differ only in location are combined, with the number of locations.
 #[derive(Debug, Default)]
 pub(super) struct Warnings {
     kept: Vec<(Warning, HashSet<String>)>,
@@ -150,7 +150,7 @@ impl Warnings {
         }
     }
 
-    /// The warnings in the order in which they came up.
+    /// The warnings, in the order in which they occurred.
     pub fn finish(self) -> Vec<Warning> {
         let mut warnings: Vec<Warning> = self
             .kept
@@ -170,7 +170,7 @@ impl Warnings {
     }
 }
 
-/// Trouble with an object of the file, before it is known whether it is an error or a warning.
+/// A problem with an object of the file. The caller decides whether it is an error or a warning.
 #[derive(Debug)]
 pub(super) struct Fault {
     pub location: String,
@@ -188,5 +188,5 @@ impl Fault {
     }
 }
 
-/// The remedy for damage that only the program which wrote the file can undo.
+/// The remedy for damage that only the program that wrote the file can repair.
 pub(super) const EXPORT_AGAIN: &str = "the file is damaged: export or download it again";

@@ -14,32 +14,32 @@ use super::diffuse_transmission::DiffuseTransmission;
 use super::error::{WarningKind, Warnings};
 use crate::plant::{Gloss, PartKind, PlantMaterial};
 
-/// Longest side of an image in texels that is decoded.
+/// Maximum side of an image in texels. Larger images are not decoded.
 const LONGEST_SIDE: u32 = 16_384;
 
-/// A material with what its vertices need to know.
+/// A material, and which texture coordinates it uses.
 pub(super) struct Surface {
     pub name: String,
     pub kind: PartKind,
     pub material: PlantMaterial,
-    /// The set of texture coordinates that the textures read.
+    /// Index of the set of texture coordinates that the textures use.
     pub uv_set: u32,
-    /// What is done to those coordinates (KHR_texture_transform).
+    /// Transform of those coordinates (KHR_texture_transform).
     pub uv_transform: Affine2,
 }
 
 impl Surface {
-    /// Whether texture coordinates matter.
+    /// Whether it has a texture, so that texture coordinates matter.
     pub fn is_textured(&self) -> bool {
         self.material.base_color_texture.is_some() || self.material.normal_texture.is_some()
     }
 }
 
-/// Decoded images by index: each is decoded once, however many materials use it.
+/// Decoded images by index. Each image is decoded once, however many materials use it.
 #[derive(Default)]
 pub(super) struct Images(Vec<Option<Option<Arc<RgbaImage>>>>);
 
-/// A texture reference in either of its two shapes.
+/// A reference to a texture, with or without KHR_texture_transform.
 struct Reference {
     texture: usize,
     uv_set: u32,
@@ -50,7 +50,7 @@ impl Reference {
     fn new(info: &Info) -> Self {
         let extension = info.extensions.as_ref().and_then(|extensions| extensions.texture_transform.as_ref());
         let transform = extension.map_or(Affine2::IDENTITY, |t| {
-            // Counter-clockwise in a frame whose v points down, as the extension's reference viewers have it.
+            // Counter-clockwise in a frame whose v axis points down, as in the reference viewers of the extension.
             let (sine, cosine) = t.rotation.0.sin_cos();
             let rotation = Mat2::from_cols(Vec2::new(cosine, -sine), Vec2::new(sine, cosine));
             let matrix = rotation * Mat2::from_diagonal(Vec2::from(t.scale.0));
@@ -61,7 +61,7 @@ impl Reference {
     }
 }
 
-/// Reads material `index` (`None`: the default material of glTF).
+/// Reads material `index`; `None` is the default material of glTF.
 pub(super) fn read(
     document: &mut Document,
     index: Option<usize>,
@@ -105,7 +105,7 @@ pub(super) fn read(
     if kind == PartKind::Foliage {
         material.gloss = options.gloss.unwrap_or(Gloss::LEAF).sanitized();
         let cutoff = unit(source.alpha_cutoff.as_ref().map_or(0.5, |cutoff| cutoff.0));
-        // The factor's alpha scales the texture's; the threshold is scaled instead, to the same effect.
+        // The alpha of the factor scales the alpha of the texture. Scaling the threshold instead has the same effect.
         let masked = source.alpha_mode == Checked::Valid(AlphaMode::Mask);
         if masked && opacity < cutoff {
             let message =
@@ -138,7 +138,8 @@ pub(super) fn read(
     surface
 }
 
-/// Gives foliage its transmission: the caller's, else the file's, else what is usual for the kind of leaf.
+/// Sets the transmission of foliage: the caller's, otherwise the file's, otherwise the typical one for the kind of
+/// leaf.
 fn transmit(
     material: &mut PlantMaterial,
     source: &Material,
@@ -163,7 +164,7 @@ fn transmit(
     }
 }
 
-/// Wood or foliage: by the caller's lists, else by the alpha mode.
+/// Wood or foliage, by the caller's lists, otherwise by the alpha mode.
 fn kind_of(source: &Material, name: &str, options: &GltfOptions, location: &str, warnings: &mut Warnings) -> PartKind {
     let listed = |names: &[String]| names.iter().any(|listed| listed == name);
     if listed(&options.foliage_materials) {
@@ -183,7 +184,7 @@ fn kind_of(source: &Material, name: &str, options: &GltfOptions, location: &str,
     }
 }
 
-/// The decoded image of texture `index`, or a warning and `None`.
+/// The decoded image of texture `index`; `None`, with a warning, if there is none.
 fn load(
     document: &mut Document,
     index: usize,
@@ -220,14 +221,14 @@ fn load(
     images.0[image].clone().flatten()
 }
 
-/// The texture formats that the file uses beyond PNG and JPEG, in brackets.
+/// The texture formats that the file uses besides PNG and JPEG, in parentheses.
 fn texture_extensions(document: &Document) -> String {
     let used: Vec<&str> =
         document.root.extensions_used.iter().map(String::as_str).filter(|name| name.contains("_texture_")).collect();
     if used.is_empty() { String::new() } else { format!(" (the file uses {})", used.join(", ")) }
 }
 
-/// Decodes a PNG or JPEG, whatever its declared type.
+/// Decodes a PNG or JPEG image, whatever its declared type.
 fn decode(bytes: Vec<u8>) -> Result<RgbaImage, String> {
     let mut reader = ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
     if reader.format().is_none() {
@@ -241,7 +242,7 @@ fn decode(bytes: Vec<u8>) -> Result<RgbaImage, String> {
     Ok(image.into_rgba8())
 }
 
-/// A factor of 0..1; what is not a number becomes 1.
+/// A factor, clamped to 0..1. NaN becomes 1.
 fn unit(value: f32) -> f32 {
     if value.is_nan() { 1.0 } else { value.clamp(0.0, 1.0) }
 }

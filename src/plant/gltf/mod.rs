@@ -1,15 +1,14 @@
-//! glTF and GLB to [`Plant`].
+//! Reads plants ([`Plant`]) from glTF and GLB files.
 //!
-//! Reads glTF 2.0 [Khronos 2021] as JSON or GLB, with buffers and images in the file, in data URIs or in files beside
-//! it. What is used of it: the default scene's triangles with position, normal and one set of texture coordinates;
-//! base colour (factor, texture), normal texture, alpha mode and cutoff; KHR_texture_transform,
-//! KHR_materials_pbrSpecularGlossiness (its diffuse part), KHR_materials_diffuse_transmission (its textures by their
-//! means over the leaf) and KHR_mesh_quantization. Everything else is named in a [`Warning`].
+//! The files are glTF 2.0 [Khronos 2021], JSON or GLB, with buffers and images in the file, in data URIs or in external
+//! files. The reader uses the triangles of the default scene with position, normal and one set of texture coordinates;
+//! base colour (factor and texture), normal texture, alpha mode and cutoff; KHR_texture_transform,
+//! KHR_materials_pbrSpecularGlossiness (its diffuse part), KHR_materials_diffuse_transmission (the averages of its
+//! textures over the leaf) and KHR_mesh_quantization. A [`Warning`] names everything else.
 //!
-//! Files come from anywhere, so nothing in them is believed: every index, length and count is checked before it is
-//! used, and no file makes this module panic or allocate beyond its own size and fixed limits. Damage that touches
-//! geometry is a [`PlantError`]; anything else (a missing texture, a broken normal) is repaired or left out, with a
-//! warning.
+//! Files come from anywhere, so nothing in them is trusted. Every index, length and count is checked before it is used.
+//! No file makes this module panic, or allocate more than its own size and fixed limits allow. Damaged geometry is a
+//! [`PlantError`]. Anything else (a missing texture, a broken normal) is repaired or omitted, with a warning.
 
 mod accessor;
 mod container;
@@ -33,11 +32,11 @@ use container::Beside;
 use error::{EXPORT_AGAIN, Fault, Warnings};
 use material::{Images, Surface};
 
-/// A plant that stands farther off than this share of its height is moved to the origin.
+/// A plant that stands farther from the origin than this fraction of its height is moved there.
 const FAR_OFF: f32 = 0.1;
-/// The part of the wood, from its lowest point, whose mean is the foot.
+/// Fraction of the height of the wood, from its lowest point, whose mean position is the foot.
 const FOOT_SHARE: f32 = 0.02;
-/// Heights in metres outside of which a plant is probably in other units.
+/// Plausible heights in metres. A plant outside this range probably has other units.
 const PLAUSIBLE_HEIGHTS: std::ops::RangeInclusive<f32> = 0.02..=130.0;
 
 /// How a file becomes a plant.
@@ -49,13 +48,13 @@ pub struct GltfOptions {
     pub foliage_materials: Vec<String>,
     /// Names of materials that are wood whatever their alpha mode.
     pub wood_materials: Vec<String>,
-    /// What the leaves are made of: how much light passes, where the file does not say it.
+    /// Kind of the leaves. It decides how much light passes through them if the file does not say so.
     pub leaf: LeafKind,
-    /// Light through leaves, as [`super::PlantMaterial::transmission`] has it, 0..2 each. `None` takes what the file's
-    /// materials say (KHR_materials_diffuse_transmission), else what is usual for `leaf`.
+    /// Transmission of leaves, as [`super::PlantMaterial::transmission`], 0..2 each. `None` takes that of the file's
+    /// materials (KHR_materials_diffuse_transmission), or else the typical one of `leaf`.
     pub transmission: Option<Vec3>,
-    /// The gloss of leaves; `None` is [`Gloss::LEAF`]. glTF's roughness and specular terms are those of exporters'
-    /// defaults.
+    /// Gloss of leaves; `None` is [`Gloss::LEAF`]. The file's roughness and specular terms are not used: they are
+    /// mostly the defaults of an exporter.
     pub gloss: Option<Gloss>,
     /// Name of the plant; `None` takes the file's name without its ending.
     pub name: Option<String>,
@@ -65,38 +64,38 @@ pub struct GltfOptions {
 ///
 /// - Materials with alpha mode MASK or BLEND are [`PartKind::Foliage`], others [`PartKind::Wood`], unless `options`
 ///   names them. All primitives with the same material become one part; wood comes first.
-/// - The plant's foot is the middle of the lowest 2 % of its wood (of all of it where there is no wood). Where the
-///   foot is farther than 10 % of the height from the origin, sideways or in height, the plant is moved there; nearer
-///   it is left as modelled, so that roots stay below the ground.
-/// - With [`GltfOptions::height`] it is then scaled to that height.
+/// - The foot of the plant is the mean position of the lowest 2 % of its wood (or of the whole plant, if it has no
+///   wood). If the foot is farther from the origin than 10 % of the height, horizontally or vertically, it is moved to
+///   the origin. Otherwise the plant stays as modelled, so that roots stay below the ground.
+/// - With [`GltfOptions::height`] the plant is then scaled to that height.
 ///
 /// # Errors
-/// [`PlantError`] if the file cannot be read, is not glTF 2.0, demands an unknown extension, has geometry that cannot
-/// be used or has no triangles, or if an option is out of range.
+/// [`PlantError`] if the file cannot be read, is not glTF 2.0, requires an unknown extension, has unusable geometry or
+/// no triangles, or if an option is out of range.
 pub fn load_plant(path: &Path, options: &GltfOptions) -> Result<(Plant, Vec<Warning>), PlantError> {
     let bytes = std::fs::read(path).map_err(|source| PlantError::Io { path: path.to_path_buf(), source })?;
     let folder = path.parent().unwrap_or(Path::new(""));
     read_plant(&bytes, path, Beside::Folder(folder), options)
 }
 
-/// Files beside a .gltf file, by the relative paths that [`external_files`] lists: their bytes, or why they cannot be
-/// read.
+/// External files of a .gltf file, by the relative paths that [`external_files`] lists: their bytes, or why they cannot
+/// be read.
 pub type ExternalFiles = BTreeMap<String, Result<Vec<u8>, String>>;
 
-/// The files that the bytes of a glTF file name for its buffers and images: relative paths, sorted, each once. A GLB
-/// mostly names none. `name` is the file's name, for messages.
+/// The external files that the bytes of a glTF file name for buffers and images: relative paths, sorted, each once.
+/// Most GLB files name none. `name` is the name of the file, for messages.
 ///
 /// # Errors
-/// [`PlantError`] where the bytes are not glTF 2.0.
+/// [`PlantError`] if the bytes are not glTF 2.0.
 pub fn external_files(bytes: &[u8], name: &Path) -> Result<Vec<String>, PlantError> {
     container::external_files(bytes, name)
 }
 
-/// Reads the plant in the `bytes` of a glTF file, as [`load_plant`] does from the file itself: `name` is the file's
-/// name, for messages and for the plant's own name, `files` what stands beside it.
+/// Reads the plant in the `bytes` of a glTF file, as [`load_plant`] reads the file itself. `name` is the name of the
+/// file, for messages and for the name of the plant. `files` are its external files.
 ///
 /// # Errors
-/// Those of [`load_plant`]. A file that is missing is an error for a buffer and a warning for an image.
+/// Those of [`load_plant`]. A missing file is an error for a buffer and a warning for an image.
 pub fn load_plant_bytes(
     bytes: &[u8],
     name: &Path,
@@ -139,14 +138,14 @@ fn read_plant(
     Ok((plant, warnings.finish()))
 }
 
-/// Extensions whose absence changes looks at most.
+/// Whether an extension affects only the look of a plant, so that a file that requires it can be read without it.
 fn is_harmless(extension: &str) -> bool {
     const PREFIXES: [&str; 7] =
         ["KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_", "KHR_xmp", "KHR_animation_"];
     extension == "KHR_mesh_quantization" || PREFIXES.iter().any(|prefix| extension.starts_with(prefix))
 }
 
-/// Extensions that are understood.
+/// Whether an extension is supported.
 fn is_understood(extension: &str) -> bool {
     let others = ["KHR_texture_transform", "KHR_materials_pbrSpecularGlossiness", "KHR_mesh_quantization"];
     extension == diffuse_transmission::NAME || others.contains(&extension)
@@ -166,7 +165,7 @@ fn check_extensions(root: &gltf::json::Root, path: &Path, warnings: &mut Warning
     Ok(())
 }
 
-/// Reads all meshes of the scene, one mesh per material, in the order of the materials.
+/// Reads all meshes of the scene and merges them by material, in the order of the materials.
 fn gather(
     document: &mut container::Document,
     options: &GltfOptions,
@@ -174,7 +173,7 @@ fn gather(
 ) -> Result<Vec<(Surface, PlantMesh)>, Fault> {
     let mut placements = nodes::placements(&document.root, warnings)?;
     if document.root.nodes.is_empty() && !document.root.meshes.is_empty() {
-        // A file that is a collection of meshes without a scene: they are the plant.
+        // The file is a collection of meshes without a scene. Together they are the plant.
         warnings.push(WarningKind::Repaired, "/nodes", "there are no nodes; all meshes are used as they are");
         let meshes = 0..document.root.meshes.len();
         placements.extend(meshes.map(|mesh| nodes::Placement { node: mesh, mesh, transform: glam::DMat4::IDENTITY }));
@@ -219,7 +218,7 @@ fn append(merged: &mut PlantMesh, mesh: PlantMesh) {
     merged.triangles.extend(mesh.triangles.into_iter().map(|triangle| triangle.map(|index| index + first)));
 }
 
-/// Names what the file has and a plant does not use, and options that fit nothing.
+/// Warns of parts of the file that a plant does not use, and of options that match nothing.
 fn mention_unused(root: &gltf::json::Root, options: &GltfOptions, warnings: &mut Warnings) {
     let unused = [("animations", root.animations.len()), ("skins", root.skins.len()), ("cameras", root.cameras.len())];
     for (name, count) in unused.into_iter().filter(|(_, count)| *count > 0) {
@@ -246,7 +245,7 @@ fn mention_absent_kind(plant: &Plant, warnings: &mut Warnings) {
     }
 }
 
-/// Puts the plant's foot to the origin if it is far off, and scales it.
+/// Moves the foot of the plant to the origin if it is far from it, and scales the plant.
 fn stand(plant: &mut Plant, options: &GltfOptions, warnings: &mut Warnings) -> Result<(), Fault> {
     let Some(bounds) = plant.bounds() else {
         return Ok(());
@@ -282,7 +281,8 @@ fn stand(plant: &mut Plant, options: &GltfOptions, warnings: &mut Warnings) -> R
     if finite { Ok(()) } else { Err(Fault::new("", "positions leave the range of numbers", EXPORT_AGAIN)) }
 }
 
-/// The middle of the lowest 2 % of the wood (of the plant where there is none), at the height of its lowest point.
+/// The mean position of the lowest 2 % of the wood (or of the plant, if it has no wood), at the height of its lowest
+/// point.
 fn foot(plant: &Plant) -> Vec3 {
     let has_wood = plant.triangle_count(PartKind::Wood) > 0;
     let counts = |kind: PartKind| !has_wood || kind == PartKind::Wood;

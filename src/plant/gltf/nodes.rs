@@ -6,21 +6,22 @@ use gltf::json::{Root, scene::Node};
 use super::error::{EXPORT_AGAIN, Fault, WarningKind, Warnings};
 use crate::plant::PlantMesh;
 
-/// Largest coordinate in metres that is taken for a plant's: far enough for any unit, near enough that lengths, areas
-/// and sums stay finite.
+/// Largest coordinate of a plant in metres: large enough for any unit, small enough that lengths, areas and sums stay
+/// finite.
 const FARTHEST: f32 = 1e9;
 
-/// A mesh where a node puts it.
+/// A mesh, and where a node places it.
 pub(super) struct Placement {
     /// Index of the node.
     pub node: usize,
     /// Index of the mesh.
     pub mesh: usize,
-    /// From the mesh's frame to the scene's.
+    /// Transform from the frame of the mesh to that of the scene.
     pub transform: DMat4,
 }
 
-/// All meshes of the default scene (the first one where the file names none; all root nodes where there is no scene).
+/// All meshes of the default scene. That is the first scene if the file names none, and all root nodes if there is no
+/// scene.
 pub(super) fn placements(root: &Root, warnings: &mut Warnings) -> Result<Vec<Placement>, Fault> {
     let mut visited = vec![false; root.nodes.len()];
     let mut found = Vec::new();
@@ -52,7 +53,7 @@ pub(super) fn placements(root: &Root, warnings: &mut Warnings) -> Result<Vec<Pla
     Ok(found)
 }
 
-/// The root nodes to start from.
+/// The root nodes of the default scene.
 fn roots(root: &Root, warnings: &mut Warnings) -> Result<Vec<usize>, Fault> {
     if root.scenes.len() > 1 {
         let message = format!("{} other scenes", root.scenes.len() - 1);
@@ -80,7 +81,7 @@ fn roots(root: &Root, warnings: &mut Warnings) -> Result<Vec<usize>, Fault> {
     Ok((0..root.nodes.len()).filter(|&node| !is_child[node]).collect())
 }
 
-/// The node's own transform: its matrix, or translation * rotation * scale.
+/// The local transform of a node: its matrix, or translation * rotation * scale.
 fn local_transform(node: &Node, location: &str, warnings: &mut Warnings) -> Result<DMat4, Fault> {
     if let Some(matrix) = node.matrix {
         return Ok(DMat4::from_cols_array(&matrix.map(f64::from)));
@@ -106,12 +107,14 @@ fn local_transform(node: &Node, location: &str, warnings: &mut Warnings) -> Resu
     Ok(DMat4::from_scale_rotation_translation(scale, rotation, vector(node.translation, DVec3::ZERO)))
 }
 
-/// Moves `mesh` by `transform`: normals by the inverse transpose, triangles reversed where it mirrors.
+/// Transforms `mesh` by `transform`. Normals are transformed by the inverse transpose, and triangles are reversed if
+/// the transform mirrors.
 ///
-/// Where a transform flattens, triangles on edge lose their area; they are removed and counted in the result.
+/// If the transform flattens, triangles that are seen edge-on lose their area. They are removed, and the result is
+/// their number.
 pub(super) fn apply(mesh: &mut PlantMesh, transform: &DMat4, location: &str) -> Result<usize, Fault> {
     let linear = DMat3::from_mat4(*transform);
-    // The cofactor matrix is the inverse transpose times the determinant, and exists for flattening ones too.
+    // The cofactor matrix is the inverse transpose times the determinant. It exists for singular transforms, too.
     let cofactor = DMat3::from_cols(
         linear.y_axis.cross(linear.z_axis),
         linear.z_axis.cross(linear.x_axis),

@@ -1,4 +1,4 @@
-//! One primitive of a mesh as a clean triangle mesh in its own frame.
+//! Reads a primitive of a mesh as a clean triangle mesh in its own frame.
 
 use glam::{DVec3, Vec2, Vec3};
 use gltf::json::accessor::Type;
@@ -11,19 +11,19 @@ use super::error::{EXPORT_AGAIN, Fault, WarningKind, Warnings};
 use super::material::Surface;
 use crate::plant::PlantMesh;
 
-/// A triangle whose area is below this share of its longest edge squared is degenerate: a sliver some 10^-7 of its
-/// length thin, whose normal is rounding noise.
+/// A triangle whose area is below this fraction of the square of its longest edge is degenerate. Its width is about
+/// 10^-7 of its length, so its normal is rounding noise.
 const SLIVER: f64 = 1e-7;
 
-/// Number of indices (or vertices, where there are no indices) that `primitive` claims to have.
+/// Number of indices (or of vertices, if there are no indices) that `primitive` claims to have.
 pub(super) fn claimed_size(document: &Document, primitive: &Primitive) -> u64 {
     let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
     primitive.indices.or(positions.copied()).map_or(0, |accessor| claimed_count(document, accessor.value()))
 }
 
-/// Reads `primitive`; `None` (with a warning) if it is not made of triangles.
+/// Reads `primitive`; `None`, with a warning, if it does not consist of triangles.
 ///
-/// Vertices that no triangle uses and degenerate triangles are dropped.
+/// Unused vertices and degenerate triangles are dropped.
 pub(super) fn read(
     document: &mut Document,
     primitive: &Primitive,
@@ -45,7 +45,7 @@ pub(super) fn read(
     };
     mention_unused(primitive, location, warnings);
 
-    // Quantised attributes are only legal with the extension, which the caller has accepted if it is required.
+    // Quantised attributes are valid only with the extension, which the caller has accepted if it is required.
     let quantized = document.root.extensions_used.iter().any(|name| name == "KHR_mesh_quantization");
     let vector = |name| Expected { name, shape: Type::Vec3, integers: quantized };
     let points = read_attribute(document, positions.value(), &vector("POSITION"), warnings)?;
@@ -119,14 +119,14 @@ pub(super) fn read(
     Ok(Some(finish(builder.mesh, location, warnings)))
 }
 
-/// A vertex; a normal of zero is missing.
+/// A vertex. A zero normal means that the normal is missing.
 struct Vertex {
     position: Vec3,
     normal: Vec3,
     uv: Vec2,
 }
 
-/// Gathers the vertices that triangles use, in the order of their first use.
+/// Collects the vertices that triangles use, in the order of their first use.
 struct Builder {
     mesh: PlantMesh,
     renumbered: Vec<u32>,
@@ -137,7 +137,7 @@ impl Builder {
         Self { mesh: PlantMesh::default(), renumbered: vec![u32::MAX; vertices] }
     }
 
-    /// Appends a triangle; `vertex` gives the vertices that are new.
+    /// Appends a triangle. `vertex` reads the vertices that are new.
     fn triangle(&mut self, corners: [u32; 3], mut vertex: impl FnMut(u32) -> Vertex) {
         let corners = corners.map(|corner| {
             let number = &mut self.renumbered[corner as usize];
@@ -161,7 +161,7 @@ fn vec3(values: &[f32]) -> Vec3 {
     }
 }
 
-/// Says which parts of a primitive are not used.
+/// Warns of the parts of a primitive that are not used.
 fn mention_unused(primitive: &Primitive, location: &str, warnings: &mut Warnings) {
     if primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
         warnings.push(WarningKind::Ignored, location, "its morph targets; the plant stands in its base shape");
@@ -171,7 +171,7 @@ fn mention_unused(primitive: &Primitive, location: &str, warnings: &mut Warnings
     }
 }
 
-/// Triangle corners from a list, a strip or a fan [glTF 2.0, section 3.7.2.1].
+/// The corners of the triangles of a list, a strip or a fan [glTF 2.0, section 3.7.2.1].
 fn triangulate(indices: &[u32], mode: Mode, location: &str, warnings: &mut Warnings) -> Vec<[u32; 3]> {
     match mode {
         Mode::TriangleStrip => indices
@@ -194,7 +194,7 @@ fn triangulate(indices: &[u32], mode: Mode, location: &str, warnings: &mut Warni
     }
 }
 
-/// Computes the normals that are missing.
+/// Computes missing normals.
 fn finish(mut mesh: PlantMesh, location: &str, warnings: &mut Warnings) -> PlantMesh {
     let missing = mesh.normals.iter().filter(|normal| **normal == Vec3::ZERO).count();
     if missing > 0 {
@@ -212,9 +212,9 @@ fn is_sliver([a, b, c]: [DVec3; 3]) -> bool {
     !doubled_area.is_finite() || doubled_area <= SLIVER * longest || doubled_area == 0.0
 }
 
-/// Gives vertices without a normal the mean of their triangles' normals, weighted by area.
+/// Sets missing normals to the mean of the normals of their triangles, weighted by area.
 ///
-/// glTF asks for flat shading here; bark and leaves look better smooth, and hard edges have split vertices anyway.
+/// glTF requires flat shading here. Bark and leaves look better smooth, and hard edges have split vertices anyway.
 fn fill_normals(mesh: &mut PlantMesh) {
     let mut sums = vec![DVec3::ZERO; mesh.positions.len()];
     for triangle in &mesh.triangles {
@@ -229,7 +229,7 @@ fn fill_normals(mesh: &mut PlantMesh) {
     }
 }
 
-/// Guards the sum of all primitives' sizes, since nodes may use one mesh many times.
+/// Limits the total size of all primitives, since nodes may use a mesh many times.
 pub(super) fn check_budget(total: u64, location: &str) -> Result<(), Fault> {
     if total > MOST_ELEMENTS {
         let what = format!("with it the plant has more than {MOST_ELEMENTS} vertices or indices");

@@ -1,11 +1,11 @@
-//! What a plant consists of, for people.
+//! A summary of a plant, for display.
 
 use std::fmt;
 
 use super::Warning;
 use crate::plant::{PartKind, Plant};
 
-/// A summary of a plant and of what its file left open.
+/// A summary of a plant and of the warnings of its import.
 #[derive(Clone, Debug)]
 pub struct PlantReport {
     /// The plant's name.
@@ -16,7 +16,7 @@ pub struct PlantReport {
     pub foliage_triangles: usize,
     /// Extent along x, y and z in metres; `None` for an empty plant.
     pub size: Option<[f32; 3]>,
-    /// Height above the foot in metres.
+    /// Height above the foot, in metres.
     pub height: f32,
     /// The parts in the order in which they are drawn.
     pub parts: Vec<PartReport>,
@@ -33,7 +33,7 @@ pub struct PartReport {
     pub vertices: usize,
     /// Number of triangles.
     pub triangles: usize,
-    /// Area of its triangles in square metres, one side, alpha not regarded.
+    /// Area of its triangles in square metres: one side, without regard to alpha.
     pub area: f64,
     /// Width and height of the base colour texture in texels.
     pub color_texture: Option<(u32, u32)>,

@@ -1,8 +1,9 @@
 //! The foliage: cards with leaf clusters along the outermost stems (Weber & Penn 1995, 4.9, with clusters for leaves).
 //!
-//! All stems that may carry leaves are laid end to end, each metre weighted by how far out in the crown it is, and the
-//! cards are dealt at even steps along that line. So the density of foliage follows the branching and not the number
-//! of cards: with fewer of them each is larger, and reaches as far back along its twig as it reaches further out.
+//! All stems that can carry leaves are laid end to end, each metre weighted by how far out in the crown it is. The
+//! cards are distributed at even steps along that line. So the density of the foliage follows the branching, not the
+//! number of cards. With fewer cards, each is larger, and extends as far back along its twig as it extends further
+//! outwards.
 //!
 //! ```text
 //!   flat: 2 triangles     folded along the twig: 4
@@ -19,7 +20,8 @@ use super::random::Random;
 use super::skeleton::{Skeleton, node_at};
 use crate::plant::PlantMesh;
 
-/// Cards are not made smaller than at this share of the species' count before they are folded.
+/// Number of cards, as a fraction of the species' count, beyond which more triangles fold cards instead of adding
+/// smaller ones.
 const FOLD_FROM: f32 = 0.6;
 
 /// Builds foliage of exactly `triangles` triangles (one fewer if that is odd).
@@ -31,19 +33,19 @@ pub(super) fn mesh(skeleton: &Skeleton, species: &GrowParameters, random: &Rando
     let count = pairs - folded;
 
     let mut cards = deal(skeleton, leaves, random, count);
-    // One area for all numbers of cards: that of the species, scaled to this individual.
+    // The total area does not depend on the number of cards: it is that of the species, scaled to this individual.
     let wanted = leaves.count as f32 * (leaves.scale * skeleton.scale).powi(2);
     let drawn: f32 = cards.iter().map(|card| card.length * card.length).sum();
     let factor = (wanted / drawn.max(1e-12)).sqrt();
     for card in &mut cards {
         card.length *= factor;
-        // What a card is larger than the species' cluster goes half outwards, half back along the twig.
+        // A card that is larger than the species' cluster extends half outwards, half back along the twig.
         let reference = leaves.scale * skeleton.scale;
         card.base -= card.direction * 0.5 * (card.length - reference).max(0.0);
     }
     let crown = Crown::around(&cards);
     let mut mesh = PlantMesh::default();
-    // Folds are dealt evenly over the tree (Bresenham's rule).
+    // Folds are distributed evenly over the tree (Bresenham's algorithm).
     for (index, card) in cards.iter().enumerate() {
         let fold = (index + 1) * folded / count > index * folded / count;
         card.build(leaves, &crown, fold, &mut mesh);
@@ -53,13 +55,13 @@ pub(super) fn mesh(skeleton: &Skeleton, species: &GrowParameters, random: &Rando
 
 /// One leaf cluster.
 struct Card {
-    /// Where its twig begins.
+    /// Position where its twig begins.
     base: Vec3,
-    /// Along its twig, unit length.
+    /// Direction of its twig, unit length.
     direction: Vec3,
-    /// Its upper side, unit length, square to the direction.
+    /// Normal of its upper side, unit length, perpendicular to the direction.
     normal: Vec3,
-    /// Along its twig, metres.
+    /// Length along its twig, metres.
     length: f32,
     /// Whether the texture is mirrored.
     mirrored: bool,
@@ -73,8 +75,8 @@ struct Run {
     weight: f32,
 }
 
-/// Finds the pieces of stems that carry leaves: all of the last level, the outer half of the level before, and the
-/// tips of what is thicker.
+/// Finds the pieces of stems that carry leaves: the whole stems of the last level, the outer halves of the level
+/// before, and the tips of thicker stems.
 fn runs(skeleton: &Skeleton, leaves: &LeafParameters) -> Vec<Run> {
     let last = skeleton.stems.iter().map(|stem| stem.level).max().unwrap_or(0);
     let mut runs = Vec::new();
@@ -92,7 +94,7 @@ fn runs(skeleton: &Skeleton, leaves: &LeafParameters) -> Vec<Run> {
             let from = first + length * piece as f32;
             let outward = node_at(&stem.nodes, from + 0.5 * length).outward;
             let inside = 1.0 - ((outward - 0.15) / 0.5).clamp(0.0, 1.0);
-            // Short twigs bear about as many leaves as long ones (4.9), hence the root of the length.
+            // Short twigs have about as many leaves as long ones (4.9), hence the square root of the length.
             let crowded = (length * pieces as f32).max(1e-3).sqrt() / pieces as f32;
             let weight = crowded * (1.0 - leaves.shell * inside) + 1e-6;
             runs.push(Run { stem: index, from, length, weight });
@@ -101,7 +103,7 @@ fn runs(skeleton: &Skeleton, leaves: &LeafParameters) -> Vec<Run> {
     runs
 }
 
-/// Deals `count` cards along the runs. Lengths are relative to each other only.
+/// Distributes `count` cards along the runs. Their lengths are relative to each other.
 fn deal(skeleton: &Skeleton, leaves: &LeafParameters, random: &Random, count: usize) -> Vec<Card> {
     let runs = runs(skeleton, leaves);
     let total: f64 = runs.iter().map(|run| f64::from(run.weight)).sum();
@@ -131,7 +133,7 @@ fn deal(skeleton: &Skeleton, leaves: &LeafParameters, random: &Random, count: us
         };
         let turn = azimuth + 20.0 * draw.signed();
         let down = leaves.down_angle_deg + leaves.down_angle_variation_deg * draw.signed();
-        // From the twig's underside, as the branches.
+        // Measured from the underside of the twig, as for branches.
         let level = tangent.cross(Vec3::Y).normalize_or(Vec3::X);
         let under = tangent.cross(level).normalize_or(Vec3::Z);
         let aside = Quat::from_axis_angle(tangent, turn.to_radians()) * under;
@@ -143,7 +145,7 @@ fn deal(skeleton: &Skeleton, leaves: &LeafParameters, random: &Random, count: us
         let out = Vec3::new(node.position.x, 0.0, node.position.z).normalize_or_zero();
         let light = (out + Vec3::Y).normalize_or(Vec3::Y);
         let normal = square_to(any.normalize_or(Vec3::X), direction).lerp(square_to(light, direction), leaves.bend);
-        // A cluster is not much longer than the twig that bears it.
+        // A cluster is not much longer than its twig.
         let stem_length = nodes[nodes.len() - 1].distance - nodes[0].distance;
         let short = (0.5 + 0.5 * stem_length / leaves.scale).min(1.0);
         cards.push(Card {
@@ -157,7 +159,7 @@ fn deal(skeleton: &Skeleton, leaves: &LeafParameters, random: &Random, count: us
     cards
 }
 
-/// The part of `vector` square to the unit vector `direction`, of unit length.
+/// The part of `vector` perpendicular to the unit vector `direction`, normalised.
 fn square_to(vector: Vec3, direction: Vec3) -> Vec3 {
     (vector - direction * vector.dot(direction)).normalize_or(direction.any_orthonormal_vector())
 }
@@ -169,7 +171,8 @@ struct Crown {
 }
 
 impl Crown {
-    /// Around all cards. Its middle lies below the crown's, so that most of the crown faces the sky.
+    /// The ellipsoid around all cards. Its centre lies below that of the crown, so that most of the crown faces the
+    /// sky.
     fn around(cards: &[Card]) -> Self {
         let first = cards.first().map_or(Vec3::ZERO, |card| card.base);
         let (low, high) = cards.iter().fold((first, first), |(low, high), c| (low.min(c.base), high.max(c.base)));
@@ -179,7 +182,7 @@ impl Crown {
         Self { center, radii }
     }
 
-    /// Outwards from the crown (the ellipsoid's gradient), unit length.
+    /// Unit vector outwards from the crown: the gradient of the ellipsoid.
     fn outward(&self, point: Vec3) -> Vec3 {
         ((point - self.center) / (self.radii * self.radii)).normalize_or(Vec3::Y)
     }

@@ -1,4 +1,4 @@
-//! Species grown by rule, in the tradition of Weber & Penn 1995, "Creation and Rendering of Realistic Trees"
+//! Grows species by rules, after Weber & Penn 1995, "Creation and Rendering of Realistic Trees"
 //! (SIGGRAPH 95).
 //!
 //! ```text
@@ -7,13 +7,13 @@
 //!                                (stems)    └─> foliage cards with leaf clusters, for all triangles that remain
 //! ```
 //!
-//! The skeleton depends on the species and the seed only, so an individual keeps its shape whatever the number of
-//! triangles; with fewer triangles thin wood is left out, and fewer, larger clusters keep the area of the foliage.
-//! A tree of 60,000 triangles takes some tens of milliseconds; the textures of bark and leaves are painted once per
+//! The skeleton depends only on the species and the seed, so an individual keeps its shape whatever the number of
+//! triangles. With fewer triangles, thin wood is omitted, and fewer but larger clusters preserve the area of the
+//! foliage. A tree of 60,000 triangles takes tens of milliseconds. The textures of bark and leaves are painted once per
 //! process and shared.
 //!
-//! Departures from the paper are named at the parameters concerned. Not modelled: degradation at range (5), since
-//! levels of detail are made elsewhere, and wind (4.7).
+//! The parameters say where they differ from the paper. Degradation at range (5) is not modelled, since levels of
+//! detail are made elsewhere, and neither is wind (4.7).
 
 mod foliage;
 mod parameters;
@@ -33,35 +33,35 @@ pub use parameters::{
 use super::{Gloss, PartKind, Plant, PlantMaterial, PlantPart};
 use random::Random;
 
-/// The numbers of triangles that a plant can be grown with.
+/// Possible numbers of triangles of a plant.
 pub const TRIANGLES: std::ops::RangeInclusive<usize> = 5_000..=100_000;
 
-/// How far below the ground the trunk reaches, in metres, so that it stands on slopes without a gap.
+/// Depth of the trunk below the ground in metres, so that there is no gap on slopes.
 pub const ROOT_DEPTH: f32 = 0.5;
 
-/// Why a plant could not be grown.
+/// Why a plant cannot be grown.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GrowError {
-    /// A number of a species is out of its range, or not a number.
+    /// A value of a species is out of range, or is NaN.
     #[error("species: {field} is {value}, but must be between {low} and {high}: correct it in the species' file")]
     Parameter {
-        /// Path of the field, as `branches[1].stem.length`.
+        /// Path of the field, such as `branches[1].stem.length`.
         field: String,
         /// The value found.
         value: f32,
-        /// Smallest value allowed.
+        /// Smallest allowed value.
         low: f32,
-        /// Largest value allowed.
+        /// Largest allowed value.
         high: f32,
     },
-    /// The number of triangles asked for is out of [`TRIANGLES`].
+    /// The requested number of triangles is outside [`TRIANGLES`].
     #[error(
         "a grown plant has between {low} and {high} triangles, but {0} were asked for: ask for a number between them",
         low = TRIANGLES.start(),
         high = TRIANGLES.end()
     )]
     Triangles(usize),
-    /// The text of a species is not what it should be.
+    /// The text of a species cannot be parsed.
     #[error("species, line {line}, column {column}: {message}")]
     Syntax {
         /// Line, from 1.
@@ -73,11 +73,11 @@ pub enum GrowError {
     },
 }
 
-/// Grows the individual `seed` of a species: a part of wood and a part of foliage, at most `triangles` triangles
-/// together and less than 2 % (in fact one) fewer. The same arguments give the same plant.
+/// Grows the individual `seed` of a species: a part of wood and a part of foliage. Together they have at most
+/// `triangles` triangles, and less than 2 % (usually one) fewer. The same arguments give the same plant.
 ///
 /// # Errors
-/// [`GrowError::Triangles`] where `triangles` is outside [`TRIANGLES`]; [`GrowError::Parameter`] as
+/// [`GrowError::Triangles`] if `triangles` is outside [`TRIANGLES`]; [`GrowError::Parameter`] as for
 /// [`GrowParameters::validate`].
 pub fn grow(species: &GrowParameters, seed: u64, triangles: usize) -> Result<Plant, GrowError> {
     if !TRIANGLES.contains(&triangles) {
@@ -120,7 +120,7 @@ pub fn grow(species: &GrowParameters, seed: u64, triangles: usize) -> Result<Pla
     })
 }
 
-/// The tint of one individual's foliage: darker, and shifted between yellowish and bluish green.
+/// The tint of an individual's foliage: darkened, and shifted towards yellowish or bluish green.
 fn individual_tint(species: &GrowParameters, random: &mut Random) -> Vec3 {
     let variation = species.leaves.tint_variation;
     let darker = 1.0 - variation * random.unit();

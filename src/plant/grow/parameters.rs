@@ -1,44 +1,44 @@
-//! What a species is: the numbers from which individuals are grown.
+//! The parameters of a species, from which individuals are grown.
 //!
-//! The names and meanings follow the parameter table of Weber & Penn 1995, "Creation and Rendering of Realistic
-//! Trees" (SIGGRAPH 95), section 4 and appendix; where a parameter departs from the paper, its field says so.
-//! Angles are in degrees here, and only here, because people write these files.
+//! Names and meanings follow the parameter table of Weber & Penn 1995, "Creation and Rendering of Realistic Trees"
+//! (SIGGRAPH 95), section 4 and appendix. Fields say where they differ from the paper. Angles are in degrees here, and
+//! only here, because people write these files.
 
 use serde::{Deserialize, Serialize};
 
 use super::GrowError;
 
-/// A species: everything that its individuals share. Read from RON (`assets/species`) or made by
-/// [`GrowParameters::broadleaf`] and [`GrowParameters::conifer`]; the default is the broadleaf.
+/// A species: everything that its individuals share. It is read from RON (`assets/species`), or comes from
+/// [`GrowParameters::broadleaf`] or [`GrowParameters::conifer`]. The default is the broadleaf.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GrowParameters {
     /// Name for messages and reports.
     pub name: String,
-    /// Outline of the crown: how long a bough may grow at each height (W&P `Shape`, 4.3). Default `Cylindrical`: the
-    /// outline is then left to `pruning`.
+    /// Outline of the crown: how long a bough may grow at each height (W&P `Shape`, 4.3). Default `Cylindrical`, with
+    /// which `pruning` alone determines the outline.
     pub shape: CrownShape,
-    /// Mean height of the trunk in metres, 1 to 60 (W&P `Scale`). Default 21.4. Foliage stands out above by less
+    /// Mean height of the trunk in metres, 1 to 60 (W&P `Scale`). Default 21.4. Foliage extends above it by less
     /// than a cluster.
     pub height: f32,
     /// Largest deviation of an individual's height in metres, 0 to half the height (W&P `ScaleV`). Default 1.6.
     pub height_variation: f32,
-    /// Radius of the trunk over its length, 0.002 to 0.05 (W&P `Ratio`). Default 0.0112. Up: stouter.
+    /// Radius of the trunk divided by its length, 0.002 to 0.05 (W&P `Ratio`). Default 0.0112. Higher: stouter.
     pub ratio: f32,
-    /// Power by which a thinner branch is thinner than it is shorter, 0.5 to 3 (W&P `RatioPower`). Default 1.2.
-    /// Up: thinner boughs on the same trunk.
+    /// Exponent that gives the ratio of radii of a branch and its parent from the ratio of their lengths, 0.5 to 3 (W&P
+    /// `RatioPower`). Default 1.2. Higher: thinner boughs on the same trunk.
     pub ratio_power: f32,
     /// Widening of the trunk's foot as a fraction of its radius, 0 to 3 (W&P `Flare`, 4.4). Default 0.6.
     pub flare: f32,
     /// Number of root lobes around the foot, 0 to 12 (W&P `Lobes`). Default 6.
     pub lobes: u32,
-    /// Depth of the lobes as a fraction of the radius, 0 to 0.4 (W&P `LobeDepth`). Default 0.14. Unlike the paper's,
-    /// the lobes fade out with the flare.
+    /// Depth of the lobes as a fraction of the radius, 0 to 0.4 (W&P `LobeDepth`). Default 0.14. Unlike in the
+    /// paper, the lobes fade out with the flare.
     pub lobe_depth: f32,
-    /// Largest lean of the trunk at its foot in degrees, 0 to 20. Default 2.5. Not in the paper.
+    /// Maximum lean of the trunk at its foot in degrees, 0 to 20. Default 2.5. Not in the paper.
     pub lean_deg: f32,
-    /// How far the crown departs from a body of revolution: a fraction of bough length, 0 to 0.8, by which whole
-    /// sides of the crown are longer or shorter. Default 0.3. Not in the paper; the character of an individual.
+    /// How much the crown differs from a body of revolution: the fraction of bough length, 0 to 0.8, by which whole
+    /// sides of the crown are longer or shorter. Default 0.3. Not in the paper. It gives individuals their character.
     pub irregularity: f32,
     /// An envelope for the tips of boughs and of the trunk's prongs (W&P 4.6), or `None` for free growth. Default
     /// `Some`: a dome.
@@ -46,18 +46,18 @@ pub struct GrowParameters {
     /// The trunk. Its `length` is a fraction of the height.
     pub trunk: StemParameters,
     /// The levels of branches: boughs on the trunk, branches on boughs, twigs on branches; 1 to 3 entries. The last
-    /// level carries the foliage, and so do the outer parts of those before it.
+    /// level carries the foliage, together with the outer parts of the levels before it.
     pub branches: Vec<BranchParameters>,
     /// The foliage.
     pub leaves: LeafParameters,
     /// The bark.
     pub bark: BarkParameters,
-    /// Share of the triangles that wood may use, 0.05 to 0.8. Default 0.36. Up: rounder wood and more twigs, but
+    /// Fraction of the triangles that wood may use, 0.05 to 0.8. Default 0.36. Higher: rounder wood and more twigs, but
     /// fewer and larger leaf clusters.
     pub wood_share: f32,
 }
 
-/// One stem of any level, seen alone (W&P 4.1).
+/// A stem of any level, by itself (W&P 4.1).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct StemParameters {
@@ -65,70 +65,73 @@ pub struct StemParameters {
     pub length: f32,
     /// Largest deviation of `length`, 0 to `length` (W&P `nLengthV`). Default 0.05.
     pub length_variation: f32,
-    /// Segments of the stem, 1 to 40 (W&P `nCurveRes`). Default 5. More segments follow the curve more finely.
+    /// Number of segments of the stem, 1 to 40 (W&P `nCurveRes`). Default 5. More segments approximate the curve
+    /// better.
     pub segments: u32,
-    /// 0 a cylinder, 1 a cone, between 1 and 2 a cone that widens to a cylinder with a round end (W&P `nTaper`,
-    /// 4.4), 0 to 2. Default 1.
+    /// Taper, 0 to 2 (W&P `nTaper`, 4.4): 0 is a cylinder, 1 a cone, and between 1 and 2 the cone widens to a cylinder
+    /// with a round end. Default 1.
     pub taper: f32,
-    /// Turn from base to tip (to the middle, where `curve_back_deg` is not 0) in degrees, -360 to 360, positive away
-    /// from the parent's direction (W&P `nCurve`). Default 0.
+    /// Rotation from base to tip in degrees, -360 to 360, positive away from the direction of the parent (W&P
+    /// `nCurve`). Default 0. If `curve_back_deg` is not 0, it is the rotation from the base to the middle.
     pub curve_deg: f32,
-    /// Turn of the outer half in degrees, -360 to 360; 0 lets `curve_deg` rule the whole stem (W&P `nCurveBack`).
+    /// Rotation of the outer half in degrees, -360 to 360 (W&P `nCurveBack`). 0: `curve_deg` applies to the whole stem.
     /// Default 0.
     pub curve_back_deg: f32,
-    /// Sum of the random rotations of the segments, in degrees, 0 to 720 (W&P `nCurveV`). Default 40. Up: gnarled.
+    /// Sum of the random rotations of the segments, in degrees, 0 to 720 (W&P `nCurveV`). Default 40. Higher: more
+    /// gnarled.
     pub curve_variation_deg: f32,
-    /// Attraction towards the zenith, -3 to 3; negative hangs (W&P `AttractionUp`, 4.8, there one value for all
-    /// levels from the second). The stem bends by about this many radians if it lies level. Default 0.
+    /// Attraction towards the zenith, -3 to 3; negative values make the stem hang (W&P `AttractionUp`, 4.8, which is
+    /// one value for all levels from the second). A horizontal stem bends by about this many radians. Default 0.
     pub attraction_up: f32,
     /// Mean number of forks in the stem, 0 to 4 (W&P `nSegSplits` times `nCurveRes`, 4.2). Default 0.
     pub splits: f32,
-    /// Fraction of the length from which forks appear, 0 to 1. Default 0.4. Not in the paper.
+    /// Fraction of the length beyond which forks appear, 0 to 1. Default 0.4. Not in the paper.
     pub split_from: f32,
     /// Angle between the two prongs of a fork in degrees, 0 to 120 (W&P `nSplitAngle`). Default 30.
     pub split_angle_deg: f32,
-    /// Largest deviation of the angle of a fork in degrees, 0 to 90 (W&P `nSplitAngleV`). Default 10.
+    /// Largest deviation of that angle in degrees, 0 to 90 (W&P `nSplitAngleV`). Default 10.
     pub split_angle_variation_deg: f32,
-    /// Fraction of the length at the base that carries no branches, 0 to 0.95 (W&P `BaseSize`, there for the trunk
+    /// Fraction of the length, from the base, without branches, 0 to 0.95 (W&P `BaseSize`, which is for the trunk
     /// only). Default 0.15.
     pub bare: f32,
 }
 
-/// The stems of one level below the trunk, as they sit on their parents.
+/// The branches of a level, and how they are attached to their parents.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BranchParameters {
     /// The stem itself.
     pub stem: StemParameters,
-    /// Branches on a parent of full length, 1 to 500 (W&P `nBranches`). Default 12.
+    /// Number of branches on a parent of full length, 1 to 500 (W&P `nBranches`). Default 12.
     pub count: u32,
-    /// Branches per whorl, 0 (spread evenly) to 12. Default 0. Not in the paper; conifers have one whorl a year.
+    /// Number of branches per whorl, 0 (spread evenly) to 12. Default 0. Not in the paper. Conifers grow one whorl a
+    /// year.
     pub whorl: u32,
     /// Angle between the parent's direction and the branch in degrees, 0 to 180 (W&P `nDownAngle`). Default 45.
     pub down_angle_deg: f32,
-    /// Deviation of that angle in degrees, -90 to 90. Positive: at random, up to this much. Negative: ordered along
-    /// the parent, steeper down at its base, nearer to its direction at its tip (W&P `nDownAngleV`). Default 10.
+    /// Deviation of that angle in degrees, -90 to 90 (W&P `nDownAngleV`). Positive: random, up to this value. Negative:
+    /// ordered along the parent, with a larger angle at its base and a smaller one at its tip. Default 10.
     pub down_angle_variation_deg: f32,
-    /// Turn about the parent from one branch to the next in degrees, -180 to 180; 137.5 is the golden angle.
-    /// Negative: branches alternate left and right, this many degrees from the parent's underside (W&P `nRotate`).
+    /// Rotation about the parent from one branch to the next in degrees, -180 to 180 (W&P `nRotate`). 137.5 is the
+    /// golden angle. Negative: branches alternate left and right, this many degrees from the underside of the parent.
     /// Default 137.5.
     pub rotate_deg: f32,
     /// Largest deviation of that rotation in degrees, 0 to 180 (W&P `nRotateV`). Default 15.
     pub rotate_variation_deg: f32,
 }
 
-/// The foliage: cards with a texture of a leaf cluster (W&P 4.9 has single leaves).
+/// The foliage: cards textured with a leaf cluster (W&P 4.9 has single leaves).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LeafParameters {
-    /// What is painted on the cards (W&P `LeafShape`). Default `Ovate`.
+    /// Shape of the leaves on the cards (W&P `LeafShape`). Default `Ovate`.
     pub shape: LeafShape,
-    /// Clusters of a tree of mean height at the size `scale`, 100 to 100000 (W&P `Leaves` over all branches).
-    /// Default 13000. A smaller number of triangles is met by fewer, larger clusters with the same total area.
+    /// Number of clusters of size `scale` on a tree of mean height, 100 to 100000 (W&P `Leaves` over all branches).
+    /// Default 13000. With fewer triangles there are fewer, larger clusters with the same total area.
     pub count: u32,
     /// Length of a cluster in metres, 0.02 to 2 (W&P `LeafScale`). Default 0.3.
     pub scale: f32,
-    /// Width of a cluster over its length, 0.2 to 2 (W&P `LeafScaleX`). Default 1.
+    /// Width of a cluster divided by its length, 0.2 to 2 (W&P `LeafScaleX`). Default 1.
     pub aspect: f32,
     /// Largest deviation of a cluster's length as a fraction, 0 to 0.6. Default 0.25.
     pub scale_variation: f32,
@@ -136,27 +139,27 @@ pub struct LeafParameters {
     pub down_angle_deg: f32,
     /// Largest deviation of that angle in degrees, 0 to 90. Default 25.
     pub down_angle_variation_deg: f32,
-    /// Turn about the twig from cluster to cluster in degrees, -180 to 180, as for branches. Default 137.5.
+    /// Rotation about the twig from one cluster to the next in degrees, -180 to 180, as for branches. Default 137.5.
     pub rotate_deg: f32,
-    /// Pull of clusters towards the ground, 0 (none) to 1 (most hang). Default 0.15.
+    /// How much clusters droop towards the ground, 0 (not at all) to 1 (most hang). Default 0.15.
     pub droop: f32,
-    /// How far the upper sides of clusters face the light (outwards and up), 0 (any way) to 1 (W&P `LeafBend`,
+    /// How much the upper sides of clusters face the light (outwards and up), 0 (not at all) to 1 (W&P `LeafBend`,
     /// 4.9). Default 0.5.
     pub bend: f32,
-    /// Fold of each half of a cluster along its twig in degrees, 0 to 60. Default 18. Only where there are triangles
-    /// for it.
+    /// Angle by which each half of a cluster is folded along its twig in degrees, 0 to 60. Default 18. Only clusters
+    /// with enough triangles are folded.
     pub fold_deg: f32,
-    /// Share of the outward direction of the crown in the shading normals, 0 (the card's own) to 1. Default 0.55.
+    /// Weight of the crown's outward direction in the shading normals, 0 (the card's own normal) to 1. Default 0.55.
     pub normal_bend: f32,
-    /// How much the inside of the crown is thinned, 0 (not) to 1 (leaves only at the outside). Default 0.65.
+    /// How much the inside of the crown is thinned out, 0 (not at all) to 1 (leaves only at the outside). Default 0.65.
     pub shell: f32,
     /// Linear factor on the painted colour, 0 to 1 each. Default white.
     pub tint: [f32; 3],
     /// Largest deviation of an individual's tint as a fraction, 0 to 0.5. Default 0.12.
     pub tint_variation: f32,
-    /// Linear colour of the light that passes through, as a factor on the colour without the leaves' gloss, 0 to 2
-    /// each; [`LeafKind`](crate::plant::LeafKind) has what is usual: 1.3 thin, 0.7 leathery, 0.5 needles. Default (1.3,
-    /// 1.3, 1.3).
+    /// Transmitted light in linear colour, as a factor on the leaf's colour without gloss, 0 to 2 each.
+    /// [`LeafKind`](crate::plant::LeafKind) has typical values: 1.3 for thin leaves, 0.7 for leathery ones, 0.5 for
+    /// needles. Default (1.3, 1.3, 1.3).
     pub transmission: [f32; 3],
 }
 
@@ -164,28 +167,28 @@ pub struct LeafParameters {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BarkParameters {
-    /// What is painted. Default `Fissured`.
+    /// Kind of the bark. Default `Fissured`.
     pub kind: BarkKind,
-    /// Width in metres that one repeat of the texture covers on the trunk, 0.05 to 5. Default 0.7. It is twice as
-    /// high. Thin branches repeat it once around, in the same proportions.
+    /// Width in metres of one repeat of the texture on the trunk, 0.05 to 5. Default 0.7. The texture is twice as high
+    /// as wide. On thin branches it repeats once around, in the same proportions.
     pub tile: f32,
     /// Linear factor on the painted colour, 0 to 1 each. Default white.
     pub tint: [f32; 3],
 }
 
-/// The envelope of W&P 4.6: `r / height < width * shape(h)`, widest at the fraction `width_peak` of the crown. Unlike
-/// the paper's it follows a bent trunk half-way, its sides differ by `irregularity`, each bough may exceed it or stay
-/// behind by up to 16 %, and branches thinner than boughs are free.
+/// The envelope of W&P 4.6: `r / height < width * shape(h)`, widest at the fraction `width_peak` of the crown. It
+/// differs from the paper: it follows a bent trunk half-way, its sides differ by `irregularity`, each bough may exceed
+/// or miss it by up to 16 %, and branches thinner than boughs are free.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pruning {
     /// Largest radius as a fraction of the height, 0.02 to 2 (W&P `PruneWidth`).
     pub width: f32,
-    /// Where the crown is widest, as a fraction of its length from below, 0.05 to 0.95 (W&P `PruneWidthPeak`).
+    /// Height of the widest point, as a fraction of the crown from below, 0.05 to 0.95 (W&P `PruneWidthPeak`).
     pub width_peak: f32,
-    /// Form below the widest point, 0.05 to 5: below 1 round, 1 straight, above 1 hollow (W&P `PrunePowerLow`).
+    /// Shape below the widest point, 0.05 to 5 (W&P `PrunePowerLow`): below 1 convex, 1 straight, above 1 concave.
     pub power_low: f32,
-    /// The same above the widest point (W&P `PrunePowerHigh`).
+    /// Shape above the widest point, in the same way (W&P `PrunePowerHigh`).
     pub power_high: f32,
 }
 
@@ -194,25 +197,25 @@ pub struct Pruning {
 pub enum CrownShape {
     /// Widest below, straight to the top.
     Conical,
-    /// As a cone, but pointed, and drawn in at the shaded base: spruces. Not in the paper.
+    /// Conical, but more pointed, and narrower at the shaded base: spruces. Not in the paper.
     Spire,
     /// Widest in the middle.
     Spherical,
     /// Widest below, round above.
     Hemispherical,
-    /// The same everywhere.
+    /// The same width everywhere.
     Cylindrical,
-    /// Somewhat wider below.
+    /// Slightly wider below.
     TaperedCylindrical,
     /// Widest at 30 % of the crown, pointed above and below.
     Flame,
     /// Widest at the top.
     InverseConical,
-    /// Widest at 30 % of the crown, half as wide above and below: most broadleaves.
+    /// Widest at 30 % of the crown, half as wide at the top and at the base: most broadleaves.
     TendFlame,
 }
 
-/// What leaf clusters show.
+/// Shape of the leaves in a cluster.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum LeafShape {
     /// A twig with pointed oval leaves (beech).
@@ -223,7 +226,7 @@ pub enum LeafShape {
     Needles,
 }
 
-/// What the bark shows.
+/// Kinds of bark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum BarkKind {
     /// Long ridges between dark fissures (oak).
@@ -232,11 +235,11 @@ pub enum BarkKind {
     Scaly,
 }
 
-/// The largest number of stems that a species may ask for.
+/// Maximum number of stems of a species.
 const MAX_STEMS: u64 = 60_000;
 
 impl CrownShape {
-    /// Relative bough length at `ratio` of the crown, 0 at its top and 1 at its base (W&P 4.3).
+    /// Relative length of boughs at `ratio` of the crown, 0 at its top and 1 at its base (W&P 4.3).
     pub fn ratio(self, ratio: f32) -> f32 {
         let r = ratio.clamp(0.0, 1.0);
         let pi = std::f32::consts::PI;
@@ -277,8 +280,8 @@ impl GrowParameters {
     /// Reads a species from RON text and validates it.
     ///
     /// # Errors
-    /// [`GrowError::Syntax`] with line and column for text that is not a species (unknown fields included),
-    /// [`GrowError::Parameter`] for a value out of its range.
+    /// [`GrowError::Syntax`] with line and column for text that is not a species, or has unknown fields;
+    /// [`GrowError::Parameter`] for a value out of range.
     pub fn from_ron(text: &str) -> Result<Self, GrowError> {
         let options = ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
         let species: Self = options.from_str(text).map_err(|error| GrowError::Syntax {
@@ -293,7 +296,7 @@ impl GrowParameters {
     /// Checks every number against its range.
     ///
     /// # Errors
-    /// [`GrowError::Parameter`] names the first field that is out of range (or not finite), its value and its range.
+    /// [`GrowError::Parameter`] with the first field that is out of range or not finite, its value and its range.
     pub fn validate(&self) -> Result<(), GrowError> {
         check("height", self.height, 1.0, 60.0)?;
         check("height_variation", self.height_variation, 0.0, 0.5 * self.height)?;
@@ -385,7 +388,7 @@ impl LeafParameters {
 }
 
 fn check(field: &str, value: f32, low: f32, high: f32) -> Result<(), GrowError> {
-    // A NaN is in no range.
+    // NaN is in no range.
     if (low..=high).contains(&value) {
         Ok(())
     } else {

@@ -1,7 +1,8 @@
-//! The two species that come with the crate, and the defaults of a species' parts.
+//! The two built-in species, and the defaults of the parts of a species.
 //!
-//! The conifer is read from its file. The broadleaf is the default of every field that a species' file leaves out, so
-//! it cannot be read from one: its numbers are here, and a test compares them with `assets/species/broadleaf.ron`.
+//! The conifer is read from its file. The broadleaf is the default of every field that a species file omits, so it
+//! cannot be read from a file itself. Its values are here, and a test compares them with
+//! `assets/species/broadleaf.ron`.
 
 use std::sync::LazyLock;
 
@@ -15,8 +16,8 @@ use crate::plant::LeafKind;
 const CONIFER: &str = include_str!("../../../assets/species/conifer.ron");
 
 impl GrowParameters {
-    /// A broadleaf of the closed forest, between oak and beech: about 22 m high, a crown of 7 to 9 m across from a
-    /// third of the height upwards, a trunk that forks within the crown.
+    /// A broadleaf of a closed forest, between oak and beech: about 22 m high, with a crown of 7 to 9 m across that
+    /// begins at a third of the height, and a trunk that forks within the crown.
     pub fn broadleaf() -> Self {
         Self {
             name: "broadleaf".into(),
@@ -106,11 +107,11 @@ impl GrowParameters {
         }
     }
 
-    /// A spruce of the closed forest: about 28 m high, a crown of 4.5 to 6 m across, whorls of boughs that hang in
-    /// the middle and turn up at their ends, with needle sprays that droop from them. Read once from
+    /// A spruce of a closed forest: about 28 m high, with a crown of 4.5 to 6 m across and whorls of boughs, which hang
+    /// in the middle and bend up at their ends, with drooping sprays of needles. It is read once from
     /// `assets/species/conifer.ron`, which is compiled in.
     pub fn conifer() -> Self {
-        // That the text is a species is certain: a test reads it.
+        // The text is valid: a test reads it.
         static SHIPPED: LazyLock<GrowParameters> =
             LazyLock::new(|| GrowParameters::from_ron(CONIFER).unwrap_or_default());
         SHIPPED.clone()

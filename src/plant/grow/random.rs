@@ -1,8 +1,8 @@
-//! A small counter-free random stream, fixed for all time.
+//! A small random number generator whose streams never change.
 //!
-//! `SplitMix64` (Steele, Lea & Flood 2014, "Fast splittable pseudorandom number generators", OOPSLA): 64 bits of
-//! state, splittable by a key. The generators of the `rand` crate may change their streams from one version to the
-//! next; a tree that is named by its seed in a scene file must not.
+//! `SplitMix64` (Steele, Lea & Flood 2014, "Fast splittable pseudorandom number generators", OOPSLA): 64 bits of state,
+//! which can be split by a key. The generators of the `rand` crate may change their streams between versions. A tree
+//! that a scene file names by its seed must not change.
 
 use crate::math::hash::{GOLDEN, mix64};
 
@@ -18,23 +18,23 @@ impl Random {
         Self { state: mix64(seed ^ 0x5851_f42d_4c95_7f2d) }
     }
 
-    /// An independent stream for the part `key` of what this stream describes; this stream does not advance.
+    /// An independent stream for the part `key` of the object that this stream describes. This stream does not advance.
     pub fn split(&self, key: u64) -> Self {
         Self { state: mix64(self.state ^ mix64(key.wrapping_add(GOLDEN))) }
     }
 
-    /// The next number, evenly in `0.0..1.0`.
+    /// The next number, uniform in `0.0..1.0`.
     pub fn unit(&mut self) -> f32 {
         self.state = self.state.wrapping_add(GOLDEN);
         (mix64(self.state) >> 40) as f32 / (1u64 << 24) as f32
     }
 
-    /// The next number, evenly in `-1.0..1.0`.
+    /// The next number, uniform in `-1.0..1.0`.
     pub fn signed(&mut self) -> f32 {
         2.0 * self.unit() - 1.0
     }
 
-    /// The next number, evenly in `low..high`.
+    /// The next number, uniform in `low..high`.
     pub fn range(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * self.unit()
     }

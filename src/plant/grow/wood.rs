@@ -1,7 +1,7 @@
 //! The wood: a tube around every stem, as round and as smooth as the triangles allow.
 //!
-//! One number, the resolution, rules how many sides a tube has, how closely its rings follow the axis and which thin
-//! stems are left out. It is found by bisection so that the wood just stays within its triangles.
+//! One number, the resolution, determines how many sides a tube has, how closely its rings follow the axis, and which
+//! thin stems are omitted. It is found by bisection, so that the wood just stays within its number of triangles.
 //!
 //! ```text
 //! ring ── ring ── ring ── tip     2·sides triangles between rings, sides at the tip; the first and last vertex of a
@@ -16,12 +16,12 @@ use super::parameters::GrowParameters;
 use super::skeleton::{Node, Skeleton, Stem};
 use crate::plant::PlantMesh;
 
-/// Steps of the bisection; the resolution is then known to a millionth of its range.
+/// Steps of the bisection, after which the resolution is known to a millionth of its range.
 const STEPS: u32 = 22;
-/// The range of resolutions. At 1 a trunk of 25 cm radius has 16 sides and stems thinner than 3 mm are left out.
+/// The range of resolutions. At 1, a trunk of 25 cm radius has 16 sides, and stems thinner than 3 mm are omitted.
 const RESOLUTIONS: (f32, f32) = (0.02, 6.0);
 
-/// Builds the wood with at most `budget` triangles (though never without a trunk, which needs some dozens).
+/// Builds the wood with at most `budget` triangles. There is always a trunk, which needs a few dozen.
 pub(super) fn mesh(skeleton: &Skeleton, species: &GrowParameters, budget: usize) -> PlantMesh {
     let triangles = |resolution: f32| -> usize {
         skeleton
@@ -50,7 +50,7 @@ pub(super) fn mesh(skeleton: &Skeleton, species: &GrowParameters, budget: usize)
     mesh
 }
 
-/// A stem's tube: which of its nodes have rings.
+/// The tube of a stem: its sides, and which of the nodes have rings.
 struct Tube<'a> {
     level: usize,
     nodes: Vec<&'a Node>,
@@ -58,17 +58,17 @@ struct Tube<'a> {
 }
 
 impl<'a> Tube<'a> {
-    /// Chooses sides and rings, or `None` for a stem too thin to draw.
+    /// Chooses sides and rings; `None` for a stem that is too thin to draw.
     fn fit(stem: &'a Stem, is_trunk: bool, resolution: f32) -> Option<Self> {
         let thickest = stem.nodes.iter().fold(0.0f32, |r, node| r.max(node.radius));
         if !is_trunk && thickest < 0.003 / (resolution * resolution) {
             return None;
         }
-        // The trunk is what one stands in front of: finer, and it has lobes.
+        // The trunk is seen from near, and has lobes, so it is finer.
         let (finer, most) = if is_trunk { (1.5, 36.0) } else { (1.0, 20.0) };
         let sides = 2.6 + 27.0 * finer * resolution.min(1.5) * thickest.sqrt();
         let sides = sides.round().clamp(3.0, most) as usize;
-        // The axis may leave the chord, and the radius its line, by this share of the radius.
+        // Maximum deviation of the axis from the chord, and of the radius from its line, as a fraction of the radius.
         let tolerance = if is_trunk { 0.02 } else { 0.12 } / resolution;
         let mut nodes = vec![&stem.nodes[0]];
         let mut from = 0;
@@ -107,33 +107,33 @@ impl<'a> Tube<'a> {
             node.radius / (1.0 + if self.level == 0 && node.distance == 0.0 { species.flare } else { 0.0 })
         });
         let repeats = (TAU * base / species.bark.tile).round().max(1.0);
-        // Waves around the foot need four sides each to be drawn.
+        // Each wave around the foot needs at least three sides.
         let lobes = if self.level == 0 && self.sides as u32 >= 3 * species.lobes { species.lobes as f32 } else { 0.0 };
 
         let mut side = tangents[0].any_orthonormal_vector();
         let mut v = 0.0;
         let mut previous_ring = 0u32;
         for (i, node) in nodes.iter().enumerate() {
-            // The frame that rotates least (parallel transport).
+            // The frame with the least rotation (parallel transport).
             side = (side - tangents[i] * side.dot(tangents[i])).normalize_or(tangents[i].any_orthonormal_vector());
             let across = tangents[i].cross(side);
             let (before, after) = (nodes[i.saturating_sub(1)], nodes[(i + 1).min(count - 1)]);
             let slope = (after.radius - before.radius) / (after.distance - before.distance).max(1e-4);
             if i > 0 {
-                // The texture has the same scale along the stem as around it at this girth; near the tip no finer than
-                // a quarter.
+                // The texture has the same scale along the stem as around it at this girth. Near the tip, the girth
+                // counts as at least a quarter of that at the base.
                 let girth = TAU * (0.5 * (before.radius + node.radius)).max(0.25 * base);
                 v += (node.distance - before.distance) * repeats / (2.0 * girth);
             }
             let ring = mesh.positions.len() as u32;
             let is_tip = i + 1 == count;
             for k in 0..=self.sides {
-                // At the tip each side has a vertex in its middle, for normals that do not meet in one.
+                // At the tip each side has its own vertex in its middle, so that the sides keep their own normals.
                 let turn = (k as f32 + if is_tip { 0.5 } else { 0.0 }) / self.sides as f32;
                 let angle = TAU * (turn % 1.0);
                 let radial = side * angle.cos() + across * angle.sin();
                 let wave = 1.0 + node.lobe * (lobes * angle).cos() * if lobes > 0.0 { 1.0 } else { 0.0 };
-                // Around a lobe the surface turns against the radial by the radius' change with the angle.
+                // Around a lobe the normal is rotated from the radial direction by the derivative of the radius.
                 let lean = node.lobe * lobes * (lobes * angle).sin() / wave;
                 let around = across * angle.cos() - side * angle.sin();
                 mesh.positions.push(node.position + radial * (node.radius * wave));

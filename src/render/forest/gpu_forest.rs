@@ -44,10 +44,11 @@ pub struct ForestLevel {
 
 /// A forest on the device.
 pub struct GpuForest {
+    /// The stand of the component.
     stand: Arc<PackedStand>,
     /// The plants that the buffers and textures hold.
     plants: Arc<Vec<BakedPlant>>,
-    /// The current component of the entity.
+    /// The current component of the entity, with the stand that is drawn: an empty one if plants are missing.
     pub forest: Forest,
     /// [`PackedTree`]s.
     pub trees: Buffer,
@@ -101,7 +102,8 @@ impl GpuForest {
         casting
     }
 
-    fn new(forest: &Forest, generation: u64, known: &Representations, upload: &mut ForestUpload) -> Self {
+    fn new(component: &Forest, generation: u64, known: &Representations, upload: &mut ForestUpload) -> Self {
+        let forest = &Forest { stand: drawn_stand(component), ..component.clone() };
         let storage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
         let device = &upload.gpu.device;
         let sizes: Vec<PlantSize> = forest.plants.iter().map(BakedPlant::size).collect();
@@ -124,7 +126,7 @@ impl GpuForest {
         let grouping =
             |level: &Option<ForestLevel>| level.as_ref().map_or(Grouping::Together, |level| level.renderer.grouping());
         Self {
-            stand: forest.stand.clone(),
+            stand: component.stand.clone(),
             plants: forest.plants.clone(),
             forest: forest.clone(),
             trees,
@@ -165,6 +167,21 @@ impl GpuForest {
     }
 }
 
+/// The stand of `forest`, or one without trees if these refer to plants that are missing: buffers of plants that are too
+/// short are errors on the device.
+fn drawn_stand(forest: &Forest) -> Arc<PackedStand> {
+    let variants = forest.stand.trees.iter().map(|tree| usize::from(tree.variant()) + 1).max().unwrap_or(0);
+    if variants <= forest.plants.len() {
+        return forest.stand.clone();
+    }
+    error_once!(
+        "a forest has {} plants, but its trees refer to {variants}: it is not drawn. Give `Forest::plants` one for each \
+         variant of the trees",
+        forest.plants.len()
+    );
+    Arc::new(PackedStand { trees: Vec::new(), indices: Vec::new(), cells: Vec::new(), grid: forest.stand.grid })
+}
+
 /// All forests of the world by their main-world entity.
 #[derive(Resource, Default)]
 pub struct GpuForests {
@@ -183,6 +200,11 @@ impl GpuForests {
     /// All levels of all forests.
     pub fn levels(&self) -> impl Iterator<Item = &ForestLevel> {
         self.iter().flat_map(|(_, forest)| forest.levels().map(|(_, level)| level))
+    }
+
+    /// Whether there is no tree in any forest.
+    pub fn have_no_trees(&self) -> bool {
+        self.iter().all(|(_, forest)| forest.forest.stand.trees.is_empty())
     }
 
     /// Optical properties of the trees of all forests, averaged over the areas of their leaves.
@@ -233,7 +255,7 @@ pub fn prepare_forests(
                 forests.generations += 1;
                 known.generation = forests.generations;
             }
-            known.forest = forest.clone();
+            known.forest = Forest { stand: known.forest.stand.clone(), ..forest.clone() };
             continue;
         }
         forests.generations += 1;

@@ -1,80 +1,65 @@
-//! The textures of full models, each filtered for its use and uploaded once.
+//! The textures of full models, each uploaded once. They are filtered by the bake ([`crate::bake::textures`]).
 
 use std::sync::Arc;
 
 use bevy::{
     platform::collections::HashMap,
-    render::{
-        render_resource::{TextureFormat, TextureView},
-        renderer::{RenderDevice, RenderQueue},
-    },
+    render::render_resource::{TextureFormat, TextureView},
 };
 
 use crate::{
-    math::MipChain,
-    plant::{
-        PartKind, PlantMaterial,
-        texture::{color_mips, leaf_mips, normal_mips},
-    },
-    render::gpu,
+    bake::textures::{FilteredTexture, PartTextures},
+    math::MipView,
+    plant::PartKind,
+    render::gpu::{self, Gpu},
 };
-
-/// What a texture is used for: each use filters it differently.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
-enum TextureUse {
-    Wood,
-    /// With the bits of the alpha test's threshold.
-    Foliage(u32),
-    Normal,
-}
 
 /// Textures that several parts share are uploaded once.
 #[derive(Default)]
 pub struct TextureCache {
-    views: HashMap<(usize, TextureUse), TextureView>,
+    /// By address; one texture has one use.
+    views: HashMap<*const FilteredTexture, TextureView>,
     /// Bound if a material has no normal map, and never sampled.
     no_normals: Option<TextureView>,
 }
 
 impl TextureCache {
     /// The base colour of a part of `kind`; white without a texture.
-    pub fn color(
-        &mut self,
-        material: &PlantMaterial,
-        kind: PartKind,
-        device: &RenderDevice,
-        queue: &RenderQueue,
-    ) -> TextureView {
+    pub fn color(&mut self, textures: &PartTextures, kind: PartKind, gpu: &Gpu) -> TextureView {
         let format = TextureFormat::Rgba8UnormSrgb;
-        let Some(image) = &material.base_color_texture else {
-            return gpu::texture(device, queue, "canopy_white", format, &plain([255; 4]), 1);
+        let Some(texture) = &textures.color else {
+            return plain("canopy_white", format, [255; 4], gpu);
         };
-        let foliage = kind == PartKind::Foliage;
-        let usage = if foliage { TextureUse::Foliage(material.alpha_cutoff.to_bits()) } else { TextureUse::Wood };
-        self.views
-            .entry((Arc::as_ptr(image) as usize, usage))
-            .or_insert_with(|| {
-                let chain = if foliage { leaf_mips(image, material.alpha_cutoff) } else { color_mips(image) };
-                let smallest = if foliage { gpu::SMALLEST_TESTED_MIP } else { 1 };
-                gpu::texture(device, queue, "canopy_base_color", format, &chain, smallest)
-            })
-            .clone()
+        let smallest = if kind == PartKind::Foliage { gpu::SMALLEST_TESTED_MIP } else { 1 };
+        self.uploaded("canopy_base_color", format, texture, smallest, gpu)
     }
 
     /// The normal map. Without one: a texel that no pipeline samples, shared by all materials.
-    pub fn normal(&mut self, material: &PlantMaterial, device: &RenderDevice, queue: &RenderQueue) -> TextureView {
+    pub fn normal(&mut self, textures: &PartTextures, gpu: &Gpu) -> TextureView {
         let format = TextureFormat::Rgba8Unorm;
-        let Some(image) = &material.normal_texture else {
-            let flat = || gpu::texture(device, queue, "canopy_flat", format, &plain([128, 128, 255, 255]), 1);
-            return self.no_normals.get_or_insert_with(flat).clone();
-        };
-        self.views
-            .entry((Arc::as_ptr(image) as usize, TextureUse::Normal))
-            .or_insert_with(|| gpu::texture(device, queue, "canopy_normal", format, &normal_mips(image), 1))
-            .clone()
+        match &textures.normals {
+            Some(texture) => self.uploaded("canopy_normal", format, texture, 1, gpu),
+            None => {
+                let flat = || plain("canopy_flat", format, [128, 128, 255, 255], gpu);
+                self.no_normals.get_or_insert_with(flat).clone()
+            }
+        }
+    }
+
+    fn uploaded(
+        &mut self,
+        label: &str,
+        format: TextureFormat,
+        texture: &Arc<FilteredTexture>,
+        smallest: u32,
+        gpu: &Gpu,
+    ) -> TextureView {
+        let upload = || gpu::texture(&gpu.device, &gpu.queue, label, format, texture.mips(), smallest);
+        self.views.entry(Arc::as_ptr(texture)).or_insert_with(upload).clone()
     }
 }
 
-fn plain(texel: [u8; 4]) -> MipChain {
-    MipChain { width: 1, height: 1, levels: vec![texel.to_vec()] }
+fn plain(label: &str, format: TextureFormat, texel: [u8; 4], gpu: &Gpu) -> TextureView {
+    let mips = MipView { width: 1, height: 1, levels: vec![&texel] };
+    gpu::texture(&gpu.device, &gpu.queue, label, format, mips, 1)
 }

@@ -76,7 +76,7 @@ pub struct Wanted {
 }
 
 impl TransferLight {
-    /// Group 3 of a part; `tint`: the colour of light scattered between leaves ([`scattered_tint`]).
+    /// Group 3 of a part; `tint`: the colour of light scattered between leaves ([`indirect_light_color`]).
     pub fn bind_group(
         &mut self,
         (settings, part): (&TransferSettings, &PackedPart),

@@ -183,12 +183,13 @@ impl TransferUniform {
     }
 }
 
-/// The colour of light that a leaf scattered, divided by its luminance; white for black leaves.
+/// The colour of indirect light, which leaves have scattered: their own colour divided by its luminance; white for
+/// black leaves.
 ///
 /// A transfer with one channel stores light from other leaves by the luminance of their colours. Scattered light of the
 /// sky is a few percent of the sky's light and stays uncoloured; that of the sun is most of the light in the shade
 /// inside a crown.
-pub fn scattered_tint(leaves: &LeafColors) -> Vec3 {
+pub fn indirect_light_color(leaves: &LeafColors) -> Vec3 {
     let color = leaves.reflected + leaves.transmitted;
     let light = luminance(color);
     if light > 1e-4 { color / light } else { Vec3::ONE }
@@ -210,7 +211,7 @@ fn variant(plant: &BakedPlant, size: &PlantSize) -> VariantUniform {
         roughness: gloss.roughness,
         realigned: realigned(&plant.lighting),
         indirect_sun_zenith: zenith,
-        indirect_sun_color: scattered_tint(&plant.plant.leaf_colors()).to_array(),
+        indirect_sun_color: indirect_light_color(&plant.plant.leaf_colors()).to_array(),
         indirect_sun_mean: mean,
         ambient_term: plant.lighting.ambient_term() as u32,
         lobe_gain: lobe_gain(gloss.roughness),

@@ -83,7 +83,7 @@ pub fn prepare_mesh_shadows(
     let Some(view) = &frame.view else { return };
     let why_none = if !scene.mesh_shadows {
         Some("no directional light has shadow maps")
-    } else if forests.order.is_empty() {
+    } else if forests.have_no_trees() {
         Some("the world has no forest")
     } else {
         None

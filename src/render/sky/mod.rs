@@ -22,7 +22,7 @@ use bevy::{
         diagnostic::RecordDiagnostics,
         render_resource::{
             CachedRenderPipelineId, DepthStencilState, PipelineCache, RenderPassDescriptor, RenderPipelineDescriptor,
-            SpecializedRenderPipeline, SpecializedRenderPipelines, StoreOp, Texture, TextureView,
+            SpecializedRenderPipeline, SpecializedRenderPipelines, StoreOp,
         },
         renderer::{RenderContext, RenderDevice, RenderQueue, ViewQuery},
         view::{ViewDepthTexture, ViewTarget},
@@ -34,7 +34,8 @@ use super::{
     bindings::{FrameBindGroup, SharedTextures, frame_layout},
     components::{CanopyCamera, Daylight},
     extract::ExtractedScene,
-    gpu::{self, opaque_depth},
+    gpu::opaque_depth,
+    light_table::LightTable,
     report::FrameReport,
     sets::{CanopyPasses, CanopyRenderSystems},
     shaders::{CanopyShaders, ShaderFile},
@@ -44,17 +45,12 @@ use crate::light::atmosphere::SkyView;
 
 /// The sky's radiance on the GPU.
 #[derive(Resource)]
-struct SkyTexture {
-    view: TextureView,
-    texture: Texture,
-    uploaded: Option<(Daylight, f32)>,
-}
+struct SkyTexture(LightTable<(Daylight, f32)>);
 
 impl FromWorld for SkyTexture {
     fn from_world(world: &mut World) -> Self {
         let size = (SkyView::WIDTH as u32, SkyView::HEIGHT as u32);
-        let (texture, view) = gpu::table(world.resource::<RenderDevice>(), "canopy_sky", size);
-        Self { texture, view, uploaded: None }
+        Self(LightTable::new(world.resource::<RenderDevice>(), "canopy_sky", size))
     }
 }
 
@@ -117,21 +113,14 @@ fn upload_sky(
     mut sky: ResMut<SkyTexture>,
     mut shared: ResMut<SharedTextures>,
 ) {
-    shared.sky = sky.view.clone();
+    shared.sky = sky.0.view().clone();
     let (Some(view), Some(daylight)) = (&frame.view, &scene.daylight) else { return };
-    let current = sky
-        .uploaded
-        .as_ref()
-        .is_some_and(|(light, exposure)| std::sync::Arc::ptr_eq(&light.0, &daylight.0) && *exposure == view.exposure);
-    if current {
+    let texels = || daylight.0.sky_view.to_rgba16f(view.exposure);
+    if sky.0.update(&queue, (daylight.clone(), view.exposure), texels) {
+        report.ran("sky radiance", "uploaded for a new light");
+    } else {
         report.skipped("sky radiance", "the light has not changed");
-        return;
     }
-    let texels = daylight.0.sky_view.to_rgba16f(view.exposure);
-    let (width, height) = (SkyView::WIDTH as u32, SkyView::HEIGHT as u32);
-    gpu::write_level(&queue, &sky.texture, 0, 0, width, height, 8, bytemuck::cast_slice(&texels));
-    sky.uploaded = Some((daylight.clone(), view.exposure));
-    report.ran("sky radiance", "uploaded for a new light");
 }
 
 fn prepare_pipeline(

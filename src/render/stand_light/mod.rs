@@ -1,7 +1,6 @@
 //! The light inside a stand, as a texture of bind group 0: the transmittance of neighbouring crowns for sky and sun,
-//! and what they scatter ([`crate::light::stand`]). Cost: nothing while light, exposure and trees stay the same.
-
-use std::sync::Arc;
+//! and what they scatter ([`crate::light::stand`]). Cost: half a millisecond for a new light, in the frame or beside it
+//! ([`LightUpdates`]); nothing while light, exposure and trees stay the same.
 
 use bevy::{
     app::{App, Plugin},
@@ -13,7 +12,6 @@ use bevy::{
     },
     render::{
         GpuResourceAppExt, Render, RenderApp,
-        render_resource::{Texture, TextureView},
         renderer::{RenderDevice, RenderQueue},
     },
 };
@@ -26,8 +24,15 @@ use crate::{
         stand::{COVERS, DEPTHS},
     },
     render::{
-        bindings::SharedTextures, extract::ExtractedScene, forest::GpuForests, gpu, report::FrameReport,
-        sets::CanopyRenderSystems, view::PreparedFrame,
+        bindings::SharedTextures,
+        components::{Daylight, LightUpdates},
+        extract::ExtractedScene,
+        follow::{Followed, Follower},
+        forest::GpuForests,
+        light_table::LightTable,
+        report::FrameReport,
+        sets::CanopyRenderSystems,
+        view::PreparedFrame,
     },
 };
 
@@ -39,17 +44,37 @@ const BRIGHTEST: f32 = 6.0e4;
 /// The table of [`StandLight`] on the GPU, exposed.
 #[derive(Resource)]
 struct StandTexture {
-    texture: Texture,
-    view: TextureView,
-    /// The light, exposure and trees for which the texture was uploaded.
-    uploaded: Option<(Arc<LightState>, f32, StandTrees)>,
+    /// Of the light and trees below, with an exposure.
+    table: LightTable<(StandKey, f32)>,
+    light: Follower<StandKey, StandLight>,
+}
+
+/// What the light in a stand depends on.
+#[derive(Clone, Debug, PartialEq)]
+struct StandKey {
+    daylight: Daylight,
+    trees: StandTrees,
+}
+
+impl StandKey {
+    /// Relative difference of illuminance up to which light is near.
+    const NEAR: f32 = 0.05;
+
+    /// Whether the light that was computed for `old` may be drawn meanwhile.
+    fn is_near(&self, old: &Self) -> bool {
+        let sum = |key: &Self| key.daylight.0.horizontal_illuminance().element_sum();
+        let (old_sum, sum) = (sum(old), sum(self));
+        self.trees == old.trees
+            && LightUpdates::is_near(old.daylight.0.key_direction, self.daylight.0.key_direction)
+            && (old_sum - sum).abs() <= Self::NEAR * sum
+    }
 }
 
 impl FromWorld for StandTexture {
     fn from_world(world: &mut World) -> Self {
         let size = (COVERS as u32, (BLOCKS * (DEPTHS + 1)) as u32);
-        let (texture, view) = gpu::table(world.resource::<RenderDevice>(), "canopy_stand_light", size);
-        Self { texture, view, uploaded: None }
+        let table = LightTable::new(world.resource::<RenderDevice>(), "canopy_stand_light", size);
+        Self { table, light: Follower::default() }
     }
 }
 
@@ -75,21 +100,22 @@ fn upload_stand_light(
     mut stand: ResMut<StandTexture>,
     mut shared: ResMut<SharedTextures>,
 ) {
-    shared.stand_light = stand.view.clone();
+    let StandTexture { table, light } = &mut *stand;
+    shared.stand_light = table.view().clone();
     let (Some(view), Some(daylight)) = (&frame.view, &scene.daylight) else { return };
-    let trees = forests.trees();
-    let same = |(light, exposure, uploaded_trees): &(Arc<LightState>, f32, StandTrees)| {
-        Arc::ptr_eq(light, &daylight.0) && *exposure == view.exposure && *uploaded_trees == trees
-    };
-    if stand.uploaded.as_ref().is_some_and(same) {
-        report.skipped("stand light", "the light has not changed");
-        return;
+    let wanted = StandKey { daylight: daylight.clone(), trees: forests.trees() };
+    let key = wanted.clone();
+    let compute = move || StandLight::new(&key.daylight.0, &key.trees);
+    let followed = light.follow(&wanted, scene.light_updates, |old| wanted.is_near(old), compute);
+    let (Some(key), Some(light)) = (light.key(), light.value()) else { return };
+    let uploaded = table.update(&queue, (key.clone(), view.exposure), || texels(&key.daylight.0, light, view.exposure));
+    match followed {
+        Followed::Waited => report.ran("stand light", "computed for a new light"),
+        Followed::Taken => report.ran("stand light", "computed beside the frames"),
+        Followed::Same if uploaded => report.ran("stand light", "uploaded for another exposure"),
+        Followed::Lags => report.skipped("stand light", "it is being computed beside the frames"),
+        Followed::Same => report.skipped("stand light", "the light has not changed"),
     }
-    let texels = texels(&daylight.0, &StandLight::new(&daylight.0, &trees), view.exposure);
-    let height = (BLOCKS * (DEPTHS + 1)) as u32;
-    gpu::write_level(&queue, &stand.texture, 0, 0, COVERS as u32, height, 8, bytemuck::cast_slice(&texels));
-    stand.uploaded = Some((daylight.0.clone(), view.exposure, trees));
-    report.ran("stand light", "computed for a new light");
 }
 
 /// Half floats, block by block.

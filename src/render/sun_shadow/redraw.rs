@@ -52,7 +52,7 @@ pub fn prepare_shadows(
         Some("no cascades are asked for")
     } else if light.key_illuminance.max_element() <= 0.0 || direction.y <= 0.0 {
         Some("no light that casts a shadow is above the horizon")
-    } else if forests.order.is_empty() && meshes.is_empty() {
+    } else if forests.have_no_trees() && meshes.is_empty() {
         Some("nothing casts a shadow")
     } else {
         None

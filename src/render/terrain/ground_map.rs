@@ -1,5 +1,5 @@
 //! A texture of the terrain seen from above that every pass reads: the horizon map of the key light, and the canopy
-//! cover.
+//! cover. It takes some 30 ms to compute, in the frame or beside it ([`LightUpdates`]).
 
 use std::sync::Arc;
 
@@ -10,26 +10,25 @@ use bevy::{
         world::{FromWorld, World},
     },
     log::error_once,
-    render::{
-        render_resource::{Texture, TextureView},
-        renderer::{RenderDevice, RenderQueue},
-    },
+    render::renderer::{RenderDevice, RenderQueue},
 };
 use glam::{DVec2, DVec3, Vec3};
 use half::f16;
+use rayon::prelude::*;
 
 use crate::{
     render::{
         bindings::{SharedPlacement, SharedTextures},
-        components::Ground,
+        components::{Ground, LightUpdates},
         extract::ExtractedScene,
-        gpu,
+        follow::{Followed, Follower},
+        light_table::LightTable,
         report::FrameReport,
         view::PreparedFrame,
     },
     scatter::CoverMap,
     terrain::{
-        Terrain,
+        Terrain, TerrainError,
         sun_horizon::{HorizonGrid, sun_horizon},
     },
 };
@@ -46,20 +45,71 @@ const SHADING_RADIUS: f64 = 32.0;
 /// surroundings (B).
 #[derive(Resource)]
 pub struct GroundMap {
-    view: TextureView,
+    table: LightTable<MapKey>,
+    content: Follower<MapKey, Result<MapContent, TerrainError>>,
     mean_cover: f32,
-    texture: Texture,
-    size: (u32, u32),
     extent: DVec2,
-    /// The canopy cover of the surroundings of each texel.
-    wide: Option<CoverMap>,
-    uploaded: Option<Uploaded>,
 }
 
-struct Uploaded {
+/// What the map depends on. Terrain and cover are compared by address.
+#[derive(Clone)]
+struct MapKey {
     terrain: Arc<Terrain>,
     cover: Option<Arc<CoverMap>>,
+    /// Unit vector to the key light.
     light: Vec3,
+}
+
+impl PartialEq for MapKey {
+    fn eq(&self, other: &Self) -> bool {
+        self.has_terrain_of(other) && self.has_cover_of(other) && self.light == other.light
+    }
+}
+
+impl MapKey {
+    fn has_terrain_of(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.terrain, &other.terrain)
+    }
+
+    fn has_cover_of(&self, other: &Self) -> bool {
+        match (&self.cover, &other.cover) {
+            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+            (None, None) => true,
+            _ => false,
+        }
+    }
+
+    /// Whether the map that was computed for `old` may be drawn meanwhile. The cover of a forest that appears may come
+    /// some frames after its trees.
+    fn is_near(&self, old: &Self) -> bool {
+        self.has_terrain_of(old) && LightUpdates::is_near(old.light, self.light)
+    }
+
+    /// Columns and rows of the map.
+    fn size(&self) -> (u32, u32) {
+        let extent = self.terrain.extent();
+        let texel = extent.max_element() / LONGEST_SIDE;
+        ((extent.x / texel).ceil().max(1.0) as u32, (extent.y / texel).ceil().max(1.0) as u32)
+    }
+
+    /// Computes the map; `wide` is the cover of the surroundings, if it is known.
+    fn content(&self, wide: Option<Arc<CoverMap>>) -> Result<MapContent, TerrainError> {
+        let (columns, rows) = self.size();
+        let grid = HorizonGrid { columns: columns as usize, rows: rows as usize, max_distance: HORIZON_DISTANCE };
+        let horizon = sun_horizon(&self.terrain, &grid, self.light.as_dvec3())?;
+        let wide = wide.or_else(|| self.cover.as_ref().map(|cover| Arc::new(cover.widened(SHADING_RADIUS))));
+        let texels = texels(self, wide.as_deref(), &horizon);
+        let sum: f32 = texels.iter().map(|texel| texel[1].to_f32()).sum();
+        Ok(MapContent { mean_cover: sum / texels.len().max(1) as f32, texels, wide })
+    }
+}
+
+/// The computed map.
+struct MapContent {
+    texels: Vec<[f16; 4]>,
+    mean_cover: f32,
+    /// The canopy cover of the surroundings of each texel.
+    wide: Option<Arc<CoverMap>>,
 }
 
 impl FromWorld for GroundMap {
@@ -71,10 +121,9 @@ impl FromWorld for GroundMap {
 impl GroundMap {
     /// The map without a ground: the light is visible everywhere, and the canopy cover is 0.
     fn empty(device: &RenderDevice, queue: &RenderQueue) -> Self {
-        let (texture, view) = gpu::table(device, "canopy_ground_map", (1, 1));
-        let texel = [f16::from_f32(-6.0e4), f16::ZERO, f16::ZERO, f16::ZERO];
-        gpu::write_level(queue, &texture, 0, 0, 1, 1, 8, bytemuck::cast_slice(&[texel]));
-        Self { view, mean_cover: 0.0, texture, size: (1, 1), extent: DVec2::ONE, wide: None, uploaded: None }
+        let table = LightTable::new(device, "canopy_ground_map", (1, 1));
+        table.write(queue, &[[f16::from_f32(-6.0e4), f16::ZERO, f16::ZERO, f16::ZERO]]);
+        Self { table, content: Follower::default(), mean_cover: 0.0, extent: DVec2::ONE }
     }
 
     /// Camera-relative origin and inverse size of the map, for a camera at `camera` (metres from the terrain's own
@@ -97,7 +146,7 @@ pub fn prepare_ground_map(
     mut placement: ResMut<SharedPlacement>,
 ) {
     update(&mut map, &scene, &device, &queue, &report);
-    textures.ground = map.view.clone();
+    textures.ground = map.table.view().clone();
     placement.mean_cover = map.mean_cover;
     if let Some(view) = &frame.view {
         let origin = scene.ground.as_ref().map_or(DVec3::ZERO, |(.., origin)| *origin);
@@ -105,7 +154,7 @@ pub fn prepare_ground_map(
     }
 }
 
-/// Computes the map when the terrain, its cover or the key light's direction changed.
+/// Brings the map to the current terrain, its cover and the key light's direction.
 fn update(
     map: &mut GroundMap,
     scene: &ExtractedScene,
@@ -115,67 +164,53 @@ fn update(
 ) {
     let Some((_, ground, _)) = &scene.ground else {
         // A despawned ground is freed together with its shadow.
-        if map.uploaded.is_some() {
+        if map.content.key().is_some() {
             *map = GroundMap::empty(device, queue);
         }
         return;
     };
     let Some(daylight) = &scene.daylight else { return };
-    let light = daylight.0.key_direction;
-    let same_ground = map.uploaded.as_ref().is_some_and(|uploaded| {
-        Arc::ptr_eq(&uploaded.terrain, &ground.terrain)
-            && match (&uploaded.cover, &ground.cover) {
-                (Some(a), Some(b)) => Arc::ptr_eq(a, b),
-                (None, None) => true,
-                _ => false,
-            }
-    });
-    if same_ground && map.uploaded.as_ref().is_some_and(|uploaded| uploaded.light == light) {
-        report.skipped("terrain shadow", "light and terrain have not changed");
-        return;
-    }
-    let extent = ground.terrain.extent();
-    let texel = extent.max_element() / LONGEST_SIDE;
-    let size = ((extent.x / texel).ceil().max(1.0) as u32, (extent.y / texel).ceil().max(1.0) as u32);
-    if size != map.size {
-        (map.texture, map.view) = gpu::table(device, "canopy_ground_map", size);
-        map.size = size;
-    }
-    map.extent = extent;
-    let grid = HorizonGrid { columns: size.0 as usize, rows: size.1 as usize, max_distance: HORIZON_DISTANCE };
-    let horizon = match sun_horizon(&ground.terrain, &grid, light.as_dvec3()) {
-        Ok(horizon) => horizon,
+    let Ground { terrain, cover, .. } = ground;
+    let wanted = MapKey { terrain: terrain.clone(), cover: cover.clone(), light: daylight.0.key_direction };
+    let known = map.content.key().is_some_and(|key| key.has_cover_of(&wanted));
+    let wide = map.content.value().and_then(|content| content.as_ref().ok()?.wide.clone()).filter(|_| known);
+    let key = wanted.clone();
+    let followed =
+        map.content.follow(&wanted, scene.light_updates, |old| wanted.is_near(old), move || key.content(wide));
+    let (Some(key), Some(content)) = (map.content.key(), map.content.value()) else { return };
+    let content = match content {
+        Ok(content) => content,
         Err(error) => {
             error_once!("the terrain's shadow cannot be computed: {error}");
             return;
         }
     };
-    if !same_ground {
-        map.wide = ground.cover.as_ref().map(|cover| cover.widened(SHADING_RADIUS));
+    let size = key.size();
+    map.table.resize(device, size);
+    map.extent = key.terrain.extent();
+    map.mean_cover = content.mean_cover;
+    map.table.update(queue, key.clone(), || &content.texels);
+    let cells = format!("{} × {} cells", size.0, size.1);
+    match followed {
+        Followed::Waited => report.ran("terrain shadow", cells),
+        Followed::Taken => report.ran("terrain shadow", format!("{cells}, computed beside the frames")),
+        Followed::Lags => report.skipped("terrain shadow", "it is being computed beside the frames"),
+        Followed::Same => report.skipped("terrain shadow", "light and terrain have not changed"),
     }
-    let texels = texels(ground, map.wide.as_ref(), &horizon, size);
-    if !same_ground {
-        let sum: f32 = texels.iter().map(|texel| texel[1].to_f32()).sum();
-        map.mean_cover = sum / texels.len().max(1) as f32;
-    }
-    gpu::write_level(queue, &map.texture, 0, 0, size.0, size.1, 8, bytemuck::cast_slice(&texels));
-    report.ran("terrain shadow", format!("{} × {} cells", size.0, size.1));
-    map.uploaded = Some(Uploaded { terrain: ground.terrain.clone(), cover: ground.cover.clone(), light });
 }
 
 /// One texel per cell, row by row from the north.
-fn texels(ground: &Ground, wide: Option<&CoverMap>, horizon: &[f32], size: (u32, u32)) -> Vec<[f16; 4]> {
-    let extent = ground.terrain.extent();
-    let cell = extent / DVec2::new(f64::from(size.0), f64::from(size.1));
-    (0..size.1)
-        .flat_map(|row| (0..size.0).map(move |column| (column, row)))
-        .map(|(column, row)| {
-            let place = (DVec2::new(f64::from(column), f64::from(row)) + 0.5) * cell - 0.5 * extent;
-            let height = ground.terrain.height(place.x, place.y) as f32;
-            let clears = horizon.get((row * size.0 + column) as usize).map_or(0.0, |h| h - height);
-            let cover = ground.cover.as_ref().map_or(0.0, |cover| cover.at(place));
-            let around = wide.map_or(0.0, |cover| cover.at(place));
-            [clears.clamp(-6.0e4, 6.0e4), cover, around, 0.0].map(f16::from_f32)
-        })
-        .collect()
+fn texels(key: &MapKey, wide: Option<&CoverMap>, horizon: &[f32]) -> Vec<[f16; 4]> {
+    let (columns, rows) = key.size();
+    let extent = key.terrain.extent();
+    let cell = extent / DVec2::new(f64::from(columns), f64::from(rows));
+    let texel = |column: u32, row: u32| {
+        let place = (DVec2::new(f64::from(column), f64::from(row)) + 0.5) * cell - 0.5 * extent;
+        let height = key.terrain.height(place.x, place.y) as f32;
+        let clears = horizon.get((row * columns + column) as usize).map_or(0.0, |h| h - height);
+        let cover = key.cover.as_ref().map_or(0.0, |cover| cover.at(place));
+        let around = wide.map_or(0.0, |cover| cover.at(place));
+        [clears.clamp(-6.0e4, 6.0e4), cover, around, 0.0].map(f16::from_f32)
+    };
+    (0..rows).into_par_iter().flat_map_iter(|row| (0..columns).map(move |column| texel(column, row))).collect()
 }

@@ -13,7 +13,7 @@ use crate::{
 
 /// Uploads [`noise_image`].
 pub fn noise_texture(device: &RenderDevice, queue: &RenderQueue) -> TextureView {
-    gpu::texture(device, queue, "canopy_ground_noise", TextureFormat::Rgba8Unorm, &mip_chain(&noise_image()), 1)
+    gpu::texture(device, queue, "canopy_ground_noise", TextureFormat::Rgba8Unorm, mip_chain(&noise_image()).view(), 1)
 }
 
 /// Box-filtered levels, all four channels alike: the values are numbers, not colours.

@@ -1,4 +1,5 @@
-//! ESRI ASCII grids ("Arc/Info ASCII Grid"): a header of keys and numbers, then the heights from the north-west.
+//! ESRI ASCII grids ("Arc/Info ASCII Grid"): a header of keys and numbers, then the heights row by row from the
+//! north-west.
 
 use glam::DVec2;
 
@@ -8,10 +9,10 @@ use crate::terrain::{CoordinateSystem, MAX_SAMPLES, TerrainError, Warning};
 const KEYS: [&str; 10] =
     ["ncols", "nrows", "xllcorner", "xllcenter", "yllcorner", "yllcenter", "cellsize", "dx", "dy", "nodata_value"];
 
-/// The largest text that is read, in bytes: it is held in memory at once.
+/// Maximum size of a text in bytes. It is held in memory as a whole.
 const MAX_TEXT: u64 = 4 << 30;
 
-/// Whether a file starts like an ASCII grid: with one of the header's keys.
+/// Whether a file starts like an ASCII grid, with one of the keys of a header.
 pub(super) fn recognises(start: &[u8]) -> bool {
     let mut words = Words::new(start);
     words.next().is_some_and(|word| key_of(word.text).is_some())
@@ -49,7 +50,7 @@ fn read_heights(
     window: &Window,
     missing: Option<f64>,
 ) -> Result<Vec<f32>, TerrainError> {
-    // A value takes a digit and a space at least, so the text itself bounds what a header may ask for.
+    // A value takes at least a digit and a space, so the size of the text limits the number of values in a header.
     let promised = grid.columns.checked_mul(grid.rows);
     if promised.is_none_or(|count| count > words.rest() / 2 + 1) {
         return Err(source.malformed(
@@ -205,7 +206,7 @@ fn number(source: &Source, word: &Word) -> Result<f64, TerrainError> {
     })
 }
 
-/// Words of a text with the position where each begins, both counted from 1.
+/// Words of a text with the line and column where each begins, both counted from 1.
 #[derive(Clone)]
 struct Words<'a> {
     text: &'a [u8],
@@ -226,7 +227,7 @@ impl<'a> Words<'a> {
         Self { text, at, line: 1, line_start: at }
     }
 
-    /// Bytes not yet read.
+    /// Number of bytes that were not read yet.
     fn rest(&self) -> usize {
         self.text.len() - self.at
     }

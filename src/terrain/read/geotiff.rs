@@ -1,4 +1,4 @@
-//! GeoTIFF [OGC 19-008r4] and BigTIFF: one band of heights with its location on earth.
+//! GeoTIFF [OGC 19-008r4] and BigTIFF: one band of heights and its location on earth.
 
 mod directory;
 mod keys;
@@ -12,11 +12,12 @@ use super::{Grid, Input, Raster, Source, Window};
 use crate::terrain::{MAX_SAMPLES, TerrainError};
 use keys::GeoKeys;
 
-/// The most bytes that one strip or tile may decode to.
+/// Maximum decoded size of a strip or tile in bytes.
 const MAX_CHUNK: usize = 1 << 30;
-/// The most bytes of a tag: offsets of four million tiles.
+/// Maximum size of a tag in bytes: the offsets of four million tiles.
 const MAX_TAG: usize = 32 << 20;
-/// LZW and Deflate reach 1:1032 to 1:2700 on constant data: what a file of a given size can hold.
+/// Maximum ratio of decoded to stored bytes. LZW and Deflate reach 1032 to 2700 on constant data. It limits what a file
+/// of a given size can hold.
 const MAX_EXPANSION: u64 = 4096;
 
 const FETCH: &str = "the file is damaged or cut off: fetch or export it again";
@@ -60,8 +61,8 @@ pub(super) fn read(source: &Source) -> Result<Raster, TerrainError> {
     Ok(Raster { grid, window, system: keys.system, heights, warnings: keys.warnings })
 }
 
-/// Where the samples lie [OGC 19-008r4, 7.4, "Raster to model coordinate transformation"], and whether the rows run
-/// from south to north.
+/// The positions of the samples [OGC 19-008r4, 7.4, "Raster to model coordinate transformation"], and whether the rows
+/// run from south to north.
 fn read_grid(
     source: &Source,
     decoder: &mut Decoder<Input>,
@@ -69,7 +70,7 @@ fn read_grid(
     rows: usize,
     point: bool,
 ) -> Result<(Grid, bool), TerrainError> {
-    // A sample is the middle of its cell, unless the file says that the raster is made of points.
+    // A sample lies in the middle of its cell, unless the file says that the raster consists of points.
     let middle = if point { 0.0 } else { 0.5 };
     let numbers = |decoder: &mut Decoder<Input>, tag| {
         decoder.find_tag(tag).ok().flatten().and_then(|value| value.into_f64_vec().ok())
@@ -114,13 +115,13 @@ fn read_grid(
     Ok((Grid { columns, rows, first, step: step.abs() }, south_up))
 }
 
-/// The value that marks missing data: GDAL writes it as text.
+/// The value that marks missing data. GDAL writes it as text.
 fn read_missing(decoder: &mut Decoder<Input>) -> Option<f64> {
     let text = decoder.find_tag(Tag::GdalNodata).ok().flatten()?.into_string().ok()?;
     text.trim_matches(|c: char| c.is_whitespace() || c == '\0').parse().ok()
 }
 
-/// Decodes the strips or tiles that a window touches.
+/// Decodes the strips or tiles that overlap a window.
 fn read_samples(
     source: &Source,
     decoder: &mut Decoder<Input>,
@@ -131,7 +132,7 @@ fn read_samples(
 ) -> Result<Vec<f32>, TerrainError> {
     let broken = |error: tiff::TiffError| source.malformed("TIFF directory", error, FETCH);
     let tiled = decoder.get_chunk_type() == ChunkType::Tile;
-    // The decoder's own functions for these panic on a directory that contradicts itself.
+    // The decoder's own functions for this panic if the directory contradicts itself.
     let (chunk_columns, chunk_rows) = if tiled {
         let width: u32 = decoder.get_tag_unsigned(Tag::TileWidth).map_err(broken)?;
         let length: u32 = decoder.get_tag_unsigned(Tag::TileLength).map_err(broken)?;
@@ -150,7 +151,7 @@ fn read_samples(
     let across_range = chunk_range(window.column, window.columns, chunk_columns);
     let down_range = chunk_range(window.row, window.rows, chunk_rows);
 
-    // Before anything is allocated: can the bytes that are there become the samples that are asked for?
+    // Before allocating: can the stored bytes hold the requested samples at all?
     let mut stored = 0_u64;
     for down in down_range.clone() {
         for column in across_range.clone() {
@@ -175,7 +176,7 @@ fn read_samples(
     for down in down_range {
         for column in across_range.clone() {
             let index = down * across + column;
-            // A tile of no bytes is one that GDAL left out because it is all missing.
+            // A tile without bytes: GDAL omits tiles in which all data are missing.
             if sizes[index] == 0 {
                 continue;
             }
@@ -194,7 +195,7 @@ fn read_samples(
                 );
                 source.malformed(at(), error, remedy)
             })?;
-            // Strips and tiles are cut off at the image's border by the decoder.
+            // The decoder crops strips and tiles at the border of the image.
             let samples = Samples { values: samples, missing };
             if samples.len() < width * height {
                 return Err(source.malformed(
@@ -214,7 +215,7 @@ fn read_samples(
     Ok(heights)
 }
 
-/// Decoded samples of whatever type as heights.
+/// Decoded samples of any type, read as heights.
 struct Samples {
     values: DecodingResult,
     missing: Option<f64>,
@@ -237,7 +238,7 @@ impl Samples {
         }
     }
 
-    /// The height at an index below `len`; NaN where data are missing.
+    /// The height at an index below `len`; NaN if it is missing.
     fn get(&self, at: usize) -> f32 {
         let value = match &self.values {
             DecodingResult::U8(v) => f64::from(v[at]),
@@ -252,7 +253,7 @@ impl Samples {
             DecodingResult::I32(v) => f64::from(v[at]),
             DecodingResult::I64(v) => v[at] as f64,
         };
-        // The mark is written in decimals; a float sample holds its nearest f32.
+        // The marker is written in decimals, while a float sample holds the nearest f32.
         let is_missing = self.missing.is_some_and(|m| value == m || value as f32 == m as f32);
         if is_missing || !value.is_finite() { f32::NAN } else { value as f32 }
     }

@@ -1,16 +1,17 @@
-//! SRTM `.hgt` files: one degree of 16-bit big-endian heights, placed by the name of the file [USGS, "SRTM Topo"].
+//! SRTM `.hgt` files: 16-bit big-endian heights of one square degree, whose name gives their location
+//! [USGS, "SRTM Topo"].
 
 use glam::DVec2;
 
 use super::{Grid, Raster, Source};
 use crate::terrain::{CoordinateSystem, TerrainError};
 
-/// Samples of a side for three and for one arc-second. Sides share their samples with the neighbours.
+/// Samples along a side, for three arc-seconds and for one. Neighbouring files share the samples on their border.
 const SIDES: [usize; 2] = [1201, 3601];
-/// The mark of a void.
+/// The value that marks missing data.
 const VOID: i16 = i16::MIN;
 
-/// Whether a file has the size of an `.hgt`; there is no header.
+/// Whether a file has the size of an `.hgt` file. There is no header.
 pub(super) fn recognises(length: u64) -> bool {
     side(length).is_some()
 }
@@ -46,7 +47,7 @@ pub(super) fn read(source: &Source) -> Result<Raster, TerrainError> {
     Ok(Raster { grid, window, system, heights, warnings: Vec::new() })
 }
 
-/// Latitude and longitude of the south-western sample from a name like `N36W085.hgt`.
+/// Latitude and longitude of the south-west sample, from a name such as `N36W085.hgt`.
 fn corner(name: &str) -> Option<(f64, f64)> {
     let name = name.as_bytes();
     let degrees = |digits: &[u8], limit: f64| {

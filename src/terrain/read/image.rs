@@ -1,4 +1,4 @@
-//! 16-bit greyscale PNG as exported by terrain editors. Metres come from [`ImageScale`](super::ImageScale).
+//! 16-bit greyscale PNG, as terrain editors export it. [`ImageScale`](super::ImageScale) gives the metres.
 
 use glam::DVec2;
 use png::{BitDepth, ColorType, Decoder, Limits, Transformations};
@@ -6,7 +6,7 @@ use png::{BitDepth, ColorType, Decoder, Limits, Transformations};
 use super::{Grid, Raster, Source};
 use crate::terrain::{CoordinateSystem, MAX_SAMPLES, TerrainError};
 
-/// Deflate packs at most 1032 bytes into one [RFC 1951]: what a file of a given size can hold.
+/// Maximum ratio of decoded to stored bytes of Deflate [RFC 1951]. It limits what a file of a given size can hold.
 const MAX_EXPANSION: u64 = 1032;
 
 pub(super) fn recognises(start: &[u8]) -> bool {

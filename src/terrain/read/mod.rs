@@ -1,8 +1,8 @@
-//! Reading terrain from files as they come. The format is known by a file's content, not by its name.
+//! Reads terrain from files of several formats. The content of a file determines its format, not its name.
 //!
 //! | format | horizontal system | heights |
 //! |---|---|---|
-//! | GeoTIFF, BigTIFF | its GeoKeys: degrees, UTM, any projection in metres or feet | 8 to 64 bit integers and floats, one band |
+//! | GeoTIFF, BigTIFF | from its GeoKeys: degrees, UTM, any projection in metres or feet | 8 to 64 bit integers and floats, one band |
 //! | ESRI ASCII grid | none in the file: local metres, or degrees if the numbers look like it | text |
 //! | SRTM `.hgt` | degrees, from the file's name (`N36W085.hgt`) | 16 bit, 1201² or 3601² |
 //! | PNG, 16 bit greyscale | metres from [`ReadOptions::image_scale`] | from the same |
@@ -22,24 +22,24 @@ use glam::DVec2;
 use super::holes::fill_holes;
 use super::{CoordinateSystem, GeoReference, HeightField, MAX_SAMPLES, Surroundings, Terrain, TerrainError, Warning};
 
-/// Heights outside this range (metres) are not heights on earth but mark missing data.
+/// Plausible heights in metres. Values outside this range are not heights on earth: they mark missing data.
 const PLAUSIBLE: std::ops::RangeInclusive<f32> = -12_000.0..=30_000.0;
 
-/// What to read and how to understand it; the default reads a whole file as it describes itself.
+/// What to read, and how to interpret it. The default reads a whole file as the file describes itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ReadOptions {
     /// Read only the samples inside this window.
     pub crop: Option<Crop>,
-    /// Metres of an image; needed for PNG, ignored for all else.
+    /// Scale of an image in metres. PNG requires it; other formats ignore it.
     pub image_scale: Option<ImageScale>,
-    /// The coordinate system, instead of what the file says or does not say.
+    /// The coordinate system, which replaces that of the file. `None` takes the one that the file states.
     pub coordinate_system: Option<CoordinateSystem>,
-    /// What lies outside the field.
+    /// How the terrain continues outside the file.
     pub surroundings: Surroundings,
 }
 
-/// A window in the coordinates of the file (degrees, or easting and northing). Samples on its border are inside.
+/// A window in the coordinates of the file (degrees, or easting and northing). Samples on its border belong to it.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Crop {
@@ -53,10 +53,10 @@ pub struct Crop {
     pub north: f64,
 }
 
-/// The metres of a greyscale image. Its file coordinates are metres from its lower left sample.
+/// The scale of a greyscale image in metres. File coordinates are metres from the lower left sample.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ImageScale {
-    /// Distance of neighbouring samples in metres, above 0.
+    /// Distance between neighbouring samples in metres, above 0.
     pub spacing: f64,
     /// Height of black (0) in metres.
     pub lowest: f64,
@@ -64,14 +64,14 @@ pub struct ImageScale {
     pub highest: f64,
 }
 
-/// Reads a terrain. Holes are filled from their rims; the warnings say what the reader decided on its own account.
+/// Reads a terrain. Holes are filled from their rims. The warnings say what the reader had to decide by itself.
 ///
-/// Memory stays within a few times the samples asked for, and within a limit that follows from the size of the file:
-/// a header alone allocates nothing.
+/// Memory stays within a few times the requested samples, and within a limit that follows from the size of the file. A
+/// header alone allocates nothing.
 ///
 /// # Errors
-/// See [`TerrainError`]: a file that cannot be read, is of no known format, broken, without data, without a known
-/// coordinate system, or of less than two rows or columns. No input makes this function panic.
+/// See [`TerrainError`]: a file that cannot be read, has an unknown format, is broken, has no data, has no known
+/// coordinate system, or has fewer than two rows or columns. No input makes this function panic.
 pub fn read_terrain(path: &Path, options: &ReadOptions) -> Result<(Terrain, Vec<Warning>), TerrainError> {
     let io = |source| TerrainError::Io { path: path.to_owned(), source };
     let mut file = File::open(path).map_err(io)?;
@@ -82,8 +82,8 @@ pub fn read_terrain(path: &Path, options: &ReadOptions) -> Result<(Terrain, Vec<
     Source { path, length, bytes: None, options }.read(&start)
 }
 
-/// Reads a terrain from the bytes of a file, as [`read_terrain`] does from the file itself. `name` is its name: for
-/// messages, and because an `.hgt` file says by it where on earth it lies.
+/// Reads a terrain from the bytes of a file, as [`read_terrain`] reads the file itself. `name` is the name of the file:
+/// it is used in messages, and it gives the location of an `.hgt` file.
 ///
 /// # Errors
 /// Those of [`read_terrain`].
@@ -96,26 +96,26 @@ pub fn read_terrain_bytes(
     Source { path: name, length: bytes.len() as u64, bytes: Some(bytes), options }.read(start)
 }
 
-/// The bytes of a file, to be read from anywhere in it.
+/// The bytes of a file, with random access.
 trait ReadAnywhere: BufRead + Seek {}
 
 impl<R: BufRead + Seek> ReadAnywhere for R {}
 
-/// What a reader reads from.
+/// Input of a reader.
 type Input<'a> = Box<dyn ReadAnywhere + 'a>;
 
-/// What every reader gets.
+/// A file and how to read it, for every reader.
 struct Source<'a> {
     path: &'a Path,
-    /// Bytes in the file.
+    /// Size of the file in bytes.
     length: u64,
-    /// The bytes, where they are not in the file at `path`.
+    /// The bytes, if they do not come from the file at `path`.
     bytes: Option<&'a [u8]>,
     options: &'a ReadOptions,
 }
 
 impl<'a> Source<'a> {
-    /// Reads what begins with `start`.
+    /// Reads the file, whose first bytes are `start`.
     fn read(&self, start: &[u8]) -> Result<(Terrain, Vec<Warning>), TerrainError> {
         let raster = if geotiff::recognises(start) {
             geotiff::read(self)?
@@ -131,7 +131,7 @@ impl<'a> Source<'a> {
         raster.into_terrain(self)
     }
 
-    /// The bytes, to be read as they are needed: a window of a large file is not the whole file.
+    /// Opens the bytes for reading on demand: a window of a large file does not need the whole file.
     fn open(&self) -> Result<Input<'a>, TerrainError> {
         match self.bytes {
             Some(bytes) => Ok(Box::new(Cursor::new(bytes))),
@@ -172,7 +172,7 @@ impl<'a> Source<'a> {
         TerrainError::Unsupported { path: self.path.to_owned(), problem: problem.into(), remedy: remedy.into() }
     }
 
-    /// The part of a grid that the options ask for.
+    /// The part of a grid that the options request.
     fn window(&self, grid: &Grid) -> Result<Window, TerrainError> {
         if grid.columns < 2 || grid.rows < 2 {
             return Err(TerrainError::TooSmall { columns: grid.columns, rows: grid.rows });
@@ -181,11 +181,11 @@ impl<'a> Source<'a> {
         let window = match self.options.crop {
             None => whole,
             Some(crop) => {
-                // A millionth of a cell: a limit written with a few digits still takes the sample it names.
+                // Tolerance of a millionth of a cell: a limit that is written with few digits includes its sample.
                 let range = |low: f64, high: f64, count: usize| {
                     let first = (low - 1e-6).ceil().max(0.0);
                     let end = ((high + 1e-6).floor() + 1.0).min(count as f64);
-                    // A limit that is not a number keeps nothing: comparisons with it are false.
+                    // A limit that is NaN selects nothing, because comparisons with it are false.
                     if low <= high && first < end { (first as usize, (end - first) as usize) } else { (0, 0) }
                 };
                 let west = (crop.west - grid.first.x) / grid.step.x;
@@ -216,14 +216,14 @@ impl<'a> Source<'a> {
     }
 }
 
-/// How a file's samples lie in its coordinates.
+/// The positions of a file's samples in its coordinates.
 #[derive(Clone, Copy, Debug)]
 struct Grid {
     columns: usize,
     rows: usize,
-    /// File coordinates of the north-western sample.
+    /// File coordinates of the north-west sample.
     first: DVec2,
-    /// Distance of samples in file coordinates to the east and to the south, both positive.
+    /// Distance between samples in file coordinates, to the east and to the south; both positive.
     step: DVec2,
 }
 
@@ -242,7 +242,7 @@ struct Window {
     rows: usize,
 }
 
-/// What a reader found: the samples of a window, holes as NaN.
+/// The result of a reader: the samples of a window. Holes are NaN.
 struct Raster {
     grid: Grid,
     window: Window,

@@ -19,13 +19,14 @@
 //! sin m phi, as y_lm is.
 
 use std::f32::consts::PI;
-use std::sync::LazyLock;
+use std::sync::OnceLock;
 
 use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::light::sh::{self, MAX_BANDS};
 use crate::light::{Atmosphere, AtmosphereParams, LightSettings, LightState, SunPosition};
+use crate::math::compute_once;
 
 /// Elevations of the sun in the set of skies, degrees: dense where skies change.
 const ELEVATIONS_DEG: [f64; 10] = [-4.0, -1.0, 2.0, 6.0, 12.0, 20.0, 30.0, 42.0, 55.0, 70.0];
@@ -58,14 +59,17 @@ struct Sky {
 }
 
 /// The skies; empty if the atmosphere could not be built.
-static SKIES: LazyLock<Vec<Sky>> = LazyLock::new(|| {
-    let Ok(atmosphere) = Atmosphere::new(AtmosphereParams::default()) else { return Vec::new() };
-    let state = |elevation: &f64| {
-        let sun = SunPosition::from_degrees(SOUTH_DEG, *elevation).ok()?;
-        LightState::new(&atmosphere, sun, None, &LightSettings::default()).ok()
-    };
-    ELEVATIONS_DEG.iter().filter_map(state).flat_map(|state| skies_of(&state)).collect()
-});
+fn skies() -> &'static [Sky] {
+    static SKIES: OnceLock<Vec<Sky>> = OnceLock::new();
+    compute_once::<Vec<Sky>>(&SKIES, || {
+        let Ok(atmosphere) = Atmosphere::new(AtmosphereParams::default()) else { return Vec::new() };
+        let state = |elevation: &f64| {
+            let sun = SunPosition::from_degrees(SOUTH_DEG, *elevation).ok()?;
+            LightState::new(&atmosphere, sun, None, &LightSettings::default()).ok()
+        };
+        ELEVATIONS_DEG.iter().filter_map(state).flat_map(|state| skies_of(&state)).collect()
+    })
+}
 
 /// Where azimuths are 0 in the basis.
 const SOUTH_DEG: f64 = 180.0;
@@ -115,38 +119,32 @@ pub(super) struct Fit {
 }
 
 /// The fits, by bands - 1; `None` where there are no skies to fit to or the equations have no solution.
-static FITS: [LazyLock<Option<Fit>>; MAX_BANDS] = [
-    LazyLock::new(|| Fit::new(1)),
-    LazyLock::new(|| Fit::new(2)),
-    LazyLock::new(|| Fit::new(3)),
-    LazyLock::new(|| Fit::new(4)),
-    LazyLock::new(|| Fit::new(5)),
-    LazyLock::new(|| Fit::new(6)),
-];
+static FITS: [OnceLock<Option<Fit>>; MAX_BANDS] = [const { OnceLock::new() }; MAX_BANDS];
 
 impl Fit {
     /// The fit with so many bands, found once a process.
     pub fn of(bands: usize) -> Option<&'static Self> {
-        FITS.get(bands.checked_sub(1)?)?.as_ref()
+        compute_once(FITS.get(bands.checked_sub(1)?)?, || Self::new(bands)).as_ref()
     }
 
     fn new(bands: usize) -> Option<Self> {
         let count = bands * bands;
-        if SKIES.is_empty() {
+        let skies = skies();
+        if skies.is_empty() {
             return None;
         }
         let mut values = vec![0.0; HEIGHTS * count];
         for m in 0..bands {
             let index = |l: usize| l * (l + 1) + m;
             let n = bands - m;
-            let share = 1.0 / SKIES.len() as f64;
+            let share = 1.0 / skies.len() as f64;
             // The mean of cos² over all azimuths.
             let half = if m == 0 { 1.0 } else { 0.5 };
             let mut left = vec![0.0; n * n];
             for i in 0..n {
                 for j in 0..n {
                     let product = |sky: &Sky| sky.coefficients[index(m + i)] * sky.coefficients[index(m + j)];
-                    left[i * n + j] = half * share * SKIES.iter().map(product).sum::<f64>();
+                    left[i * n + j] = half * share * skies.iter().map(product).sum::<f64>();
                 }
                 left[i * n + i] += PULL;
             }
@@ -159,7 +157,7 @@ impl Fit {
                 let mut basis = [0.0; MAX_BANDS * MAX_BANDS];
                 sh::basis_into(Vec3::new(0.0, y, (1.0 - y * y).max(0.0).sqrt()), &mut basis);
                 let mut right: Vec<f64> = (m..bands).map(|l| PULL * f64::from(basis[index(l)])).collect();
-                for sky in SKIES.iter() {
+                for sky in skies.iter() {
                     let radiance = match part.checked_sub(HEIGHTS / 2) {
                         Some(part) => sky.profile[part][m],
                         None if m == 0 => sky.ground,

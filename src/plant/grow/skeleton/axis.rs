@@ -1,4 +1,4 @@
-//! The axis of a stem (Weber & Penn 1995, 4.1 and 4.8), and where prongs leave it (4.2).
+//! The axis of a stem (Weber & Penn 1995, 4.1 and 4.8), and where it forks (4.2).
 
 use std::f32::consts::{FRAC_PI_2, TAU};
 
@@ -7,11 +7,11 @@ use glam::{Quat, Vec3};
 use super::super::random::Random;
 use super::{Grower, Sprout};
 
-/// Radius of each prong of a fork over the radius below it. Between Leonardo's rule for two equal prongs (0.71) and
-/// the paper (1).
+/// Radius of each prong of a fork divided by the radius below the fork. It lies between Leonardo's rule for two equal
+/// prongs (0.71) and the paper (1).
 const PRONG: f32 = 0.82;
 
-/// A node with its frame, while the stem grows.
+/// A node with its frame, used while the stem grows.
 #[derive(Clone, Copy)]
 pub(super) struct Knot {
     pub position: Vec3,
@@ -21,7 +21,7 @@ pub(super) struct Knot {
 }
 
 impl Grower<'_> {
-    /// Follows the axis (4.1) and notes the prongs that leave it (4.2).
+    /// Follows the axis (4.1) and records the prongs that leave it (4.2).
     pub(super) fn trace(&self, sprout: &Sprout, random: &Random) -> (Vec<Knot>, Vec<Sprout>) {
         let stem = self.parameters(sprout.level);
         let mut draw = random.split(0);
@@ -59,7 +59,7 @@ impl Grower<'_> {
             if debt >= 1.0 && along < 0.85 {
                 debt -= 1.0;
                 let angle = (stem.split_angle_deg + stem.split_angle_variation_deg * draw.signed()).to_radians();
-                // A trunk forks to any side, a bough rather into a fan that lies level.
+                // A trunk forks in any direction. The prongs of a bough form a roughly horizontal fan.
                 let azimuth = if sprout.level == 0 {
                     draw.range(0.0, TAU)
                 } else {
@@ -87,14 +87,14 @@ impl Grower<'_> {
     }
 }
 
-/// Rotates a frame towards the zenith (4.8; the paper rotates about x only, which leaves stems that wander sideways).
+/// Rotates a frame towards the zenith (4.8). The paper rotates about x only, with which stems drift sideways.
 fn attract(rotation: Quat, amount: f32) -> Quat {
     let axis = (rotation * Vec3::Z).cross(Vec3::Y);
     let sine = axis.length();
     if sine < 1e-3 { rotation } else { Quat::from_axis_angle(axis / sine, amount * sine) * rotation }
 }
 
-/// The knot at a distance within a piece.
+/// The knot at a distance along a piece.
 pub(super) fn at(knots: &[Knot], distance: f32) -> Knot {
     let after = knots.partition_point(|knot| knot.distance < distance).clamp(1, knots.len() - 1);
     let (a, b) = (knots[after - 1], knots[after]);

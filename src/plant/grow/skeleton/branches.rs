@@ -1,4 +1,4 @@
-//! Where branches leave a stem, and how long and thick they are (Weber & Penn 1995, 4.3 and 4.4).
+//! Positions, lengths and radii of the branches of a stem (Weber & Penn 1995, 4.3 and 4.4).
 
 use glam::{Quat, Vec3};
 
@@ -47,7 +47,7 @@ impl Grower<'_> {
             } else {
                 azimuth += branches.rotate_deg + if whorl == 1 { wobble } else { 0.0 };
                 let spoke = if whorl == 1 { 0.0 } else { 360.0 * (index % whorl) as f32 / whorl as f32 + wobble };
-                // Within a whorl the golden angle rotates the whorl, not the branch.
+                // The golden angle is between whorls, not between the branches of a whorl.
                 if whorl == 1 { azimuth } else { row as f32 * branches.rotate_deg + spoke }
             };
             let knot = at(knots, distance);
@@ -58,7 +58,7 @@ impl Grower<'_> {
                 + if variation >= 0.0 {
                     variation * draw.signed()
                 } else {
-                    // 4.3, negative nDownAngleV: ordered along the parent; a tenth of it at random.
+                    // 4.3, negative nDownAngleV: ordered along the parent, with a random part of a tenth.
                     variation * (1.0 - 2.0 * (0.2 + 0.8 * ratio)) + 0.25 * variation * draw.signed()
                 };
             let rotation = knot.rotation
@@ -90,7 +90,7 @@ impl Grower<'_> {
         children
     }
 
-    /// Length in metres of a mean stem of a level, were it at its parent's base.
+    /// Length in metres that a mean stem of a level has at the base of its parent.
     fn reach(&self, level: usize) -> f32 {
         (0..=level).map(|level| self.parameters(level).length).product::<f32>() * self.height
     }

@@ -1,10 +1,10 @@
-//! The outline of a crown: the envelope that prunes it (Weber & Penn 1995, 4.6), and how its sides differ.
+//! The outline of a crown: the envelope that prunes it (Weber & Penn 1995, 4.6), and the differences between its sides.
 
 use glam::Vec3;
 
 use super::Grower;
 
-/// A wave around the crown by which its sides differ.
+/// A wave around the crown that makes its sides differ.
 pub(super) struct Side {
     pub waves: f32,
     pub phase: f32,
@@ -13,8 +13,8 @@ pub(super) struct Side {
 }
 
 impl Grower<'_> {
-    /// Is a point outside the envelope of 4.6, widened by `slack`? It is measured from the middle between the trunk
-    /// and the vertical of the paper, so that a bent tree keeps its top, and the sides of the crown differ.
+    /// Whether a point is outside the envelope of 4.6, widened by `slack`. The envelope lies around the middle between
+    /// the trunk and the vertical axis of the paper, so that a bent tree keeps its top. The sides of the crown differ.
     pub(super) fn is_outside(&self, point: Vec3, slack: f32) -> bool {
         self.species.pruning.is_some_and(|pruning| {
             let ratio = (self.height - point.y) / (self.height * (1.0 - self.species.trunk.bare));
@@ -26,7 +26,7 @@ impl Grower<'_> {
         })
     }
 
-    /// Factor on the length of the boughs of one side of the crown.
+    /// Factor on the length of the boughs on one side of the crown.
     pub(super) fn side(&self, direction: Vec3, ratio: f32) -> f32 {
         let azimuth = direction.x.atan2(direction.z);
         let (sum, weights) = self.sides.iter().fold((0.0, 0.0), |(sum, weights), side| {

@@ -1,8 +1,8 @@
 //! The skeleton of a tree: its stems as polylines with radii (Weber & Penn 1995, 4.1 to 4.6 and 4.8).
 //!
-//! A stem's frame has its z axis along the stem; x is the axis about which the stem bends away from its parent.
-//! Every stem draws from a random stream of its own, split from its parent's by its index, so that a change of one
-//! level's parameters leaves the levels before it as they were.
+//! The frame of a stem has its z axis along the stem; x is the axis about which the stem bends away from its parent.
+//! Every stem has its own random stream, which is split from that of its parent by index. So a change of the parameters
+//! of a level does not affect the levels before it.
 
 mod axis;
 mod branches;
@@ -22,22 +22,22 @@ pub(super) use radii::node_at;
 /// A point of a stem's axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
-    /// Metres in the plant's frame.
+    /// Position in the frame of the plant, metres.
     pub position: Vec3,
     /// Radius of the wood in metres; 0 at the tip.
     pub radius: f32,
-    /// Metres along the stem from its base.
+    /// Distance from the base along the stem, metres.
     pub distance: f32,
     /// Depth of the root lobes as a fraction of the radius.
     pub lobe: f32,
-    /// 0 inside the crown, at the trunk, to 1 at the crown's outside.
+    /// How far out in the crown it is: 0 at the trunk, 1 at the outside.
     pub outward: f32,
 }
 
-/// A stem, or from a fork on one prong of it, from base to tip; two nodes at least.
+/// A stem, or a prong of it beyond a fork, from base to tip. It has at least two nodes.
 #[derive(Clone, Debug)]
 pub(super) struct Stem {
-    /// 0 for the trunk, 1 for boughs and so on.
+    /// 0 for the trunk, 1 for boughs, and so on.
     pub level: usize,
     /// The axis.
     pub nodes: Vec<Node>,
@@ -48,16 +48,16 @@ pub(super) struct Stem {
 pub(super) struct Skeleton {
     /// The stems.
     pub stems: Vec<Stem>,
-    /// Height of this individual over the species' mean height.
+    /// Height of this individual divided by the mean height of the species.
     pub scale: f32,
 }
 
-/// Stems of one tree at most; what would grow beyond is left out. Above what a valid species asks for without forks.
+/// Maximum number of stems of a tree; further ones are omitted. A valid species without forks stays below it.
 const STEM_LIMIT: usize = 120_000;
-/// The thinnest wood in metres, but for tips.
+/// Smallest radius of wood in metres, except at tips.
 const MIN_RADIUS: f32 = 0.0012;
 
-/// Grows the stems of an individual. The species must be valid.
+/// Grows the stems of an individual of a valid species.
 pub(super) fn grow(species: &GrowParameters, random: &Random) -> Skeleton {
     let mut draw = random.split(0);
     let height = species.height + species.height_variation * draw.signed();
@@ -90,21 +90,21 @@ pub(super) fn grow(species: &GrowParameters, random: &Random) -> Skeleton {
     Skeleton { stems: grower.stems, scale: height / species.height }
 }
 
-/// How a stem (or a prong) begins.
+/// The beginning of a stem or a prong.
 struct Sprout {
     level: usize,
     origin: Vec3,
     rotation: Quat,
-    /// Of the whole stem, from its base.
+    /// Length of the whole stem, from its base.
     length: f32,
-    /// Distance from the stem's base at which this piece begins: 0, or that of its fork.
+    /// Distance from the base of the stem at which this piece begins: 0, or that of its fork.
     begin: f32,
-    /// Radius that the whole stem has at its base.
+    /// Radius of the whole stem at its base.
     radius: f32,
-    /// Factor on the radius from the forks so far.
+    /// Factor on the radius, from the forks so far.
     thickness: f32,
     outward: f32,
-    /// Part of a fork that is due, 0 to 1 (the error diffusion of 4.2).
+    /// Accumulated fraction of the next fork, 0 to 1 (the error diffusion of 4.2).
     debt: f32,
 }
 
@@ -112,7 +112,7 @@ struct Grower<'a> {
     species: &'a GrowParameters,
     height: f32,
     sides: [Side; 3],
-    /// The trunk, from below: the middle of the envelope.
+    /// The axis of the trunk, from below: the middle of the envelope.
     axis: Vec<Vec3>,
     stems: Vec<Stem>,
 }
@@ -134,8 +134,8 @@ impl Grower<'_> {
         if self.stems.is_empty() {
             self.axis = knots.iter().map(|knot| knot.position).collect();
         } else {
-            // 4.6: shorten until the tip is within the envelope; what is left of it too short does not grow. Only
-            // prongs of the trunk and boughs obey, each to its own measure: a crown is not clipped as a hedge is.
+            // 4.6: shorten until the tip is within the envelope. A stem that becomes too short does not grow. Only
+            // prongs of the trunk and boughs are pruned, each to its own limit: a crown is not clipped like a hedge.
             let whole = sprout.length - sprout.begin;
             let mut rest = whole;
             let slack = random.split(2).range(0.84, 1.16);

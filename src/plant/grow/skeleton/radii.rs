@@ -1,4 +1,4 @@
-//! How thick the wood is along a stem (Weber & Penn 1995, 4.4), and the trunk's foot.
+//! Radii along a stem (Weber & Penn 1995, 4.4), and the foot of the trunk.
 
 use glam::Vec3;
 
@@ -7,11 +7,11 @@ use super::axis::{Knot, at};
 use super::{Grower, MIN_RADIUS, Node, Sprout};
 use crate::math::smoothstep;
 
-/// Distances from the ground, in metres, at which the trunk's foot has nodes for its flare.
+/// Heights above the ground, in metres, at which the foot of the trunk has nodes for its flare.
 const FOOT: [f32; 7] = [0.12, 0.3, 0.55, 0.9, 1.35, 1.9, 2.6];
 
 impl Grower<'_> {
-    /// Gives the axis its radii (4.4), and the trunk its foot.
+    /// The nodes of the axis with their radii (4.4), and those of the foot of the trunk.
     pub(super) fn nodes(&self, sprout: &Sprout, knots: &[Knot]) -> Vec<Node> {
         let stem = self.parameters(sprout.level);
         let node = |knot: &Knot| {
@@ -47,7 +47,7 @@ impl Grower<'_> {
             }
             let mut new = node(knot);
             if index + 1 == knots.len() {
-                // The tip: a point where the stem tapers to one, else a round end a radius long.
+                // The tip: a point if the stem tapers to one, otherwise a round end as long as the radius.
                 let blunt = new.radius > 0.25 * nodes.last().map_or(0.0, |before: &Node| before.radius);
                 if blunt {
                     nodes.push(new);
@@ -70,12 +70,12 @@ fn tapered(radius: f32, length: f32, taper: f32, along: f32) -> f32 {
     if taper <= 1.0 || left >= cone { cone } else { (cone * cone - (left - cone) * (left - cone)).max(0.0).sqrt() }
 }
 
-/// 1 at the trunk's foot, falling to 0 at an eighth of its length (4.4).
+/// 1 at the foot of the trunk, falling to 0 at an eighth of its length (4.4).
 fn flare(along: f32) -> f32 {
     ((100f32.powf(1.0 - 8.0 * along) - 1.0) / 99.0).clamp(0.0, 1.0)
 }
 
-/// The node at a distance within a stem, interpolated linearly.
+/// The node at a distance along a stem, interpolated linearly.
 pub(in crate::plant::grow) fn node_at(nodes: &[Node], distance: f32) -> Node {
     let after = nodes.partition_point(|node| node.distance < distance).clamp(1, nodes.len() - 1);
     let (a, b) = (nodes[after - 1], nodes[after]);
@@ -107,7 +107,7 @@ mod tests {
         assert_eq!(tapered(0.2, 5.0, 0.0, 1.0), 0.2);
         assert!((tapered(0.2, 5.0, 1.0, 0.75) - 0.05).abs() < 1e-6);
         assert!((tapered(0.2, 5.0, 2.0, 0.5) - 0.2).abs() < 1e-6);
-        // A radius before the end of a round end the whole radius is left, at the end none.
+        // A round end has the whole radius one radius before its tip, and none at the tip.
         assert!((tapered(0.2, 5.0, 2.0, 0.96) - 0.2).abs() < 1e-6);
         assert!(tapered(0.2, 5.0, 2.0, 1.0) < 1e-6);
     }

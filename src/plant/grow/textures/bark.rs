@@ -1,4 +1,4 @@
-//! Bark: a height field, coloured by its depth, with the normals of its slopes.
+//! Bark: a height field, with colours by depth and normals from the slopes.
 
 use std::sync::Arc;
 
@@ -36,7 +36,7 @@ pub(super) fn paint(kind: BarkKind) -> BarkTextures {
         let at = |dx: usize, dy: usize| field[(y + dy) % HEIGHT * WIDTH + (x + dx) % WIDTH].height;
         let right = at(1, 0) - at(WIDTH - 1, 0);
         let down = at(0, 1) - at(0, HEIGHT - 1);
-        // +Y of the normal is up, the texture's rows run down.
+        // +Y of the normal points up, while the rows of the texture run down.
         let normal = Vec3::new(-right * relief, down * relief, 1.0).normalize();
         Rgba([byte(0.5 + 0.5 * normal.x), byte(0.5 + 0.5 * normal.y), byte(0.5 + 0.5 * normal.z), 255])
     });
@@ -44,13 +44,13 @@ pub(super) fn paint(kind: BarkKind) -> BarkTextures {
 }
 
 struct Place {
-    /// 0 deep to 1 high.
+    /// Height, 0 (deepest) to 1 (highest).
     height: f32,
     /// sRGB albedo.
     color: Vec3,
 }
 
-/// Oak: ridges that run up the trunk, part and join, between deep fissures.
+/// Oak: ridges along the trunk, which divide and join, between deep fissures.
 fn fissured(x: f32, y: f32) -> Place {
     let warp_x = 0.05 * octaves(x, y, [4, 6], 3, 1);
     let warp_y = 0.06 * octaves(x, y, [4, 5], 2, 11);
@@ -75,7 +75,7 @@ fn fissured(x: f32, y: f32) -> Place {
     Place { height, color }
 }
 
-/// Spruce: thin scales, each attached above and lifted at its lower rim, in greyish and reddish browns.
+/// Spruce: thin scales in greyish and reddish browns. Each is attached at its upper rim and lifted at its lower one.
 fn scaly(x: f32, y: f32) -> Place {
     let warp_x = 0.030 * octaves(x, y, [10, 18], 4, 2);
     let warp_y = 0.018 * octaves(x, y, [12, 20], 4, 12);
@@ -83,8 +83,8 @@ fn scaly(x: f32, y: f32) -> Place {
     let scale = cell(u * 12.0, v * 17.0, [12, 17], 1.41, 22);
     let flake = cell(u * 27.0, v * 40.0, [27, 40], 1.35, 32);
     let grain = octaves(x, y, [48, 80], 4, 42);
-    // A position below its cell's point (rows run down) is at the free rim, where the scale casts a shadow; above, it
-    // passes into the scale over it.
+    // A position below the point of its cell (rows run down) is at the free rim, where the scale casts a shadow. Above
+    // the point, the scale merges with the one above it.
     let low = smoothstep(-0.15, 0.35, -scale.to_point[1]);
     let flake_low = smoothstep(-0.2, 0.4, -flake.to_point[1]);
     let gap = (1.0 - smoothstep(0.0, 0.15, scale.border + 0.03 * grain)) * (0.25 + 0.75 * low);

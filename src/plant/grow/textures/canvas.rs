@@ -1,9 +1,9 @@
-//! A canvas of sRGB colours with coverage, and how it becomes a texture.
+//! A canvas of sRGB colours with coverage, and its conversion to a texture.
 
 use glam::{Vec2, Vec3, Vec4};
 use image::{Rgba, RgbaImage};
 
-/// A square canvas. Pixels hold colour times coverage, and coverage.
+/// A square canvas. A pixel holds colour times coverage, and coverage.
 pub(super) struct Canvas {
     size: usize,
     pixels: Vec<Vec4>,
@@ -15,7 +15,7 @@ impl Canvas {
         Self { size, pixels: vec![Vec4::ZERO; size * size] }
     }
 
-    /// Pixels whose centres lie in the box, each with its centre.
+    /// The pixels whose centres lie in the box, each with its centre.
     pub fn within(&self, low: Vec2, high: Vec2) -> impl Iterator<Item = (usize, Vec2)> + use<> {
         let size = self.size;
         let clamp = |x: f32| x.clamp(0.0, size as f32) as usize;
@@ -24,19 +24,19 @@ impl Canvas {
         (y0..y1).flat_map(move |y| (x0..x1).map(move |x| (y * size + x, Vec2::new(x as f32 + 0.5, y as f32 + 0.5))))
     }
 
-    /// Lays a colour over a pixel.
+    /// Blends a colour over a pixel.
     pub fn over(&mut self, pixel: usize, color: Vec3, coverage: f32) {
         let coverage = coverage.clamp(0.0, 1.0);
         self.pixels[pixel] = self.pixels[pixel] * (1.0 - coverage) + color.extend(1.0) * coverage;
     }
 
-    /// Darkens what is on a pixel.
+    /// Darkens a pixel.
     pub fn shade(&mut self, pixel: usize, factor: f32) {
         let old = self.pixels[pixel];
         self.pixels[pixel] = (old.truncate() * factor).extend(old.w);
     }
 
-    /// Darkens what lies within `reach` pixels of the line between two points, most at the line, down to `factor`.
+    /// Darkens the pixels within `reach` of the line between two points: by `factor` at the line, less farther away.
     pub fn shadow(&mut self, a: Vec2, b: Vec2, reach: f32, factor: f32) {
         let (axis, margin) = (b - a, Vec2::splat(reach));
         let along = axis / axis.length_squared().max(1e-6);
@@ -47,7 +47,8 @@ impl Canvas {
         }
     }
 
-    /// A stroke between two points with half widths `r0` and `r1`, shaded round. Colour is that of its middle.
+    /// Draws a stroke between two points with the half widths `r0` and `r1`, shaded as a round body. `color` is that of
+    /// its middle.
     pub fn stroke(&mut self, a: Vec2, b: Vec2, r0: f32, r1: f32, color: Vec3) {
         let reach = Vec2::splat(r0.max(r1) + 1.0);
         let axis = b - a;
@@ -58,7 +59,7 @@ impl Canvas {
             let t = to.dot(along).clamp(0.0, 1.0);
             let radius = r0 + (r1 - r0) * t;
             let distance = to.distance(axis * t);
-            // Thinner than a pixel: fainter.
+            // A stroke that is thinner than a pixel is fainter.
             let coverage = (radius - distance + 0.5).clamp(0.0, 1.0) * (2.0 * radius).min(1.0);
             if coverage > 0.0 {
                 let round = 1.0 - 0.28 * (to.dot(across) / radius.max(0.5)).clamp(-1.0, 1.0).abs().powi(2);
@@ -67,8 +68,8 @@ impl Canvas {
         }
     }
 
-    /// The finished texture. Colours flow from covered pixels into transparent ones through a pyramid of averages
-    /// (Gortler et al. 1996, "The Lumigraph", pull-push), so that filtering and mip maps meet no foreign colour.
+    /// The finished texture. A pyramid of averages spreads colours from covered pixels into transparent ones (Gortler
+    /// et al. 1996, "The Lumigraph", pull-push), so that filtering and mipmaps do not pick up other colours.
     pub fn finish(self) -> RgbaImage {
         let mut levels = vec![self.pixels];
         let mut size = self.size;
@@ -94,7 +95,7 @@ impl Canvas {
                 .map(|(i, &pixel)| {
                     let below = fill[(i / width / 2).min(half - 1) * half + (i % width / 2).min(half - 1)];
                     let below = below.truncate() / below.w.max(1e-6);
-                    // A pixel that is covered in part keeps its own colour.
+                    // A partly covered pixel keeps its own colour.
                     let known = if pixel.w > 0.02 { 1.0 } else { pixel.w / 0.02 };
                     (below * (1.0 - known) + pixel.truncate() / pixel.w.max(1e-6) * known).extend(1.0)
                 })

@@ -1,4 +1,4 @@
-//! Noise that repeats: value noise and cells on a lattice that wraps around (Perlin 1985; Worley 1996).
+//! Periodic noise: value noise and cells on a lattice that wraps around (Perlin 1985; Worley 1996).
 
 /// 32 random bits for a lattice point (the finaliser of MurmurHash3, Appleby 2011).
 fn hash(x: i32, y: i32, seed: u32) -> u32 {
@@ -9,7 +9,7 @@ fn hash(x: i32, y: i32, seed: u32) -> u32 {
     h ^ (h >> 16)
 }
 
-/// Wraps a lattice coordinate that is less than a period outside.
+/// Wraps a lattice coordinate that is outside by less than a period.
 fn wrap(x: i32, period: i32) -> i32 {
     if x < 0 {
         x + period
@@ -20,8 +20,8 @@ fn wrap(x: i32, period: i32) -> i32 {
     }
 }
 
-/// Value noise, -1 to 1, that repeats after `period` lattice points each way. `x` and `y` may leave the period by
-/// less than one more.
+/// Value noise, -1 to 1, that repeats after `period` lattice points along each axis. `x` and `y` may be outside the
+/// period by less than one more period.
 pub(super) fn noise(x: f32, y: f32, period: [i32; 2], seed: u32) -> f32 {
     let (cell_x, cell_y) = (x.floor(), y.floor());
     let fade = |t: f32| t * t * t * (t * (6.0 * t - 15.0) + 10.0);
@@ -34,8 +34,8 @@ pub(super) fn noise(x: f32, y: f32, period: [i32; 2], seed: u32) -> f32 {
     2.0 * (low + (high - low) * v) - 1.0
 }
 
-/// Octaves of [`noise`], each twice as fine and half as strong, about -1 to 1; `x` and `y` run from 0 to 1 over
-/// the texture, `period` is that of the first octave.
+/// Octaves of [`noise`], each twice as fine and half as strong as the one before; about -1 to 1. `x` and `y` run from 0
+/// to 1 over the texture. `period` is that of the first octave.
 pub(super) fn octaves(x: f32, y: f32, period: [i32; 2], count: u32, seed: u32) -> f32 {
     let (mut sum, mut weight, mut total) = (0.0, 1.0, 0.0);
     for octave in 0..count {
@@ -47,18 +47,18 @@ pub(super) fn octaves(x: f32, y: f32, period: [i32; 2], count: u32, seed: u32) -
     sum / total
 }
 
-/// Distances to the nearest cells of a position.
+/// The cell at a position.
 pub(super) struct Cell {
-    /// Distance to the border with the neighbouring cell, in widths of a cell.
+    /// Distance to the border with the nearest other cell, in widths of a cell.
     pub border: f32,
     /// Vector to the cell's own point, in cells.
     pub to_point: [f32; 2],
-    /// A number of the cell, `0.0..1.0`.
+    /// A random number of the cell, `0.0..1.0`.
     pub value: f32,
 }
 
-/// The cell at a position of a lattice that repeats after `period` cells each way; cells are `stretch` times as high as
-/// wide. `x` and `y`, in cells, may leave the period by less than one more.
+/// The cell at a position of a lattice that repeats after `period` cells along each axis. Cells are `stretch` times as
+/// high as wide. `x` and `y`, in cells, may be outside the period by less than one more period.
 pub(super) fn cell(x: f32, y: f32, period: [i32; 2], stretch: f32, seed: u32) -> Cell {
     let (cell_x, cell_y) = (x.floor() as i32, y.floor() as i32);
     let mut points = [(f32::MAX, [0.0; 2], 0.0); 9];
@@ -77,7 +77,7 @@ pub(super) fn cell(x: f32, y: f32, period: [i32; 2], stretch: f32, seed: u32) ->
     }
     let own = points[nearest];
     let border = points.iter().enumerate().filter(|&(i, _)| i != nearest).fold(f32::MAX, |border, (_, other)| {
-        // Distance to the bisector of the two points, measured where cells have their true proportions.
+        // Distance to the bisector of the two points, measured with the true proportions of the cells.
         let between = [other.1[0] - own.1[0], other.1[1] - own.1[1]];
         let middle = [0.5 * (other.1[0] + own.1[0]), 0.5 * (other.1[1] + own.1[1])];
         let up = between[1] / stretch;

@@ -1,4 +1,4 @@
-//! A twig with broad leaves, ovate as a beech's or lobed as an oak's.
+//! Paints a twig with broad leaves: ovate like those of a beech, or lobed like those of an oak.
 
 use std::f32::consts::{PI, TAU};
 
@@ -45,7 +45,7 @@ pub(super) fn paint(shape: LeafShape) -> RgbaImage {
         twig.draw(&mut canvas, 4.5, 2.0);
         twig.leaves(&mut random, 4, 0.22, 0.24, &mut leaves);
     }
-    // Those that lie deepest first, so that the tips of twigs lie on top.
+    // Deepest leaves first, so that those at the tips of twigs are on top.
     leaves.sort_by(|a, b| a.depth.total_cmp(&b.depth));
     for (index, leaf) in leaves.iter().enumerate() {
         leaf.draw(&mut canvas, &outline, index as u32, size);
@@ -53,17 +53,17 @@ pub(super) fn paint(shape: LeafShape) -> RgbaImage {
     canvas.finish()
 }
 
-/// A twig in units of the texture's width; angles clockwise from straight up.
+/// A twig in units of the width of the texture. Angles are clockwise from straight up.
 struct Twig {
     base: Vec2,
     angle: f32,
     length: f32,
-    /// Turn from base to tip, radians.
+    /// Rotation from base to tip, radians.
     bend: f32,
 }
 
 impl Twig {
-    /// Place and direction at a fraction of the length.
+    /// Position and direction at a fraction of the length.
     fn at(&self, along: f32) -> (Vec2, f32) {
         let angle = self.angle + self.bend * along;
         let middle = self.angle + 0.5 * self.bend * along;
@@ -79,7 +79,7 @@ impl Twig {
         }
     }
 
-    /// Sets leaves alternately left and right from the fraction `from`, and one at the tip.
+    /// Places leaves alternately left and right from the fraction `from` on, and one at the tip.
     fn leaves(&self, random: &mut Random, count: usize, from: f32, size: f32, leaves: &mut Vec<Leaf>) {
         for index in 0..count {
             let along = from + (0.95 - from) * (index as f32 + 0.3 * random.unit()) / count as f32;
@@ -98,12 +98,12 @@ struct Leaf {
     base: Vec2,
     angle: f32,
     length: f32,
-    /// Width over length against the outline's: a leaf seen aslant is narrow.
+    /// Factor on the width of the outline: a leaf that is seen at an angle is narrow.
     width: f32,
     bend: f32,
     depth: f32,
     color: Vec3,
-    /// Which half faces the light.
+    /// The half that faces the light.
     lit: f32,
 }
 
@@ -132,7 +132,7 @@ impl Leaf {
         let foot = base + axis * petiole;
         let blade = length - petiole;
 
-        // The shadow that it casts on leaves below, towards the lower right.
+        // Its shadow on the leaves below, towards the lower right.
         let tip = foot + (axis + across * self.bend) * blade;
         let reach = Vec2::splat(0.36 * blade * self.width + 10.0);
         for (pixel, center) in canvas.within(foot.min(tip) - reach, foot.max(tip) + reach + Vec2::new(5.0, 9.0)) {
@@ -152,7 +152,7 @@ impl Leaf {
         }
     }
 
-    /// The colour of a point on the blade: midrib, veins, the swelling between them, mottling, a lighter rim.
+    /// The colour at a position on the blade: midrib, veins, bulges between them, mottling, a lighter rim.
     fn color_at(&self, outline: &Outline, place: Place, seed: u32) -> Vec3 {
         let half = (outline.half_width(place.along) * self.width).max(1e-3);
         let across = (place.across / half).clamp(-1.0, 1.0);
@@ -175,7 +175,7 @@ impl Leaf {
     }
 }
 
-/// A position on a leaf, in lengths of its blade.
+/// A position on a leaf, in units of the length of its blade.
 #[derive(Clone, Copy)]
 struct Place {
     along: f32,
@@ -205,12 +205,12 @@ impl Outline {
             .map(|i| {
                 let u = i as f32 / SAMPLES as f32;
                 if lobed {
-                    // Obovate, with four rounded lobes a side and narrow bays between them.
+                    // Obovate, with four rounded lobes per side and narrow sinuses between them.
                     let body = (PI * u.powf(1.25)).sin().max(0.0).powf(0.75) * 0.36;
                     let bay = 0.5 - 0.5 * (TAU * (4.3 * u.powf(1.08) - 0.42)).cos();
                     body * (1.0 - 0.42 * bay * bay * smoothstep(0.05, 0.3, u) * (1.0 - smoothstep(0.84, 0.98, u)))
                 } else {
-                    // Ovate with a drawn-out tip and a wavy rim.
+                    // Ovate, with a long tip and a wavy rim.
                     let body = (PI * u.powf(0.82)).sin().max(0.0).powf(0.92) * (1.0 - 0.22 * u) * 0.34;
                     body * (1.0 + 0.025 * (TAU * 8.0 * u).sin())
                 }
@@ -225,7 +225,7 @@ impl Outline {
         self.table[i] + (self.table[i + 1] - self.table[i]) * (x - i as f32)
     }
 
-    /// Distance to the rim in blade lengths, positive inside (to first order in the rim's slope).
+    /// Distance to the rim in blade lengths, positive inside; to first order in the slope of the rim.
     fn distance(&self, place: Place, width: f32) -> f32 {
         let beyond = (-place.along).max(place.along - 1.0);
         if beyond > 0.0 {

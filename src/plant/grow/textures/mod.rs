@@ -1,8 +1,9 @@
-//! Bark and leaf clusters, painted by rule.
+//! Procedural textures of bark and leaf clusters.
 //!
-//! Textures are the same in every run, are painted when first asked for (a tenth to some tenths of a second each) and
-//! are then shared by all plants of the process. Colours are albedos of real bark and leaves: linear reflectance of
-//! leaves about 0.04 to 0.15 in green (Gates et al. 1965, "Spectral properties of plants", Applied Optics 4).
+//! The textures are the same in every run. They are painted when they are first needed, which takes a tenth to some
+//! tenths of a second each, and then shared by all plants of the process. Colours are albedos of real bark and leaves.
+//! The linear reflectance of leaves in green is about 0.04 to 0.15 (Gates et al. 1965, "Spectral properties of plants",
+//! Applied Optics 4).
 
 mod bark;
 mod canvas;
@@ -15,8 +16,9 @@ use std::sync::{Arc, OnceLock};
 use image::RgbaImage;
 
 use super::parameters::{BarkKind, LeafShape};
+use crate::math::compute_once;
 
-/// The two textures of a bark. Both repeat without seams in both directions.
+/// The two textures of a bark. Both tile seamlessly in both directions.
 #[derive(Clone, Debug)]
 pub struct BarkTextures {
     /// Albedo, sRGB, 512 by 1024, opaque.
@@ -25,19 +27,19 @@ pub struct BarkTextures {
     pub normal: Arc<RgbaImage>,
 }
 
-/// The textures of a bark: painted once, then shared.
+/// The textures of a bark: painted when first needed, then shared.
 pub fn bark(kind: BarkKind) -> BarkTextures {
     static PAINTED: [OnceLock<BarkTextures>; 2] = [const { OnceLock::new() }; 2];
     let slot = match kind {
         BarkKind::Fissured => 0,
         BarkKind::Scaly => 1,
     };
-    PAINTED[slot].get_or_init(|| bark::paint(kind)).clone()
+    compute_once(&PAINTED[slot], || bark::paint(kind)).clone()
 }
 
-/// The texture of a leaf cluster, 1024 by 1024, its twig entering in the middle of the lower edge: sRGB albedo with
-/// straight alpha, antialiased, nothing within some pixels of the edges. Transparent texels carry the colours of
-/// leaves nearby, so that filtering shows no rims. Painted once, then shared.
+/// The texture of a leaf cluster, 1024 by 1024: sRGB albedo with straight alpha, antialiased. The twig enters in the
+/// middle of the lower edge. The last few pixels at the edges are transparent. Transparent texels have the colours of
+/// nearby leaves, so that filtering shows no rims. Painted when first needed, then shared.
 pub fn cluster(shape: LeafShape) -> Arc<RgbaImage> {
     static PAINTED: [OnceLock<Arc<RgbaImage>>; 3] = [const { OnceLock::new() }; 3];
     let slot = match shape {
@@ -55,8 +57,8 @@ pub fn cluster(shape: LeafShape) -> Arc<RgbaImage> {
         .clone()
 }
 
-/// Fraction of the cluster's texture that is leaf (alpha at least one half), 0 to 1. Times `count * scale² * aspect`
-/// it is the leaf area of a tree.
+/// Fraction of the cluster's texture that is leaf (alpha of at least one half), 0 to 1. Multiplied by
+/// `count * scale² * aspect`, it gives the leaf area of a tree.
 pub fn coverage(shape: LeafShape) -> f32 {
     let texture = cluster(shape);
     let opaque = texture.pixels().filter(|pixel| pixel[3] >= 128).count();

@@ -1,4 +1,4 @@
-//! A spruce's twig with side twigs, full of needles.
+//! Paints the twig of a spruce, with side twigs full of needles.
 
 use glam::{Vec2, Vec3};
 use image::RgbaImage;
@@ -24,7 +24,7 @@ pub(super) fn paint() -> RgbaImage {
         let side = if index % 2 == 0 { 1.0 } else { -1.0 };
         let along = 0.05 + 0.76 * (index as f32 + 0.4 * random.signed()) / (2 * pairs) as f32;
         let (base, angle) = main.at(along);
-        // Longest below the middle, as side shoots of earlier years have grown longer.
+        // Longest below the middle, because side shoots of earlier years have grown longer.
         let length = (0.60 - 0.44 * along) * (0.72 + 2.0 * along).min(1.0) * random.range(0.88, 1.04);
         let shoot = Shoot {
             base,
@@ -50,12 +50,12 @@ pub(super) fn paint() -> RgbaImage {
     canvas.finish()
 }
 
-/// A shoot in units of the texture's width; angles clockwise from straight up.
+/// A shoot in units of the width of the texture. Angles are clockwise from straight up.
 struct Shoot {
     base: Vec2,
     angle: f32,
     length: f32,
-    /// Turn from base to tip, radians.
+    /// Rotation from base to tip, radians.
     bend: f32,
 }
 
@@ -66,7 +66,7 @@ impl Shoot {
         (self.base + self.length * along * Vec2::new(middle.sin(), -middle.cos()), angle)
     }
 
-    /// Needles to both sides behind, the twig, and needles that lie on it in front.
+    /// Draws needles to both sides behind the twig, the twig, and needles on it in front.
     fn draw(&self, canvas: &mut Canvas, random: &mut Random) {
         let size = SIZE as f32;
         let steps = (self.length * size / 5.0).max(4.0) as usize;
@@ -88,7 +88,7 @@ impl Shoot {
                 let (base, angle) = self.at(along);
                 for side in [-1.0, 1.0] {
                     let open = if layer == 0 { random.range(0.65, 1.15) } else { random.range(0.1, 0.7) };
-                    // Shorter and closer to the twig at its tip.
+                    // Needles are shorter and closer to the twig at its tip.
                     let taper = 1.0 - 0.45 * along.powi(3);
                     let length = size * 0.044 * taper * random.range(0.75, 1.1) * if layer == 0 { 1.0 } else { 0.8 };
                     let angle = angle + side * open * taper;

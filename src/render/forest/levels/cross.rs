@@ -23,7 +23,7 @@ use crate::{
     bake::{BakedPlant, levels::cross::Cross},
     cull::Grouping,
     lod::Representation,
-    math::MipChain,
+    math::{MipChain, MipView},
     render::{
         components::Forest,
         forest::{
@@ -256,7 +256,7 @@ impl GpuLevel for GpuCrosses {
         let pairs = || relight.old.iter().zip(relight.new);
         for (index, (_, new)) in pairs().enumerate().filter(|(_, pair)| changed(pair)) {
             for (plane, chain) in new.cross().into_iter().flat_map(|cross| &cross.textures.properties).enumerate() {
-                gpu::write_layer(&upload.gpu.queue, &drawn.properties, (index * PLANES + plane) as u32, chain);
+                gpu::write_layer(&upload.gpu.queue, &drawn.properties, (index * PLANES + plane) as u32, &chain.view());
             }
         }
         upload.gpu.queue.write_buffer(&drawn.variants, 0, bytemuck::cast_slice(&cross_variants(relight.new)));
@@ -270,13 +270,13 @@ impl GpuLevel for GpuCrosses {
 
 /// Three layers per plant of the textures that `of` takes from a cross. A plant without a cross gets those of another
 /// one; its planes have no extent, so they are never seen.
-fn layers(plants: &[BakedPlant], of: fn(&Cross) -> &[MipChain]) -> Vec<&MipChain> {
+fn layers(plants: &[BakedPlant], of: fn(&Cross) -> &[MipChain]) -> Vec<MipView<'_>> {
     let crosses = || plants.iter().filter_map(BakedPlant::cross);
     let Some(blank) = crosses().find_map(|cross| of(cross).first()) else { return Vec::new() };
     let mut all = Vec::with_capacity(plants.len() * PLANES);
     for plant in plants {
         let own = plant.cross().map_or(&[][..], |cross| of(cross));
-        all.extend((0..PLANES).map(|plane| own.get(plane).unwrap_or(blank)));
+        all.extend((0..PLANES).map(|plane| own.get(plane).unwrap_or(blank).view()));
     }
     all
 }
@@ -285,7 +285,7 @@ fn layers(plants: &[BakedPlant], of: fn(&Cross) -> &[MipChain]) -> Vec<&MipChain
 fn upload_textures(plants: &[BakedPlant], gpu: &Gpu) -> (Texture, Buffer, BindGroup) {
     let colors = layers(plants, |cross| &cross.textures.color);
     let properties = layers(plants, |cross| &cross.textures.properties);
-    let upload = |label: &str, format: TextureFormat, layers: &[&MipChain]| {
+    let upload = |label: &str, format: TextureFormat, layers: &[MipView]| {
         gpu::texture_array(&gpu.device, &gpu.queue, label, format, layers, gpu::SMALLEST_TESTED_MIP)
     };
     let (_, colors) = upload("canopy_cross_color", TextureFormat::Rgba8UnormSrgb, &colors);
@@ -311,8 +311,8 @@ fn upload_textures(plants: &[BakedPlant], gpu: &Gpu) -> (Texture, Buffer, BindGr
 
 /// The lighting textures, of those plants that have them.
 fn upload_light(plants: &[BakedPlant], gpu: &Gpu) -> Option<BindGroup> {
-    let layers: Vec<&MipChain> =
-        plants.iter().filter_map(BakedPlant::cross).flat_map(|cross| &cross.textures.light).collect();
+    let crosses = plants.iter().filter_map(BakedPlant::cross);
+    let layers: Vec<MipView> = crosses.flat_map(|cross| &cross.textures.light).map(MipChain::view).collect();
     if layers.is_empty() {
         return None;
     }

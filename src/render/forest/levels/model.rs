@@ -35,7 +35,7 @@ use crate::{
             representation::{ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight},
             textures::TextureCache,
             transfer::transfer_layout,
-            uniforms::{PartUniform, part_uniform, scattered_tint},
+            uniforms::{PartUniform, indirect_light_color, part_uniform},
             vertex::PlantVertex,
         },
         gpu::{self, Gpu},
@@ -188,7 +188,8 @@ impl LevelRenderer for ModelRenderer {
             (Some(old), Some(new)) => Arc::ptr_eq(old, new),
             (old, new) => old.is_none() && new.is_none(),
         };
-        Arc::ptr_eq(&old.plant, &new.plant) && same_proxy
+        let same_textures = Arc::ptr_eq(&old.textures, &new.textures) || old.textures == new.textures;
+        Arc::ptr_eq(&old.plant, &new.plant) && same_proxy && same_textures
     }
 
     fn pipeline(&self, features: u32, target: LevelTarget) -> RenderPipelineDescriptor {
@@ -324,7 +325,7 @@ impl GpuLevel for GpuModels {
             if Arc::ptr_eq(&old.lighting, &new.lighting) {
                 continue;
             }
-            let tint = scattered_tint(&new.plant.leaf_colors());
+            let tint = indirect_light_color(&new.plant.leaf_colors());
             let sun = relight.suns.get(index).copied().unwrap_or_default();
             let Some(parts) = self.parts.get_mut(index) else { continue };
             for (number, (gpu_part, part)) in parts.iter_mut().zip(&new.plant.parts).enumerate() {
@@ -349,7 +350,15 @@ fn upload_parts(
     upload: &mut ForestUpload,
 ) -> Vec<GpuPart> {
     let gpu = upload.gpu;
-    let tint = scattered_tint(&plant.plant.leaf_colors());
+    let tint = indirect_light_color(&plant.plant.leaf_colors());
+    if plant.textures.0.len() != plant.plant.parts.len() {
+        error_once!(
+            "the plant `{}` is not drawn as a full model, as its textures were not filtered: list \
+             `Representation::MODEL` in `BakeSettings::representations`",
+            plant.plant.name
+        );
+        return Vec::new();
+    }
     let proxies = plant.shadow_proxy();
     if proxies.is_none() {
         error_once!(
@@ -359,7 +368,7 @@ fn upload_parts(
         );
     }
     let mut parts = Vec::new();
-    for (index, part) in plant.plant.parts.iter().enumerate() {
+    for (index, (part, filtered)) in plant.plant.parts.iter().zip(&plant.textures.0).enumerate() {
         let empty = PlantMesh::default();
         let proxy = proxies.and_then(|meshes| meshes.get(index)).unwrap_or(&empty);
         let material = &part.material;
@@ -367,8 +376,8 @@ fn upload_parts(
         let usage = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
         let uniform = part_uniform(material, &plant.lighting);
         let uniform = gpu::buffer_with(&gpu.device, "canopy_plant_part", usage, &[uniform]);
-        let color = textures.color(material, part.kind, &gpu.device, &gpu.queue);
-        let normal = textures.normal(material, &gpu.device, &gpu.queue);
+        let color = textures.color(filtered, part.kind, gpu);
+        let normal = textures.normal(filtered, gpu);
         let bind_group = gpu.bind_group(
             "canopy_plant_part",
             &part_layout(),

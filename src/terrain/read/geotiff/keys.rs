@@ -1,4 +1,4 @@
-//! The GeoKeys of a GeoTIFF: what its coordinates and heights mean [OGC 19-008r4, 7.3 and annex B].
+//! The GeoKeys of a GeoTIFF, which define its coordinates and heights [OGC 19-008r4, 7.3 and annex B].
 
 use tiff::decoder::Decoder;
 use tiff::tags::Tag;
@@ -15,17 +15,17 @@ const PROJECTION: u16 = 3074;
 const LINEAR_UNITS: u16 = 3076;
 const LINEAR_UNIT_SIZE: u16 = 3077;
 const VERTICAL_UNITS: u16 = 4099;
-/// The value of a key that stands for "described by other keys".
+/// The value of a key that is described by other keys.
 const USER_DEFINED: u16 = 32767;
 
-/// Metres of the linear units that occur [EPSG registry].
+/// Linear units in use, with their length in metres [EPSG registry].
 const UNITS: [(u16, f64); 6] =
     [(9001, 1.0), (9002, 0.3048), (9003, 1200.0 / 3937.0), (9005, 0.304_797_265_4), (9036, 1000.0), (9096, 0.9144)];
 
-/// What the keys say.
+/// The content of the keys.
 pub(super) struct GeoKeys {
     pub(super) system: CoordinateSystem,
-    /// The raster is made of points, not of cells.
+    /// Whether the raster consists of points, not of cells.
     pub(super) point: bool,
     pub(super) metres_per_height_unit: f64,
     pub(super) warnings: Vec<Warning>,
@@ -108,7 +108,7 @@ fn projected_system(
     };
     let known = match (code, keys.short(PROJECTION)) {
         (Some(code), _) => CoordinateSystem::from_epsg(code),
-        // A projected system of the file's own that uses one of the UTM zones as they are.
+        // A user-defined projected system that uses a UTM zone without changes.
         (None, Some(zone @ 16001..=16060)) => Some(CoordinateSystem::Utm { zone: (zone - 16000) as u8, south: false }),
         (None, Some(zone @ 16101..=16160)) => Some(CoordinateSystem::Utm { zone: (zone - 16100) as u8, south: true }),
         (None, _) => None,
@@ -133,7 +133,7 @@ fn metres_of_unit(code: u16) -> Option<f64> {
     UNITS.iter().find(|(unit, _)| *unit == code).map(|(_, metres)| *metres)
 }
 
-/// The key entries (key, tag of the value or 0, count, value or index) and the doubles they point into.
+/// The entries of the keys (key, tag of the value or 0, count, value or index) and the doubles that they refer to.
 struct Directory<'a> {
     entries: &'a [u16],
     doubles: &'a [f64],

@@ -7,7 +7,7 @@ use crate::files::write_whole;
 
 /// A rendered image.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Picture {
+pub struct RenderedImage {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
@@ -16,7 +16,7 @@ pub struct Picture {
     pub pixels: Vec<u8>,
 }
 
-impl Picture {
+impl RenderedImage {
     /// Writes the image as PNG. `notes` are pairs of keyword (Latin-1, 1 to 79 characters) and text.
     ///
     /// The file appears whole or not at all: it is written under a temporary name in the same folder, then renamed.
@@ -51,5 +51,27 @@ impl Picture {
         let mut writer = encoder.write_header()?;
         writer.write_image_data(&self.pixels)?;
         writer.finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_image_is_stored_with_its_size_and_notes() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("a.png");
+        let picture = Picture { width: 2, height: 1, pixels: vec![7; 6] };
+        let notes = [("Title", "a wood".to_owned()), ("Seed", "1".to_owned())];
+        assert!(!Picture::is_stored(&path, (2, 1), &notes));
+        picture.save(&path, &notes)?;
+        assert!(Picture::is_stored(&path, (2, 1), &notes));
+        assert!(!Picture::is_stored(&path, (1, 2), &notes) && !Picture::is_stored(&path, (2, 1), &notes[..1]));
+        let other = [("Title", "a wood".to_owned()), ("Seed", "2".to_owned())];
+        assert!(!Picture::is_stored(&path, (2, 1), &other));
+        std::fs::write(&path, b"no image")?;
+        assert!(!Picture::is_stored(&path, (2, 1), &notes) && !Picture::is_stored(folder.path(), (2, 1), &notes));
+        Ok(())
     }
 }

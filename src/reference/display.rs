@@ -67,7 +67,7 @@ impl ToneTable {
 
 /// How radiance is converted to an image for a screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Development<'a> {
+pub struct DisplayTransform<'a> {
     /// From nits to display values.
     pub exposure: f32,
     /// Night vision.
@@ -78,7 +78,7 @@ pub struct Development<'a> {
     pub dither: bool,
 }
 
-impl<'a> Development<'a> {
+impl<'a> DisplayTransform<'a> {
     /// The renderer's conversion for the light `state`.
     pub fn of(state: &LightState, tone: Option<&'a ToneTable>) -> Self {
         Self { exposure: state.exposure, night: state.scotopic, tone, dither: true }
@@ -101,9 +101,9 @@ impl<'a> Development<'a> {
 
 impl Film {
     /// The image as a screen shows it: sRGB, three bytes a pixel, row by row from the top.
-    pub fn develop(&self, development: &Development) -> Vec<u8> {
+    pub fn display(&self, transform: &DisplayTransform) -> Vec<u8> {
         let width = self.size().0 as usize;
-        let code = |(at, radiance): (usize, Vec3)| development.code(radiance, (at % width) as u32, (at / width) as u32);
+        let code = |(at, radiance): (usize, Vec3)| transform.code(radiance, (at % width) as u32, (at / width) as u32);
         self.radiance().into_iter().enumerate().flat_map(code).collect()
     }
 
@@ -151,11 +151,11 @@ mod tests {
     }
 
     #[test]
-    fn development_exposes_and_the_dither_stays_within_a_code() {
+    fn the_transform_exposes_and_the_dither_stays_within_a_code() {
         let night = ScotopicTint::for_illuminance(1e5, 0.85);
-        let plain = Development { exposure: 1e-4, night, tone: None, dither: false };
+        let plain = DisplayTransform { exposure: 1e-4, night, tone: None, dither: false };
         assert_eq!(plain.code(Vec3::new(0.0, 2140.4, 1e9), 0, 0), [0, 127, 255]);
-        let dithered = Development { dither: true, ..plain };
+        let dithered = DisplayTransform { dither: true, ..plain };
         for column in 0..50 {
             let code = dithered.code(Vec3::splat(2140.4), column, 3);
             assert!(code.iter().all(|c| c.abs_diff(127) <= 1), "{code:?}");
