@@ -68,6 +68,8 @@ impl Range {
         let next = match self.step {
             Step::Factor(coarse, small, least) => {
                 let factor = if fine { small } else { coarse };
+                // Whole numbers keep all of their digits.
+                let rounded = |value| if whole { value } else { rounded(value) };
                 match up {
                     true if value < least => least,
                     true => rounded(value * factor),
@@ -143,6 +145,16 @@ mod tests {
                 }
                 assert_eq!(range.stepped(value, up, false, whole), end);
             }
+        }
+    }
+
+    #[test]
+    fn doubled_whole_numbers_stay_powers_of_two() {
+        let range = Range::doubled(256..=8192);
+        let sizes = [256.0, 512.0, 1024.0, 2048.0, 4096.0, 8192.0];
+        for pair in sizes.windows(2) {
+            assert_eq!(range.stepped(pair[0], true, false, true), pair[1]);
+            assert_eq!(range.stepped(pair[1], false, true, true), pair[0]);
         }
     }
 

@@ -279,7 +279,8 @@ mod tests {
         // One cannot be read, one cannot be built.
         for (wrong, more) in [("none", ""), ("3", MISSING)] {
             write(wrong, more)?;
-            assert!(load_again(&mut app).contains("not loaded again") && seed(&app) == 2);
+            let message = load_again(&mut app);
+            assert!(message.contains("not loaded again") && seed(&app) == 2, "{wrong}: {message}");
         }
         assert!(app.should_exit().is_none());
         Ok(())

@@ -35,6 +35,8 @@ pub(super) const WARNING: Color32 = Color32::from_rgb(255, 150, 110);
 /// Width of the progress of a build in points, and height of its bar.
 const BUILDING_WIDTH: f32 = 420.0;
 const BAR_HEIGHT: f32 = 6.0;
+/// Width of the longest name of a pass in points.
+const PASS_WIDTH: f32 = 110.0;
 const FRAME_TIME: &str = "Time between the completion of two frames on the device, over the last 120 frames: CPU, \
                           device, and the wait for the screen. Half of the frames take at most p50, 95 % of them at \
                           most p95.";
@@ -99,7 +101,7 @@ fn panel(context: &Context, name: &str, align: Align2, offset: [f32; 2], content
         // Rows are as high as their text, not as a button.
         ui.spacing_mut().interact_size.y = 0.0;
         Frame::new()
-            .fill(Color32::from_black_alpha(180))
+            .fill(Color32::from_black_alpha(205))
             .stroke(Stroke::NONE)
             .corner_radius(CornerRadius::same(4))
             .inner_margin(Margin::same(8))
@@ -201,7 +203,8 @@ fn numbers(ui: &mut Ui, session: &Session, scene: &SceneProgress, frames: &Frame
 }
 
 fn passes(ui: &mut Ui, report: &FrameReport) {
-    Grid::new("canopy_passes").num_columns(2).spacing([10.0, 0.0]).show(ui, |ui| {
+    // A grid has the columns of the frame before; a frame may take a second.
+    Grid::new("canopy_passes").num_columns(2).spacing([10.0, 0.0]).min_col_width(PASS_WIDTH).show(ui, |ui| {
         for (pass, outcome) in report.outcomes() {
             let (text, color) = match outcome {
                 PassOutcome::Ran(on) => (format!("ran: {on}"), Color32::from_rgb(190, 225, 180)),

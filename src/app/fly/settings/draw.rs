@@ -37,7 +37,8 @@ pub fn settings_panel(ui: &mut Ui, panel: &mut SettingsPanel) {
     let section = panel.section;
     ScrollArea::vertical().max_height(tallest).show(ui, |ui| {
         // A grid remembers its columns by its name.
-        Grid::new(("canopy_settings", section)).num_columns(2).spacing([10.0, 3.0]).show(ui, |ui| {
+        let grid = Grid::new(("canopy_settings", section)).num_columns(2).spacing([10.0, 3.0]);
+        grid.min_col_width(NAME_WIDTH).show(ui, |ui| {
             for (number, field) in panel.fields.iter().enumerate() {
                 let (clicked, edit) = row(ui, (section, number), field, number == panel.line);
                 if clicked || edit.is_some() {
@@ -96,12 +97,7 @@ fn row(ui: &mut Ui, id: (usize, usize), field: &Field, selected: bool) -> (bool,
     let name = small(format!("{mark}{}{}", "   ".repeat(field.depth), field.label)).color(color);
     let name =
         if field.is_changed { name.strong().color(if selected { SELECTED } else { Color32::WHITE }) } else { name };
-    let clicked = ui
-        .scope(|ui| {
-            ui.set_min_width(NAME_WIDTH);
-            ui.add(Label::new(name).sense(Sense::click())).on_hover_text(tip(field)).clicked()
-        })
-        .inner;
+    let clicked = ui.add(Label::new(name).sense(Sense::click())).on_hover_text(tip(field)).clicked();
     let edit = ui.horizontal(|ui| value(ui, id, field)).inner;
     (clicked, edit)
 }
