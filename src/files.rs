@@ -46,6 +46,7 @@ pub(crate) fn replace(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Resu
 ///
 /// # Errors
 /// Those that [`write_whole`] would have: the path is a folder, leads through a file, or may not be written to.
+#[cfg(any(test, feature = "program"))]
 pub(crate) fn check_writable(path: &Path) -> io::Result<()> {
     let target = followed(path)?;
     match fs::metadata(&target) {

@@ -179,7 +179,6 @@ fn requests_that_cannot_be_met_are_refused_before_the_bake() {
         (&["reference"], "folder.png", "--out"),
     ];
     for (arguments, out, word) in cases {
-        let _gpu = gpu();
         let mut program = command(arguments);
         let output = program.arg(&scene).arg("--out").arg(folder.path().join(out)).output().expect("the program");
         let message = said(&output);

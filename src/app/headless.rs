@@ -56,13 +56,13 @@ use crate::{
 /// [`AppError`]; images that were finished before it stay, and no file is left half-written.
 /// [`AppError::Interrupted`] soon after `progress` [is cancelled](Progress::is_cancelled): after the current image.
 pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<RenderReport, AppError> {
-    // The scene's own errors come first, then the device's: both are found before the long work, and before anything is
-    // left behind.
+    // The scene's own errors come first, then the request's, then the device's: all are found before the long work, and
+    // before anything is left behind.
     let scene = options.overrides.applied(options.scene.read()?);
-    let settings = adapter::settings(options.adapter.as_deref())?;
-    let most_trees = adapter::check_size(&settings, options.size)?;
     RenderPlan::check(options, &scene)?;
     check_writable(options)?;
+    let settings = adapter::settings(options.adapter.as_deref())?;
+    let most_trees = adapter::check_size(&settings, options.size)?;
     let stage = Stage::build_within(&scene, most_trees, progress).map_err(interrupt::building)?;
     let plan = RenderPlan::new(options, &stage.scene, &|x, z| stage.terrain.height(x, z))?;
     let mut report = RenderReport::default();

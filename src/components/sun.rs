@@ -29,6 +29,7 @@ use crate::{
     light::{
         ExposureSettings, LightError, LightSettings, LightState,
         atmosphere::{Atmosphere, AtmosphereParams},
+        check_range,
         moon::{MoonSetting, celestial_rotation},
         sun::{Observer, SunPosition},
     },
@@ -137,11 +138,21 @@ impl Sun {
         Self { instant: other.instant, rate: other.rate, ..self.clone() } == *other
     }
 
+    /// Refuses what is outside of the ranges that the fields name.
+    fn check(&self) -> Result<(), LightError> {
+        self.observer.validate()?;
+        check_range("visibility", self.visibility_km, "km", 2.0, 250.0, "40 km is a clear day")?;
+        let stops = f64::from(self.compensation_ev);
+        check_range("exposure compensation", stops, "EV", -10.0, 10.0, "positive is brighter")?;
+        Ok(())
+    }
+
     /// The light of these settings; `atmosphere` has their visibility.
     ///
     /// # Errors
-    /// [`LightError`] for an impossible location or instant.
+    /// [`LightError`] for a value outside of its range, and an instant that is too far away.
     pub fn light(&self, atmosphere: &Atmosphere) -> Result<LightState, LightError> {
+        self.check()?;
         let sun = SunPosition::at(self.instant, &self.observer)?;
         let moon = self.moon.moon(Some((self.instant, &self.observer)), &sun)?;
         let settings = LightSettings {
@@ -195,6 +206,8 @@ impl LightWork {
         let known = self.air.clone().filter(|(visibility, _)| *visibility == sun.visibility_km);
         let sun = sun.clone();
         move || {
+            // The air is expensive, so it comes after the check.
+            sun.check()?;
             let air = match known {
                 Some((_, air)) => air,
                 None => Arc::new(Atmosphere::new(AtmosphereParams::with_visibility_km(sun.visibility_km))?),
@@ -365,7 +378,7 @@ mod tests {
             impossible.push(at(&|observer| observer.pressure_mbar = wrong));
             impossible.push(at(&|observer| observer.temperature_c = wrong));
             impossible.push(Sun { compensation_ev: wrong as f32, ..sun.clone() });
-            assert!(Atmosphere::new(AtmosphereParams::with_visibility_km(wrong)).is_err(), "{wrong} km");
+            impossible.push(Sun { visibility_km: wrong, ..sun.clone() });
         }
         for sun in impossible {
             assert!(sun.light(&atmosphere).is_err(), "{sun:?}");

@@ -23,6 +23,7 @@ mod surroundings;
 
 pub use atmosphere::{Atmosphere, AtmosphereParams, SkyView};
 pub use error::LightError;
+pub(crate) use error::check_range;
 pub use exposure::{ExposureSettings, ScotopicTint, exposure_from_ev100};
 pub use moon::{Moon, MoonSetting};
 pub use night::{NightSky, StarField};
