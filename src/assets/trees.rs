@@ -108,6 +108,7 @@ impl<'a> StandPlan<'a> {
 ///
 /// # Errors
 /// Those of [`StandPlan`].
+#[cfg(feature = "program")]
 pub fn build_stand(
     scene: &Scene,
     plan: &PlantPlan,
