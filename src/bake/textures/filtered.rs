@@ -51,7 +51,7 @@ impl FilteredTexture {
     pub(in crate::bake) fn from_levels(base: Arc<RgbaImage>, smaller: Vec<Vec<u8>>) -> Option<Self> {
         let texture = Self { base, smaller };
         let sizes = smaller_sizes(texture.base.width(), texture.base.height());
-        let fits = texture.smaller.iter().map(Vec::len).eq(sizes.into_iter());
+        let fits = texture.smaller.iter().map(Vec::len).eq(sizes);
         fits.then_some(texture)
     }
 
