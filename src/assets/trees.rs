@@ -104,21 +104,6 @@ impl<'a> StandPlan<'a> {
     }
 }
 
-/// Builds the stand of `scene` on `terrain`, from plants of these sizes, by variant.
-///
-/// # Errors
-/// Those of [`StandPlan`].
-#[cfg(feature = "program")]
-pub fn build_stand(
-    scene: &Scene,
-    plan: &PlantPlan,
-    sizes: &[PlantSize],
-    terrain: &Terrain,
-    progress: &mut dyn Progress,
-) -> Result<Stand, StageError> {
-    StandPlan::new(scene, terrain)?.build(plan, sizes, progress)
-}
-
 /// The number of trees that `trees` ask for on `terrain`, from a sample.
 fn estimate(scene: &Scene, trees: &ScatteredTrees, terrain: &Terrain) -> Result<f64, StageError> {
     // Where trees may stand does not depend on the plants: each species has one, of a height from which it can be scaled

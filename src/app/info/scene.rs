@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     app::AppError,
-    assets::{ground::build_terrain, plants, stage::observer, trees},
+    assets::{ground::build_terrain, plants, stage::observer, trees::StandPlan},
     bake::plant_size,
     light::sun::{Observer, SunPosition},
     math::digits::grouped,
@@ -64,7 +64,7 @@ fn describe(page: &mut Page, scene: &Scene, path: &Path) -> Result<(), AppError>
         individuals.push(plant);
     }
     let sizes: Vec<PlantSize> = individuals.iter().map(plant_size).collect();
-    let stand = trees::build_stand(scene, &plan, &sizes, &ground, &mut heard)?;
+    let stand = StandPlan::new(scene, &ground)?.build(&plan, &sizes, &mut heard)?;
 
     page.title(format!("{}: a scene", path.display()));
     page.inset(|page| {
