@@ -13,7 +13,7 @@ use bevy::{
         query::With,
         resource::Resource,
         system::{Commands, Local, Res, ResMut, Single},
-        world::Ref,
+        world::{Mut, Ref},
     },
     platform::cell::SyncCell,
     render::view::Msaa,
@@ -139,9 +139,10 @@ pub fn fail(
 }
 
 /// Reads the scene again; it replaces the current one when it is built. Camera and clock stay.
-pub fn reload(request: &Request, session: &mut Session, terminal: &mut Terminal, scene: &mut CanopyScene) {
+pub fn reload(request: &Request, session: &mut Session, terminal: &mut Terminal, scene: &mut Mut<CanopyScene>) {
     match Request::read(&request.options) {
-        Ok(read) => *scene = CanopyScene::new(read),
+        // A scene that cannot be read must not be touched: a change begins a build.
+        Ok(read) => **scene = CanopyScene::new(read),
         Err(error) => refuse(&error.to_string(), session, terminal),
     }
 }
@@ -246,9 +247,9 @@ mod tests {
     /// Presses the key R, and waits for the build that it begins, if it does.
     fn load_again(app: &mut App) -> String {
         let mut scenes = app.world_mut().query::<&mut CanopyScene>();
-        app.world_mut().resource_scope(|world, mut session: bevy::ecs::world::Mut<Session>| {
-            world.resource_scope(|world, mut terminal: bevy::ecs::world::Mut<Terminal>| {
-                world.resource_scope(|world, request: bevy::ecs::world::Mut<Request>| {
+        app.world_mut().resource_scope(|world, mut session: Mut<Session>| {
+            world.resource_scope(|world, mut terminal: Mut<Terminal>| {
+                world.resource_scope(|world, request: Mut<Request>| {
                     let mut scene = scenes.single_mut(world).unwrap();
                     reload(&request, &mut session, &mut terminal, &mut scene);
                 });

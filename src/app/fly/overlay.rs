@@ -32,8 +32,9 @@ pub(super) const SMALL: f32 = 12.0;
 pub(super) const NAME: Color32 = Color32::from_gray(185);
 /// Colour of warnings.
 pub(super) const WARNING: Color32 = Color32::from_rgb(255, 150, 110);
-/// Width of the progress of a build in points, and height of its bar.
+/// Width and height of the progress of a build without warnings in points, and height of its bar.
 const BUILDING_WIDTH: f32 = 420.0;
+const BUILDING_HEIGHT: f32 = 50.0;
 const BAR_HEIGHT: f32 = 6.0;
 /// Width of the longest name of a pass in points.
 const PASS_WIDTH: f32 = 110.0;
@@ -84,12 +85,14 @@ pub fn draw_overlays(
     if settings.open && !session.help {
         panel(context, "canopy_settings", Align2::RIGHT_TOP, [-EDGE, EDGE], |ui| settings_panel(ui, &mut settings));
     }
-    if scene.state == SceneState::Building {
-        panel(context, "canopy_building_again", Align2::RIGHT_BOTTOM, [-EDGE, -EDGE], |ui| building(ui, &scene));
+    let is_building = scene.state == SceneState::Building;
+    if is_building {
+        panel(context, "canopy_building_again", Align2::CENTER_BOTTOM, [0.0, -EDGE], |ui| building(ui, &scene));
     }
     if let Some(message) = session.message() {
         // An area remembers its size by its name, so each message has its own.
-        panel(context, message, Align2::CENTER_BOTTOM, [0.0, -2.0 * EDGE], |ui| {
+        let rise = if is_building { BUILDING_HEIGHT } else { 0.0 };
+        panel(context, message, Align2::CENTER_BOTTOM, [0.0, -2.0 * EDGE - rise], |ui| {
             ui.label(message);
         });
     }

@@ -11,9 +11,10 @@ use crate::{
     math::range::{Range, Step, three_digits},
 };
 
-/// Width of the panel and of a field's name in points.
+/// Width of the panel and of a field's name, and height of a field in points.
 const WIDTH: f32 = 330.0;
 const NAME_WIDTH: f32 = 135.0;
+const ROW_HEIGHT: f32 = 18.0;
 /// Points that the panel leaves to the window's other edge.
 const MARGIN: f32 = 150.0;
 const SELECTED: Color32 = Color32::from_rgb(255, 214, 120);
@@ -36,6 +37,8 @@ pub fn settings_panel(ui: &mut Ui, panel: &mut SettingsPanel) {
     let tallest = (ui.ctx().viewport_rect().height() - MARGIN).max(MARGIN);
     let section = panel.section;
     ScrollArea::vertical().max_height(tallest).show(ui, |ui| {
+        // Names and values are centred on rows of one height.
+        ui.spacing_mut().interact_size.y = ROW_HEIGHT;
         // A grid remembers its columns by its name.
         let grid = Grid::new(("canopy_settings", section)).num_columns(2).spacing([10.0, 3.0]);
         grid.min_col_width(NAME_WIDTH).show(ui, |ui| {
