@@ -10,10 +10,14 @@
 //!
 //! With `--appear`: how long are the frames around the one in which a forest of these plants appears?
 //!
+//! With `--trees`: what do time and memory cost as a forest grows?
+//!
 //! Run `cargo bench --bench startup -- --help` for the arguments; benches/README.md has results.
 
 #[path = "startup/appear.rs"]
 mod appear;
+#[path = "startup/sizes.rs"]
+mod sizes;
 
 use std::{path::PathBuf, process::Command, time::Instant};
 
@@ -57,6 +61,9 @@ struct Arguments {
     /// Draw that forest without shadow maps. They are drawn for what appears, and for nothing else.
     #[arg(long)]
     no_shadows: bool,
+    /// Instead: builds and draws forests of these numbers of trees.
+    #[arg(long, num_args = 1..)]
+    trees: Vec<u64>,
     /// One turn in this process: what the other processes of a run are.
     #[arg(long, hide = true)]
     turn: bool,
@@ -73,7 +80,13 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
 fn main() -> anyhow::Result<()> {
     let arguments = Arguments::parse();
     if arguments.turn {
-        return turn(&arguments);
+        return match arguments.trees.first() {
+            Some(trees) => sizes::turn(&arguments, *trees),
+            None => turn(&arguments),
+        };
+    }
+    if !arguments.trees.is_empty() {
+        return sizes::run(&arguments);
     }
     if !arguments.appear.is_empty() {
         return appear::run(&arguments);

@@ -415,6 +415,32 @@ fn light_is_continuous_as_the_sun_sinks() {
     }
 }
 
+/// What is displayed of the zenith and of white ground, up to a factor.
+fn displayed(elevation_deg: f64, moon: MoonSetting) -> [f32; 2] {
+    let now = state(elevation_deg, moon);
+    let exposure = (-now.ev100).exp2();
+    [now.sky_view.sample(Vec3::Y), now.horizontal_illuminance()].map(|light| luminance(light) * exposure)
+}
+
+#[test]
+fn a_night_turns_into_day_without_a_step() {
+    const MOST: f32 = 1.11;
+    for moon in [MoonSetting::None, MoonSetting::Full] {
+        let elevations = (-72..=36).map(|quarter| 0.25 * f64::from(quarter));
+        let images: Vec<_> = elevations.map(|elevation| (elevation, displayed(elevation, moon))).collect();
+        for pair in images.windows(2) {
+            let ((_, before), (elevation, after)) = (pair[0], pair[1]);
+            for (name, (before, after)) in ["zenith", "ground"].into_iter().zip(before.into_iter().zip(after)) {
+                let step = (after / before).max(before / after);
+                assert!(step <= MOST, "{name} at {elevation} degrees, {moon:?}: a step of {step}");
+            }
+        }
+    }
+    // A control: over two degrees the light changes by more.
+    let [[before, _], [after, _]] = [-4.0, -2.0].map(|elevation| displayed(elevation, MoonSetting::None));
+    assert!((after / before).max(before / after) > MOST, "{before} {after}");
+}
+
 #[test]
 fn exposure_is_monotone_and_night_stays_dark_and_readable() {
     let mut last = f32::INFINITY;

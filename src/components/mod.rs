@@ -43,7 +43,7 @@ pub use sun::{DrawnSun, Sun, SunError, SunPlugin, SunRefresh};
 pub use terrain::{Terrain3d, TerrainFailed, TerrainReady, TerrainSettings};
 
 /// [`Terrain3d`] and [`Forest3d`]. Part of [`CanopyPlugins`](crate::CanopyPlugins); needs
-/// [`CanopyAssetPlugin`](crate::assets::CanopyAssetPlugin), without whose assets the systems do nothing.
+/// [`CanopyAssetPlugin`], without whose assets the systems do nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ForestPlugin;
 

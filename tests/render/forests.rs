@@ -10,14 +10,16 @@ use canopy::{
     app::Renderer,
     assets::Stage,
     bake::BakedPlant,
-    render::components::Forest,
+    render::components::{Forest, Ground},
     scatter::{PackedStand, PlantSize, Stand, packed::DEFAULT_CELL_SIZE},
 };
 
-use super::{NOON, again, draw, showing};
+use glam::DVec2;
+
+use super::{NOON, again, draw, renderer, showing};
 use crate::support::{
     gpu::gpu,
-    stage::{grove, view},
+    stage::{grove, trees_at, view},
 };
 
 /// A renderer that shows the ground of `stage` alone.
@@ -104,5 +106,27 @@ fn forests_that_come_and_go_leave_nothing_on_the_device() {
         counts.iter().all(|count| (0..3).all(|kind| 0 < count[kind] && count[kind] < most[kind])),
         "{most:?}, {counts:?}"
     );
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+#[test]
+fn scenes_that_replace_each_other_leave_nothing_on_the_device() {
+    let gpu = gpu();
+    let scenes = [grove(1), trees_at(&[DVec2::ZERO, DVec2::new(12.0, -5.0)], 1)];
+    let mut renderer = renderer(1);
+    let mut counts = Vec::new();
+    for change in 0..20 {
+        let stage = &scenes[change % 2].stage;
+        let world = renderer.app().world_mut();
+        let shown: Vec<Entity> =
+            world.query_filtered::<Entity, Or<(With<Forest>, With<Ground>)>>().iter(world).collect();
+        shown.into_iter().for_each(|entity| _ = world.despawn(entity));
+        renderer.show(stage);
+        draw(&mut renderer, stage, &view(stage, (0.0, 10.0, 60.0), 0.0, -5.0), NOON);
+        again(&mut renderer);
+        counts.push(objects(&mut renderer));
+    }
+    // The first change to either scene brings what stays.
+    assert!((4..20).all(|change| counts[change] == counts[change - 2]), "{counts:?}");
     assert_eq!(gpu.messages(), Vec::<String>::new());
 }
