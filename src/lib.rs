@@ -61,6 +61,11 @@ pub mod trace;
 
 pub use plugin::CanopyPlugins;
 
+/// The programs in README compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 /// What most programs need.
 pub mod prelude {
     pub use crate::{
