@@ -11,6 +11,7 @@ mod plugins;
 mod shadows;
 mod world;
 
+use bevy::ecs::{entity::Entity, query::QueryFilter};
 use canopy::app::{RenderedImage, Renderer};
 use canopy::assets::Stage;
 use canopy::scene::Viewpoint;
@@ -56,4 +57,11 @@ fn again(renderer: &mut Renderer) -> RenderedImage {
         Ok(picture) => picture,
         Err(error) => panic!("{error}"),
     }
+}
+
+/// Despawns the entities that `F` selects.
+fn despawn<F: QueryFilter>(renderer: &mut Renderer) {
+    let world = renderer.app().world_mut();
+    let entities: Vec<Entity> = world.query_filtered::<Entity, F>().iter(world).collect();
+    entities.into_iter().for_each(|entity| _ = world.despawn(entity));
 }

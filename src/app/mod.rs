@@ -3,7 +3,7 @@
 //! [`ReferenceOptions`]), and the functions here carry them out.
 //!
 //! It uses the library as any program does. The flight spawns a [`CanopyScene`](crate::components::CanopyScene), which is
-//! built beside the frames. [`render`] and [`reference()`] have nothing to show before their scene is built, so they wait
+//! built in the background. [`render`] and [`reference()`] have nothing to show before their scene is built, so they wait
 //! for [`Stage::build`](crate::assets::Stage::build).
 
 mod adapter;

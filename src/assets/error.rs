@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use super::background::BackgroundError;
+
 /// Why a scene cannot be built or shown.
 #[derive(Debug, thiserror::Error)]
 pub enum StageError {
@@ -109,4 +111,10 @@ pub enum StageError {
     /// A scene that could not be built in the background.
     #[error("the scene could not be built: {0}")]
     Background(String),
+}
+
+impl From<BackgroundError> for StageError {
+    fn from(error: BackgroundError) -> Self {
+        Self::Background(error.to_string())
+    }
 }

@@ -65,8 +65,7 @@ impl AssetLoader for TerrainMapLoader {
         let path = context.path().path().to_owned();
         let bytes = read::all(reader, &path).await?;
         let options = *settings;
-        let terrain = background::start(move |_| read_terrain_bytes(&bytes, &path, &options)).await;
-        let (terrain, warnings) = terrain.map_err(|error| StageError::Background(error.to_string()))??;
+        let (terrain, warnings) = background::start(move |_| read_terrain_bytes(&bytes, &path, &options)).await??;
         for warning in &warnings {
             warn!("{}: {warning}", context.path());
         }

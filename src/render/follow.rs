@@ -1,4 +1,4 @@
-//! Values that follow from a key, such as tables that follow from the light: computed in the frame, or beside the frames.
+//! Values that follow from a key, such as tables that follow from the light: computed in the frame, or in the background.
 //!
 //! The work runs in Bevy's `AsyncComputeTaskPool`, where the light itself is computed: dropping a task cancels it, and no
 //! bake runs there, so it is never queued behind one. What the work does in parallel goes to rayon's global pool, which a
@@ -27,7 +27,7 @@ pub enum Followed {
     Same,
     /// The value is new: the frame waited for it.
     Waited,
-    /// The value is new: it was computed beside the frames.
+    /// The value is new: it was computed in the background.
     Taken,
     /// The value is not new, and lags behind the key.
     Lags,

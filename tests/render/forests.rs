@@ -16,7 +16,7 @@ use canopy::{
 
 use glam::DVec2;
 
-use super::{NOON, again, draw, renderer, showing};
+use super::{NOON, again, despawn, draw, renderer, showing};
 use crate::support::{
     gpu::gpu,
     stage::{grove, trees_at, view},
@@ -25,16 +25,8 @@ use crate::support::{
 /// A renderer that shows the ground of `stage` alone.
 fn bare(stage: &Stage) -> Renderer {
     let mut renderer = showing(stage);
-    despawn_forests(&mut renderer);
+    despawn::<With<Forest>>(&mut renderer);
     renderer
-}
-
-fn despawn_forests(renderer: &mut Renderer) {
-    let world = renderer.app().world_mut();
-    let forests: Vec<Entity> = world.query_filtered::<Entity, With<Forest>>().iter(world).collect();
-    for forest in forests {
-        world.despawn(forest);
-    }
 }
 
 #[test]
@@ -94,7 +86,7 @@ fn forests_that_come_and_go_leave_nothing_on_the_device() {
         renderer.app().world_mut().spawn(stage.forest().expect("a forest"));
         draw(&mut renderer, stage, &from, NOON);
         most = objects(&mut renderer);
-        despawn_forests(&mut renderer);
+        despawn::<With<Forest>>(&mut renderer);
         draw(&mut renderer, stage, &from, NOON);
         again(&mut renderer);
         counts.push(objects(&mut renderer));
@@ -117,10 +109,7 @@ fn scenes_that_replace_each_other_leave_nothing_on_the_device() {
     let mut counts = Vec::new();
     for change in 0..20 {
         let stage = &scenes[change % 2].stage;
-        let world = renderer.app().world_mut();
-        let shown: Vec<Entity> =
-            world.query_filtered::<Entity, Or<(With<Forest>, With<Ground>)>>().iter(world).collect();
-        shown.into_iter().for_each(|entity| _ = world.despawn(entity));
+        despawn::<Or<(With<Forest>, With<Ground>)>>(&mut renderer);
         renderer.show(stage);
         draw(&mut renderer, stage, &view(stage, (0.0, 10.0, 60.0), 0.0, -5.0), NOON);
         again(&mut renderer);

@@ -1,4 +1,4 @@
-//! What follows from the light: in the frame, or beside the frames.
+//! What follows from the light: in the frame, or in the background.
 
 use bevy::prelude::*;
 use canopy::{
@@ -26,9 +26,9 @@ fn outcomes(renderer: &mut Renderer) -> [PassOutcome; 2] {
     })
 }
 
-/// Whether a frame waited for it, instead of letting it be computed beside the frames.
+/// Whether a frame waited for it, instead of letting it be computed in the background.
 fn waited(outcome: &PassOutcome) -> bool {
-    matches!(outcome, PassOutcome::Ran(on) if !on.contains("beside the frames"))
+    matches!(outcome, PassOutcome::Ran(on) if !on.contains("in the background"))
 }
 
 /// Whether it is that of the light.

@@ -28,7 +28,7 @@ use canopy::{
 };
 use glam::{DVec2, DVec3};
 
-use super::{NOON, SIZE, again, draw, showing};
+use super::{NOON, SIZE, again, despawn, draw, showing};
 use crate::support::{
     gpu::gpu,
     image::{difference, keep, linear, luminance, mean_color},
@@ -53,12 +53,6 @@ fn red(picture: &RenderedImage) -> usize {
 fn forests(renderer: &mut Renderer) -> Vec<Entity> {
     let world = renderer.app().world_mut();
     world.query_filtered::<Entity, With<Forest>>().iter(world).collect()
-}
-
-fn despawn_forests(renderer: &mut Renderer) {
-    for forest in forests(renderer) {
-        renderer.app().world_mut().despawn(forest);
-    }
 }
 
 /// Draws what is there twice: what was spawned is on the device in the second frame.
@@ -87,7 +81,7 @@ fn meshes_and_trees_hide_each_other() {
         let whole = settled(&mut renderer, stage, &from);
         keep(&whole, &format!("cube-before-{distance}"));
 
-        despawn_forests(&mut renderer);
+        despawn::<With<Forest>>(&mut renderer);
         let without = settled(&mut renderer, stage, &from);
         assert_eq!(red(&whole), red(&without), "at {distance} m a tree covers a cube that stands before it");
         renderer.app().world_mut().despawn(before);
@@ -153,7 +147,7 @@ fn a_forest_that_is_despawned_frees_what_it_held() {
         |renderer: &mut Renderer| renderer.app().sub_app(RenderApp).world().resource::<GpuForests>().iter().count();
     assert_eq!(on_device(&mut renderer), 2, "several forests in one world");
     assert!(Arc::strong_count(&stage.stand) > 1 && Arc::strong_count(&stage.plants) > 1);
-    despawn_forests(&mut renderer);
+    despawn::<With<Forest>>(&mut renderer);
     settled(&mut renderer, stage, &from);
     assert_eq!(on_device(&mut renderer), 0);
     assert_eq!((Arc::strong_count(&stage.stand), Arc::strong_count(&stage.plants)), (1, 1));

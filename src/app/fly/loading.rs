@@ -1,4 +1,4 @@
-//! From a request to a flight: the scene is built by [`CanopyScene`] beside the frames. Its progress goes to the
+//! From a request to a flight: the scene is built by [`CanopyScene`] in the background. Its progress goes to the
 //! terminal, its end starts the flight or stops the program.
 
 use std::sync::{Arc, Mutex, PoisonError};

@@ -51,8 +51,7 @@ impl AssetLoader for PlantLoader {
             let files = files_of(&bytes, &path, context).await?;
             Recipe::gltf(&path, bytes, files, settings)
         };
-        let baked = background::start(move |wanted| recipe.bake(wanted)).await;
-        let plant = baked.map_err(|error| StageError::Background(error.to_string()))??;
+        let plant = background::start(move |wanted| recipe.bake(wanted)).await??;
         for warning in &plant.warnings {
             warn!("{}: {warning}", context.path());
         }

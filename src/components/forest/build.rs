@@ -212,7 +212,7 @@ mod tests {
             let work = background::start(move |wanted| ingredients.build(wanted).map(|_| ()));
             loop {
                 if let Some(built) = work.finished() {
-                    return built.map_err(|error| StageError::Background(error.to_string()).into()).flatten();
+                    return built.map_err(|error| StageError::from(error).into()).flatten();
                 }
                 std::thread::yield_now();
             }

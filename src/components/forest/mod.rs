@@ -156,27 +156,26 @@ impl Forest3d {
 
     /// Restricts the trees to this rectangle; for trees by rule.
     #[must_use]
-    pub fn area(mut self, area: Area) -> Self {
-        if let ForestTrees::Scattered(rules) = &mut self.trees {
-            rules.area = Some(area);
-        }
-        self
+    pub fn area(self, area: Area) -> Self {
+        self.with_rules(|rules| rules.area = Some(area))
     }
 
     /// Minimum distance between two trees in metres; for trees by rule.
     #[must_use]
-    pub fn min_distance(mut self, metres: f64) -> Self {
-        if let ForestTrees::Scattered(rules) = &mut self.trees {
-            rules.min_distance = metres;
-        }
-        self
+    pub fn min_distance(self, metres: f64) -> Self {
+        self.with_rules(|rules| rules.min_distance = metres)
     }
 
     /// Adds clearings; for trees by rule.
     #[must_use]
-    pub fn clearings(mut self, clearings: ClearingNoise) -> Self {
+    pub fn clearings(self, clearings: ClearingNoise) -> Self {
+        self.with_rules(|rules| rules.clearings = Some(clearings))
+    }
+
+    /// Changes the rules of trees by rule; nothing else has any.
+    fn with_rules(mut self, change: impl FnOnce(&mut ScatteredTrees)) -> Self {
         if let ForestTrees::Scattered(rules) = &mut self.trees {
-            rules.clearings = Some(clearings);
+            change(rules);
         }
         self
     }

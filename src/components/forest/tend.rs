@@ -195,7 +195,7 @@ pub fn tend_forests(
             continue;
         };
         work.job = None;
-        let built = result.map_err(|error| StageError::Background(error.to_string()).into()).flatten();
+        let built = result.map_err(|error| StageError::from(error).into()).flatten();
         let built = built.and_then(|built| {
             sources.device.as_ref().map_or(Ok(()), |device| check_trees(built.stand.trees.len(), device))?;
             Ok(built)

@@ -50,7 +50,7 @@ impl Job {
     /// threads.
     pub fn finished(&self) -> Option<Result<Stage, StageError>> {
         let result = self.work.finished()?;
-        Some(result.unwrap_or_else(|error| Err(StageError::Background(error.to_string()))))
+        Some(result.unwrap_or_else(|error| Err(error.into())))
     }
 }
 

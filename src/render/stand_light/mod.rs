@@ -111,9 +111,9 @@ fn upload_stand_light(
     let uploaded = table.update(&queue, (key.clone(), view.exposure), || texels(&key.daylight.0, light, view.exposure));
     match followed {
         Followed::Waited => report.ran("stand light", "computed for a new light"),
-        Followed::Taken => report.ran("stand light", "computed beside the frames"),
+        Followed::Taken => report.ran("stand light", "computed in the background"),
         Followed::Same if uploaded => report.ran("stand light", "uploaded for another exposure"),
-        Followed::Lags => report.skipped("stand light", "it is being computed beside the frames"),
+        Followed::Lags => report.skipped("stand light", "it is being computed in the background"),
         Followed::Same => report.skipped("stand light", "the light has not changed"),
     }
 }

@@ -193,8 +193,8 @@ fn update(
     let cells = format!("{} × {} cells", size.0, size.1);
     match followed {
         Followed::Waited => report.ran("terrain shadow", cells),
-        Followed::Taken => report.ran("terrain shadow", format!("{cells}, computed beside the frames")),
-        Followed::Lags => report.skipped("terrain shadow", "it is being computed beside the frames"),
+        Followed::Taken => report.ran("terrain shadow", format!("{cells}, computed in the background")),
+        Followed::Lags => report.skipped("terrain shadow", "it is being computed in the background"),
         Followed::Same => report.skipped("terrain shadow", "light and terrain have not changed"),
     }
 }
