@@ -1,8 +1,11 @@
 //! Terrain and forests as components: built, built anew, swapped, taken away.
 
-use std::sync::Arc;
+use std::{any::TypeId, sync::Arc};
 
-use bevy::prelude::*;
+use bevy::{
+    asset::{AssetLoadError, AssetLoadFailedEvent, LoadState},
+    prelude::*,
+};
 use canopy::{
     lod::{Levels, Representation},
     prelude::*,
@@ -96,6 +99,43 @@ fn a_changed_file_builds_the_forest_anew_and_a_broken_one_leaves_it() {
     program.server().reload("small.species.ron");
     program.until_heard(|heard| heard.ready.len() == 3);
     assert_eq!(program.forest(forest).map(|forest| forest.plants.len()), Some(2));
+}
+
+/// Bevy reads a file that failed a second time. Where that second read began before the failure was heard, the forest of
+/// the file before it was built again.
+#[cfg(unix)]
+#[test]
+fn a_failure_heard_while_the_file_is_read_again_builds_nothing() {
+    let mut program = program();
+    let path = program.folder.path().join("small.species.ron");
+    let plant = program.load::<PlantAsset>("small.species.ron");
+    program.spawn(Forest3d::scatter(50.0).of(plant.clone(), 1.0));
+    program.until_heard(|heard| heard.ready.len() == 1);
+    program.write("small.species.ron", b"broken");
+    let server = program.server();
+    server.reload("small.species.ron");
+    program.until_heard(|heard| heard.failed.len() == 1);
+
+    // A pipe: it is being read until this test writes to it.
+    std::fs::remove_file(&path).expect("the species file");
+    let made = std::process::Command::new("mkfifo").arg(&path).status().expect("mkfifo runs");
+    assert!(made.success());
+    let again = program.load::<PlantAsset>("small.species.ron");
+    program.until(|_| matches!(server.load_state(&again), LoadState::Loading));
+    let error = AssetLoadError::RequestedHandleTypeMismatch {
+        path: "small.species.ron".into(),
+        requested: TypeId::of::<PlantAsset>(),
+        actual_asset_name: "plant",
+        loader_name: "test",
+    };
+    let failure = AssetLoadFailedEvent { id: plant.id(), path: "small.species.ron".into(), error };
+    program.app.world_mut().write_message(failure);
+    for _ in 0..2000 {
+        program.app.update();
+        std::thread::yield_now();
+    }
+    assert_eq!((program.heard().ready.len(), program.heard().failed.len()), (1, 1));
+    program.write("small.species.ron", b"");
 }
 
 #[test]

@@ -102,12 +102,22 @@ pub struct Sources<'w, 's> {
 }
 
 impl Sources<'_, '_> {
+    /// What the server knows of an asset; `None` for assets that the program made itself.
+    fn state(&self, id: impl Into<UntypedAssetId>) -> Option<LoadState> {
+        self.server.as_ref()?.get_load_state(id)
+    }
+
     /// Why an asset cannot be loaded, if it failed.
     fn failure(&self, id: impl Into<UntypedAssetId>) -> Option<String> {
-        match self.server.as_ref()?.get_load_state(id)? {
+        match self.state(id)? {
             LoadState::Failed(error) => Some(load_error(&error)),
             LoadState::NotLoaded | LoadState::Loading | LoadState::Loaded => None,
         }
+    }
+
+    /// Whether an asset is being loaded. One that is there already is then about to be replaced.
+    fn loads(&self, id: impl Into<UntypedAssetId>) -> bool {
+        matches!(self.state(id), Some(LoadState::Loading))
     }
 
     /// What `forest` is built of; `None` while something is still being loaded.
@@ -123,6 +133,11 @@ impl Sources<'_, '_> {
         }
         if let Some(error) = ground.and_then(|map| self.failure(map)) {
             return Err(ForestError::Terrain(error));
+        }
+        if forest.species.iter().any(|species| self.loads(species.plant.id()))
+            || ground.is_some_and(|map| self.loads(map))
+        {
+            return Ok(None);
         }
         let plants: Option<Vec<PlantAsset>> =
             forest.species.iter().map(|species| self.plants.get(species.plant.id()).cloned()).collect();
