@@ -25,6 +25,7 @@ mod stock;
 use std::path::PathBuf;
 
 use anyhow::Context;
+use canopy::render::components::{TreeListMaker, TreeLists};
 use clap::{Parser, ValueEnum};
 
 use field::{Field, Look};
@@ -69,6 +70,9 @@ struct Arguments {
     /// Texels along a side of a shadow map.
     #[arg(long, default_value_t = 2048)]
     shadow_size: u32,
+    /// Who makes our lists of drawn trees.
+    #[arg(long, value_enum, default_value_t = Maker::Automatic)]
+    lists: Maker,
     /// Leaves out what is named, on both sides, to see what it costs.
     #[arg(long, value_delimiter = ',')]
     without: Vec<Piece>,
@@ -96,6 +100,25 @@ enum Piece {
     Shadow,
     Ground,
     Trees,
+}
+
+/// Who makes lists of trees.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Maker {
+    Automatic,
+    Processor,
+    Device,
+}
+
+impl From<Maker> for TreeLists {
+    fn from(maker: Maker) -> Self {
+        let maker = match maker {
+            Maker::Automatic => TreeListMaker::Automatic,
+            Maker::Processor => TreeListMaker::Processor,
+            Maker::Device => TreeListMaker::Device,
+        };
+        Self { maker, ..Self::default() }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -146,6 +169,9 @@ fn main() -> anyhow::Result<()> {
         let field = Field::new(&plant, trees, look)?;
         let mut ours = (arguments.only != Some(Side::Stock)).then(|| Ours::new(&field)).transpose()?;
         let mut stock = (arguments.only != Some(Side::Ours)).then(|| Stock::new(&field)).transpose()?;
+        if let Some(ours) = &mut ours {
+            ours.make_lists(arguments.lists.into());
+        }
         for &series in &arguments.series {
             let runs = measure::alternate(&field, series, arguments.warm_up, arguments.frames, &mut ours, &mut stock)?;
             println!("{}", runs.row(trees, series));

@@ -76,12 +76,16 @@ impl LevelRenderer for Boxes {
 
 struct GpuBoxes;
 
+/// All trees in one draw call.
+const BOXES: TreeDraw = TreeDraw { group: 0, vertices: TreeVertices::Pulled(36) };
+
 #[rustfmt::skip]
 impl GpuLevel for GpuBoxes {
     fn features(&self, target: LevelTarget) -> Vec<u32> { if target == LevelTarget::ShadowMap { vec![] } else { vec![0] } }
     fn triangles(&self, _variant: usize) -> usize { 12 }
-    fn draw<'a>(&'a self, pass: &mut TrackedRenderPass<'a>, _: u32, _: LevelTarget, ranges: &[std::ops::Range<u32>]) {
-        ranges.iter().for_each(|trees| pass.draw(36 * trees.start..36 * trees.end, 0..1));
+    fn draws(&self, _: LevelTarget) -> Vec<TreeDraw> { vec![BOXES] }
+    fn draw<'a>(&'a self, pass: &mut TrackedRenderPass<'a>, _: u32, _: LevelTarget, trees: &DrawnTrees<'a>) {
+        trees.draw(pass, BOXES);
     }
     fn relight(&mut self, _: &Relight, _: &mut ForestUpload) {}
 }

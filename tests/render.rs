@@ -4,6 +4,7 @@ mod foliage;
 mod forests;
 mod levels;
 mod light_updates;
+mod lists;
 mod memory;
 mod pictures;
 mod plate;

@@ -9,10 +9,15 @@ use std::{
 };
 
 use canopy::{
+    cull::{
+        Cluster, TreeSize, Volume,
+        volume::{LevelRange, Ring, VolumePlane},
+    },
     render::{
         bindings::uniforms::{
             CascadeUniform, CascadeViewUniform, FrameUniform, LightUniform, NOISE_PERIOD, ShadowUniform,
         },
+        cull::{ListRoom, TreeDrawWords},
         forest::{
             CrossVariantUniform, ForestViewUniform, PartUniform, PlaneUniform, PlantVertex, TransferUniform,
             VariantUniform,
@@ -279,6 +284,39 @@ fn gpu_structs_are_what_the_shaders_think() {
         }
     );
     twin!(layouts, "Tree", PackedTree { xz, y, cell, look });
+    twin!(layouts, "Ring", Ring { shift, square });
+    twin!(layouts, "LevelRange", LevelRange { begin, end, first_group, by_variant });
+    twin!(layouts, "VolumePlane", VolumePlane { normal, offset, drop_factor });
+    twin!(
+        layouts,
+        "Volume",
+        Volume {
+            anchor_cell,
+            anchor_step,
+            anchor_y,
+            y_scale,
+            shift,
+            size_factor,
+            lowest,
+            first_level_only,
+            whole_levels,
+            along_light,
+            key_normal,
+            key_offset,
+            key_shift,
+            plane_count,
+            level_count,
+            cluster_count,
+            variant_count,
+            limit,
+            levels,
+            planes
+        }
+    );
+    twin!(layouts, "Cluster", Cluster { cell, first, count, low, high, bottom, top });
+    twin!(layouts, "TreeSize", TreeSize { radius, height });
+    twin!(layouts, "TreeDraw", TreeDrawWords { group, vertices, indexed });
+    twin!(layouts, "ListRoom", ListRoom { capacity, staging, group_count, draw_count });
     twin!(layouts, "Tile", GpuTile { origin, spacing, first, morph_start, morph_end, clearance, camera_height });
     twin!(layouts, "TileVertex", GpuTileVertex { height, parent_height, normal, parent_normal });
     assert_eq!(size_of::<PackedTree>(), 16, "a tree costs at most 16 bytes");
@@ -301,6 +339,11 @@ fn every_bound_struct_has_its_twin_tested() {
         "Tile",
         "TileVertex",
         "MeshPosition",
+        "Volume",
+        "Cluster",
+        "TreeSize",
+        "TreeDraw",
+        "ListRoom",
     ];
     for (place, module) in modules() {
         for (_, variable) in module.global_variables.iter().filter(|(_, variable)| variable.binding.is_some()) {

@@ -8,7 +8,7 @@ use canopy::{
     bake::{BakedLevel, BakedPlant},
     components::Sun,
     lod::{FadeBand, Levels},
-    render::components::{Forest, Ground, SunShadowSettings},
+    render::components::{Forest, Ground, SunShadowSettings, TreeLists},
     scene::Viewpoint,
 };
 use glam::DVec3;
@@ -67,6 +67,11 @@ impl Ours {
     /// Places the camera.
     pub fn place(&mut self, view: &Viewpoint) {
         self.0.set_view(view);
+    }
+
+    /// Sets who makes the lists of trees.
+    pub fn make_lists(&mut self, lists: TreeLists) {
+        self.0.app().insert_resource(lists);
     }
 
     /// Sets the time; the light follows within the frame.

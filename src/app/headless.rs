@@ -43,9 +43,11 @@ use crate::{
     progress::Progress,
     render::{
         components::{CanopyCamera, LightUpdates, SunShadowSettings},
+        forest::collect_view_counts,
         readback::read_rgb,
         report::{FrameReport, PassOutcome},
         shaders::CanopyShaders,
+        sun_shadow::collect_caster_counts,
     },
     scene::Viewpoint,
 };
@@ -139,6 +141,10 @@ fn interrupted(report: &RenderReport, total: usize) -> AppError {
 
 /// Time limit for shaders and pipelines; far more than they need on the slowest machine.
 const LONGEST_WAIT: Duration = Duration::from_secs(120);
+
+/// How often a frame is drawn again because lists of trees were too short: once is enough, since all that they lack is
+/// counted.
+const MOST_REDRAWS: usize = 3;
 
 /// A renderer without a window, driven frame by frame.
 pub struct Renderer {
@@ -263,6 +269,24 @@ impl Renderer {
             self.warm_up()?;
             self.warm = true;
         }
+        self.draw_once()?;
+        // Lists of trees that were too short have grown, and the frame is drawn again.
+        for _ in 0..MOST_REDRAWS {
+            if !self.lists_were_short() {
+                break;
+            }
+            self.draw_once()?;
+        }
+        match self.app.should_exit() {
+            Some(exit) if exit.is_error() => {
+                Err(AppError::Render("the graphics device reported an error (see above)".to_owned()))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Draws one frame with the lists of trees as long as they are.
+    fn draw_once(&mut self) -> Result<(), AppError> {
         self.app.update();
         // A frame in which a pass waited for its pipeline is drawn again.
         let started = Instant::now();
@@ -275,12 +299,15 @@ impl Renderer {
         // What the device reported says more than that it could not be waited for.
         self.check_fault()?;
         waited.map_err(|error| AppError::Render(error.to_string()))?;
-        match self.app.should_exit() {
-            Some(exit) if exit.is_error() => {
-                Err(AppError::Render("the graphics device reported an error (see above)".to_owned()))
-            }
-            _ => Ok(()),
-        }
+        Ok(())
+    }
+
+    /// Takes the counts of the lists that the device made; whether trees are missing in the last frame.
+    fn lists_were_short(&mut self) -> bool {
+        let world = self.app.sub_app_mut(RenderApp).world_mut();
+        let view = world.run_system_cached(collect_view_counts).unwrap_or(false);
+        let casters = world.run_system_cached(collect_caster_counts).unwrap_or(false);
+        view || casters
     }
 
     /// The first updates upload meshes, textures and shaders, and draw nothing yet.

@@ -75,33 +75,6 @@ impl CascadeBox {
     pub fn clip_from_camera(&self, camera: DVec3) -> Mat4 {
         self.clip_from_anchor() * Mat4::from_translation((camera - self.center).as_vec3())
     }
-
-    /// The volume that holds all casters of the cascade, with the light's frame computed once.
-    pub fn caster_volume(&self) -> CasterVolume {
-        CasterVolume { bounds: *self, frame: light_frame(self.direction) }
-    }
-}
-
-/// The part of space whose objects (casters) can shade a cascade.
-#[derive(Clone, Copy, Debug)]
-pub struct CasterVolume {
-    bounds: CascadeBox,
-    frame: DMat3,
-}
-
-impl CasterVolume {
-    /// Whether a caster within the axis-aligned box `min..max` (scene metres) can shade the cascade: seen along the
-    /// light it overlaps the cascade's box, and it does not lie wholly behind it.
-    pub fn includes(&self, min: DVec3, max: DVec3) -> bool {
-        let Self { bounds, frame } = self;
-        let middle = frame.transpose() * (0.5 * (min + max) - bounds.center);
-        let half = 0.5 * (max - min);
-        let half_extent = |axis: DVec3| axis.abs().dot(half);
-        middle.x.abs() <= bounds.half_width + half_extent(frame.x_axis)
-            && middle.y.abs() <= bounds.half_width + half_extent(frame.y_axis)
-            && middle.z >= -bounds.half_depth - half_extent(frame.z_axis)
-            && middle.z <= bounds.distance_to_light + half_extent(frame.z_axis)
-    }
 }
 
 /// Served radii of `count` cascades up to `distance` metres, finest first, in a geometric series.
@@ -190,16 +163,6 @@ mod tests {
         assert_eq!(a, b);
         let c = CascadeBox::new(DVec3::new(90.0, 300.0, 5.0), 100.0, 2048, direction, 30.0);
         assert_ne!(a, c);
-    }
-
-    #[test]
-    fn casters_towards_the_light_count_and_those_behind_do_not() {
-        let cascade = CascadeBox::new(DVec3::ZERO, 50.0, 1024, DVec3::new(1.0, 1.0, 0.0).normalize(), 30.0);
-        let around = |center: DVec3| cascade.caster_volume().includes(center - 1.0, center + 1.0);
-        assert!(around(DVec3::ZERO));
-        assert!(around(cascade.direction * 120.0));
-        assert!(!around(cascade.direction * -200.0));
-        assert!(!around(DVec3::new(0.0, 0.0, 200.0)));
     }
 
     #[test]

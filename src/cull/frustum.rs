@@ -26,20 +26,14 @@ impl Frustum {
         Self { planes: planes.into_iter().filter_map(normalised).collect() }
     }
 
+    /// Its planes, with unit normals: `normal · p + w >= 0` inside.
+    pub fn planes(&self) -> &[Vec4] {
+        &self.planes
+    }
+
     /// Whether the camera-relative axis-aligned box may be visible.
     pub fn sees_box(&self, min: Vec3, max: Vec3) -> bool {
         let (middle, half) = (0.5 * (min + max), 0.5 * (max - min));
         self.planes.iter().all(|plane| plane.xyz().dot(middle) + plane.w + plane.xyz().abs().dot(half) >= 0.0)
-    }
-
-    /// Whether a camera-relative sphere that is swept from `start` to `end` may be visible.
-    pub fn sees_swept_sphere(&self, start: Vec3, end: Vec3, radius: f32) -> bool {
-        let above = |plane: &Vec4, point: Vec3| plane.xyz().dot(point) + plane.w;
-        self.planes.iter().all(|plane| above(plane, start).max(above(plane, end)) >= -radius)
-    }
-
-    /// Whether the camera-relative sphere may be visible.
-    pub fn sees_sphere(&self, center: Vec3, radius: f32) -> bool {
-        self.planes.iter().all(|plane| plane.xyz().dot(center) + plane.w >= -radius)
     }
 }

@@ -11,10 +11,20 @@ pub enum Grouping {
     Together,
 }
 
-/// The trees of one stand that one view draws: ranges into `visible`, which holds indices of trees.
+impl Grouping {
+    /// Number of groups of a level, for plants of so many variants.
+    pub fn groups(self, variants: usize) -> usize {
+        match self {
+            Self::ByVariant => variants,
+            Self::Together => 1,
+        }
+    }
+}
+
+/// The trees of one page of a stand that one view draws: ranges into `visible`, which holds indices of trees.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DrawLists {
-    /// Indices into the stand's trees.
+    /// Indices into the page's trees.
     pub visible: Vec<u32>,
     /// The ranges of each level: one per variant, or a single one ([`Grouping`]).
     pub levels: Vec<Vec<Range<u32>>>,
@@ -22,7 +32,7 @@ pub struct DrawLists {
 
 impl DrawLists {
     /// The lists of each level and group, one after another.
-    pub(super) fn assemble(levels: Vec<Vec<Vec<u32>>>) -> Self {
+    fn assemble(levels: Vec<Vec<Vec<u32>>>) -> Self {
         let mut visible = Vec::with_capacity(levels.iter().flatten().map(Vec::len).sum());
         let mut range = |mut list: Vec<u32>| {
             let first = visible.len() as u32;
@@ -45,23 +55,19 @@ impl DrawLists {
 }
 
 /// Lists under construction: entries by level and group.
-pub(super) struct ListBuilder<'a, T> {
+pub(super) struct ListBuilder<'a> {
     groupings: &'a [Grouping],
-    lists: Vec<Vec<Vec<T>>>,
+    lists: Vec<Vec<Vec<u32>>>,
 }
 
-impl<'a, T> ListBuilder<'a, T> {
+impl<'a> ListBuilder<'a> {
     pub fn new(groupings: &'a [Grouping], variants: usize) -> Self {
-        let groups = |grouping: &Grouping| match grouping {
-            Grouping::ByVariant => variants,
-            Grouping::Together => 1,
-        };
-        let lists = groupings.iter().map(|grouping| (0..groups(grouping)).map(|_| Vec::new()).collect()).collect();
+        let lists = groupings.iter().map(|grouping| vec![Vec::new(); grouping.groups(variants)]).collect();
         Self { groupings, lists }
     }
 
     /// The list of a tree of `variant` in `level`; `None` for a level or a variant that does not exist.
-    pub fn list(&mut self, level: usize, variant: usize) -> Option<&mut Vec<T>> {
+    pub fn list(&mut self, level: usize, variant: usize) -> Option<&mut Vec<u32>> {
         let group = match self.groupings.get(level)? {
             Grouping::ByVariant => variant,
             Grouping::Together => 0,
@@ -69,7 +75,7 @@ impl<'a, T> ListBuilder<'a, T> {
         self.lists.get_mut(level)?.get_mut(group)
     }
 
-    pub fn into_lists(self) -> Vec<Vec<Vec<T>>> {
-        self.lists
+    pub fn finish(self) -> DrawLists {
+        DrawLists::assemble(self.lists)
     }
 }

@@ -1,18 +1,24 @@
 //! Culling: which trees a view or a cascade draws, and with which representation. Pure functions over a packed stand.
 //!
-//! Trees are sorted into square cells. Cells are tested against the frustum and sorted front to back, so that near
-//! crowns hide what lies behind before it is shaded; only cells that a fade band crosses are searched tree by
-//! tree. The lists depend only on the camera: no atomics, no race for their order.
+//! Trees are sorted into cells, and the trees of a cell into [clusters](Cluster) of at most 64. A [`Volume`] is what a view
+//! or a cascade can see. Clusters are tested against it and sorted front to back, so that near crowns hide what lies behind
+//! before it is shaded; only clusters that a fade band crosses are searched tree by tree. The lists depend only on the
+//! volume: no atomics, no race for their order.
 //!
-//! Cost: one test per cell (8,800 cells for 36 km²) and one append per visible tree.
+//! The same lists are made by a compute pass ([`render::cull`](crate::render::cull)). Both decide in whole numbers, so that
+//! they agree about every tree on every device.
+//!
+//! Cost: one test per cluster (some 16,000 for a million trees) and one append per visible tree.
 
 pub mod cascades;
-mod casters;
+pub mod clusters;
 mod frustum;
 mod lists;
-mod view;
+mod select;
+pub mod volume;
 
-pub use casters::{SeenShadows, cull_cascade, cull_light_view};
+pub use clusters::{Cluster, Page, TreeSize, pages};
 pub use frustum::Frustum;
 pub use lists::{DrawLists, Grouping};
-pub use view::cull_view;
+pub use select::select;
+pub use volume::{Drawn, SeenShadows, Volume};

@@ -189,6 +189,37 @@ impl Default for SunShadowSettings {
     }
 }
 
+/// Who makes the lists of trees that a frame draws. The image is the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+pub enum TreeListMaker {
+    /// The graphics device where it can, except for software drivers: on these the lists compete with the image for the
+    /// same processor.
+    #[default]
+    Automatic,
+    /// The processor. It looks at clusters of up to 64 trees, and uploads four bytes for each drawn tree and map.
+    Processor,
+    /// The graphics device, software drivers included; where it cannot, the processor. The processor's work does not
+    /// grow with the number of trees.
+    Device,
+}
+
+/// How the lists of drawn trees are made.
+#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Resource, Default)]
+pub struct TreeLists {
+    /// Who makes them.
+    pub maker: TreeListMaker,
+    /// The most trees in one buffer. A forest of more trees is split into several, each with its own lists and draw calls;
+    /// so is one that is larger than the device's largest storage buffer.
+    pub trees_per_buffer: usize,
+}
+
+impl Default for TreeLists {
+    fn default() -> Self {
+        Self { maker: TreeListMaker::default(), trees_per_buffer: usize::MAX }
+    }
+}
+
 /// Debug options of a camera.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, ExtractComponent, Reflect)]
 #[reflect(Component, Default)]
@@ -213,10 +244,11 @@ impl Plugin for ComponentsPlugin {
             ExtractComponentPlugin::<ViewOptions>::default(),
         ))
         .register_type::<(CanopyCamera, CanopyOrigin, SunShadowSettings, ViewOptions, CastsCanopyShadow)>()
-        .register_type::<(Forest, Ground)>()
+        .register_type::<(Forest, Ground, TreeLists)>()
         .register_type::<LightUpdates>()
         .init_resource::<CanopyOrigin>()
-        .init_resource::<LightUpdates>();
+        .init_resource::<LightUpdates>()
+        .init_resource::<TreeLists>();
     }
 }
 

@@ -24,7 +24,7 @@ use bevy::{
 use glam::{DVec3, Quat, Vec3};
 
 use super::components::{
-    CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, LightUpdates, SunShadowSettings,
+    CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, LightUpdates, SunShadowSettings, TreeLists,
 };
 
 /// The data of the main world for a frame.
@@ -48,6 +48,8 @@ pub struct ExtractedScene {
     pub mesh_shadows: bool,
     /// Shadow settings.
     pub shadow: SunShadowSettings,
+    /// How the lists of trees are made.
+    pub tree_lists: TreeLists,
 }
 
 /// The components that decide where an entity is drawn, and whether.
@@ -62,7 +64,11 @@ pub fn extract_scene(
     grounds: Extract<Query<(Entity, &Ground, Placed)>>,
     casters: Extract<Query<(Entity, &Mesh3d, &GlobalTransform), With<CastsCanopyShadow>>>,
     mut changes: Extract<MessageReader<AssetEvent<Mesh>>>,
-    (daylight, light_updates): (Extract<Option<Res<Daylight>>>, Extract<Option<Res<LightUpdates>>>),
+    (daylight, light_updates, tree_lists): (
+        Extract<Option<Res<Daylight>>>,
+        Extract<Option<Res<LightUpdates>>>,
+        Extract<Option<Res<TreeLists>>>,
+    ),
     shadows: Extract<Query<(Entity, &SunShadowSettings)>>,
     lights: Extract<Query<&DirectionalLight>>,
 ) {
@@ -90,6 +96,7 @@ pub fn extract_scene(
     let ground = visible().min_by_key(|(entity, ..)| *entity);
     scene.ground = ground.map(|(entity, ground, placed)| (entity, ground.clone(), translation(placed.0)));
     scene.daylight = daylight.as_deref().cloned();
+    scene.tree_lists = tree_lists.as_deref().copied().unwrap_or_default();
     scene.light_updates = light_updates.as_deref().copied().unwrap_or_default();
     let mut meshes: Vec<_> = casters.iter().collect();
     meshes.sort_by_key(|(entity, ..)| *entity);

@@ -15,6 +15,7 @@ use bevy::{
 };
 use bytemuck::Pod;
 
+use super::frame_work::FrameWork;
 use crate::math::MipView;
 
 /// The device, its queue and the pipeline cache: what an upload needs.
@@ -26,11 +27,33 @@ pub struct Gpu<'w> {
     pub queue: Res<'w, RenderQueue>,
     /// The cache of layouts and pipelines.
     pub pipelines: Res<'w, PipelineCache>,
+    /// Counts what is done through the functions here.
+    pub work: Res<'w, FrameWork>,
 }
 
 impl Gpu<'_> {
+    /// A new buffer.
+    pub fn buffer(&self, descriptor: &BufferDescriptor) -> Buffer {
+        FrameWork::add(&self.work.allocations, 1);
+        self.device.create_buffer(descriptor)
+    }
+
+    /// A buffer with `data`; never empty, as empty buffers cannot be bound.
+    pub fn filled_buffer<T: Pod>(&self, label: &str, usage: BufferUsages, data: &[T]) -> Buffer {
+        FrameWork::add(&self.work.allocations, 1);
+        FrameWork::add(&self.work.uploaded_bytes, size_of_val(data) as u64);
+        buffer_with(&self.device, label, usage, data)
+    }
+
+    /// Writes `bytes` into `buffer` from `offset` on.
+    pub fn write(&self, buffer: &Buffer, offset: u64, bytes: &[u8]) {
+        FrameWork::add(&self.work.uploaded_bytes, bytes.len() as u64);
+        self.queue.write_buffer(buffer, offset, bytes);
+    }
+
     /// A bind group of `layout`.
     pub fn bind_group(&self, label: &str, layout: &BindGroupLayoutDescriptor, entries: &[BindGroupEntry]) -> BindGroup {
+        FrameWork::add(&self.work.allocations, 1);
         self.device.create_bind_group(label, &self.pipelines.get_bind_group_layout(layout), entries)
     }
 }

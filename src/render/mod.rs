@@ -5,6 +5,7 @@
 //! ```text
 //! extract ── view (camera in f64) ── cull (lists of trees) ── bindings (group 0)
 //!              │
+//!              ├─ cull         lists of trees, where the device makes them, before all cameras
 //!              ├─ sun_shadow   only the cascades that changed        before Core3dSystems::MainPass
 //!              ├─ mesh_shadow  trees in Bevy's own shadow maps       after Bevy's casters
 //!              ├─ (Bevy's own opaque meshes)
@@ -18,10 +19,12 @@
 
 pub mod bindings;
 pub mod components;
+pub mod cull;
 pub mod diagnostics;
 pub mod extract;
 mod follow;
 pub mod forest;
+pub mod frame_work;
 pub mod gpu;
 mod light_table;
 pub mod mesh_shadow;
@@ -79,6 +82,7 @@ impl Plugin for CanopyRenderPlugin {
             view::ViewPlugin,
             bindings::BindingsPlugin,
             stand_light::StandLightPlugin,
+            cull::CullPlugin,
             sky::SkyPassPlugin,
             sun_shadow::SunShadowPassPlugin,
             mesh_shadow::MeshShadowPlugin,

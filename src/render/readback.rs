@@ -1,10 +1,10 @@
-//! Reads the pixels of a finished frame back from the device.
+//! Reads the pixels of a finished frame, or the words of a buffer, back from the device.
 
 use std::sync::{Arc, Mutex};
 
 use bevy::render::{
     render_resource::{
-        BufferAsyncError, BufferDescriptor, BufferUsages, CommandEncoderDescriptor, Extent3d, MapMode, PollType,
+        Buffer, BufferAsyncError, BufferDescriptor, BufferUsages, CommandEncoderDescriptor, Extent3d, MapMode, PollType,
         TexelCopyBufferInfo, TexelCopyBufferLayout, Texture,
     },
     renderer::{RenderDevice, RenderQueue},
@@ -22,6 +22,48 @@ pub enum ReadbackError {
     /// The device finished without an answer.
     #[error("the image could not be read back: the device did not answer")]
     NoAnswer,
+}
+
+/// The first `words` words of `buffer`, which must allow copies. Waits until the device has finished everything that was
+/// submitted.
+///
+/// # Errors
+/// [`ReadbackError`] if the device is lost or out of memory.
+pub fn read_words(
+    device: &RenderDevice,
+    queue: &RenderQueue,
+    buffer: &Buffer,
+    words: usize,
+) -> Result<Vec<u32>, ReadbackError> {
+    let bytes = (4 * words as u64).min(buffer.size());
+    let copy = device.create_buffer(&BufferDescriptor {
+        label: Some("canopy_readback"),
+        size: bytes.max(4),
+        usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor::default());
+    encoder.copy_buffer_to_buffer(buffer, 0, &copy, 0, bytes);
+    queue.submit([encoder.finish()]);
+    wait_for(device, &copy)?;
+    let mut all: Vec<u32> = bytemuck::pod_collect_to_vec(&copy.slice(..).get_mapped_range());
+    all.truncate(words);
+    Ok(all)
+}
+
+/// Maps `buffer` for reading, and waits until it is.
+fn wait_for(device: &RenderDevice, buffer: &Buffer) -> Result<(), ReadbackError> {
+    let outcome = Arc::new(Mutex::new(None));
+    let shared = outcome.clone();
+    buffer.slice(..).map_async(MapMode::Read, move |result| {
+        if let Ok(mut slot) = shared.lock() {
+            *slot = Some(result);
+        }
+    });
+    device.wgpu_device().poll(PollType::Wait { submission_index: None, timeout: None })?;
+    let mapped = outcome.lock().ok().and_then(|mut slot| slot.take());
+    mapped.ok_or(ReadbackError::NoAnswer)??;
+    Ok(())
 }
 
 /// The first layer of `texture`, whose format has four bytes per pixel, without its fourth channel: three bytes per
@@ -48,17 +90,8 @@ pub fn read_rgb(device: &RenderDevice, queue: &RenderQueue, texture: &Texture) -
         Extent3d { width, height, depth_or_array_layers: 1 },
     );
     queue.submit([encoder.finish()]);
-    let outcome = Arc::new(Mutex::new(None));
-    let shared = outcome.clone();
+    wait_for(device, &buffer)?;
     let slice = buffer.slice(..);
-    slice.map_async(MapMode::Read, move |result| {
-        if let Ok(mut slot) = shared.lock() {
-            *slot = Some(result);
-        }
-    });
-    device.wgpu_device().poll(PollType::Wait { submission_index: None, timeout: None })?;
-    let mapped = outcome.lock().ok().and_then(|mut slot| slot.take());
-    mapped.ok_or(ReadbackError::NoAnswer)??;
     let mut pixels = Vec::with_capacity(3 * width as usize * height as usize);
     for line in slice.get_mapped_range().chunks_exact(row) {
         for pixel in line[..4 * width as usize].chunks_exact(4) {

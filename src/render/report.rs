@@ -32,12 +32,22 @@ pub struct FrameReport(Arc<Mutex<Pages>>);
 impl FrameReport {
     /// Records that `pass` ran.
     pub fn ran(&self, pass: impl Into<String>, on: impl Into<String>) {
-        self.pages().open.insert(pass.into(), PassOutcome::Ran(on.into()));
+        self.record(pass, PassOutcome::Ran(on.into()));
     }
 
     /// Records that `pass` was skipped.
     pub fn skipped(&self, pass: impl Into<String>, why: impl Into<String>) {
-        self.pages().open.insert(pass.into(), PassOutcome::Skipped(why.into()));
+        self.record(pass, PassOutcome::Skipped(why.into()));
+    }
+
+    /// Records what became of `pass`.
+    pub fn record(&self, pass: impl Into<String>, outcome: PassOutcome) {
+        self.pages().open.insert(pass.into(), outcome);
+    }
+
+    /// Replaces what became of `pass` in the last complete frame, because the device has told more of it.
+    pub fn amend(&self, pass: impl Into<String>, outcome: PassOutcome) {
+        self.pages().last.insert(pass.into(), outcome);
     }
 
     /// All outcomes of the last complete frame, by pass name.

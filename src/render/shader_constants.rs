@@ -7,6 +7,7 @@ use std::fmt::Write as _;
 
 use super::{
     bindings::uniforms,
+    cull,
     forest::{transfer, uniforms as forest},
 };
 use crate::{
@@ -14,6 +15,7 @@ use crate::{
         levels::cross,
         lighting::{AmbientTerm, implicit::packing},
     },
+    cull::{clusters, volume},
     light::{atmosphere::SkyView, night, stand},
     lod,
     scatter::packed,
@@ -79,6 +81,19 @@ pub fn constants() -> Vec<(&'static str, &'static str, Value)> {
         ("WHOLE", "Alpha threshold at which a representation is whole.", lod::WHOLE.into()),
         ("FADE_SPAN", "What fading adds to `WHOLE` until nothing is left.", lod::FADE_SPAN.into()),
         ("GONE", "Alpha threshold from which on nothing is left.", lod::GONE.into()),
+        ("MAX_LEVELS", "Most levels of a forest.", uint(lod::MAX_LEVELS)),
+        ("MAX_PLANES", "Most planes of a volume.", uint(volume::MAX_PLANES)),
+        ("COORDINATE_LIMIT", "Limit of coordinates in plane tests.", Value::Int(volume::COORDINATE_LIMIT)),
+        ("PLANE_SLACK", "What rounding moves a plane at most.", Value::Int(volume::PLANE_SLACK)),
+        ("ENDLESS_DROP", "Units of a drop that counts as endless.", Value::Int(volume::ENDLESS_DROP)),
+        ("SQUARE_LIMIT", "Largest coordinate that is squared.", volume::SQUARE_LIMIT.into()),
+        ("CLUSTER_KEYS", "Keys of clusters lie below this.", volume::KEYS.into()),
+        ("CLUSTER_BITS", "Bits of a cluster's index, below its key.", clusters::CLUSTER_BITS.into()),
+        ("SORT_THREADS", "Threads of the workgroup that sorts.", cull::SORT_THREADS.into()),
+        ("TEST_THREADS", "Threads of a workgroup that looks at clusters.", cull::TEST_THREADS.into()),
+        ("LIST_STARTS", "Word of the results at which the levels' starts lie.", uint(cull::STARTS)),
+        ("LIST_TOTALS", "The same of their numbers of trees.", uint(cull::TOTALS)),
+        ("LIST_HEADER", "Words before the ranges of the groups.", uint(cull::HEADER)),
         ("AMBIENT_FITTED", "Leaves that are lit by k_a with fitted constants.", (AmbientTerm::Fitted as u32).into()),
         ("AMBIENT_PUBLISHED", "Leaves that are lit by k_a as published.", (AmbientTerm::Published as u32).into()),
         ("PLANES", "Planes of a cross.", uint(forest::PLANES)),

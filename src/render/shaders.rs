@@ -64,6 +64,7 @@ shader_files! {
     Lighting = "common/lighting.wgsl",
     ForestInstance = "forest/instance.wgsl",
     ForestTransfer = "forest/transfer.wgsl",
+    CullVolume = "cull/volume.wgsl",
     ForestCrossVariant = "forest/cross_variant.wgsl",
     ForestModel = "forest/model.wgsl",
     ForestCross = "forest/cross.wgsl",
@@ -71,6 +72,7 @@ shader_files! {
     SunShadowModel = "sun_shadow/model.wgsl",
     SunShadowCross = "sun_shadow/cross.wgsl",
     SunShadowMesh = "sun_shadow/mesh.wgsl",
+    CullLists = "cull/lists.wgsl",
     SkyPass = "sky/sky.wgsl",
     Terrain = "terrain/terrain.wgsl",
 }

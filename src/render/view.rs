@@ -46,6 +46,9 @@ pub struct ViewFormat {
 }
 
 impl ViewFormat {
+    /// Some format, for what does not depend on it.
+    pub const ANY: Self = Self { color: TextureFormat::Rgba16Float, samples: 1 };
+
     /// A pipeline that draws into the attachment with the entry points `vertex` and `fragment` of `shader`, under
     /// `defs`.
     pub fn pipeline(

@@ -1,6 +1,9 @@
 //! A forest on the device: created when the entity appears or changes, dropped when it is removed.
 
-use std::{ops::Range, sync::Arc};
+use std::{
+    ops::Range,
+    sync::{Arc, OnceLock},
+};
 
 use bevy::{
     ecs::{
@@ -18,18 +21,20 @@ use bevy::{
 
 use super::{
     leaves::Leaves,
-    representation::{ForestUpload, GpuLevel, LevelRenderer, Relight, Representations},
+    representation::{ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight, Representations},
     transfer::TransferLight,
     uniforms::variants,
 };
 use crate::{
     bake::BakedPlant,
-    cull::Grouping,
+    cull::{Drawn, Grouping, Page, TreeSize, pages},
     light::StandTrees,
     render::{
         components::Forest,
+        cull::{DrawTable, ListSources},
         extract::ExtractedScene,
         gpu::{self, Gpu},
+        view::ViewFormat,
     },
     scatter::{PackedStand, PackedTree, PlantSize},
 };
@@ -42,6 +47,24 @@ pub struct ForestLevel {
     pub gpu: Box<dyn GpuLevel>,
 }
 
+/// A part of a forest whose trees fit into one buffer.
+struct GpuPage {
+    page: Page,
+    /// [`PackedTree`]s.
+    trees: Buffer,
+    /// [`Cluster`](crate::cull::Cluster)s, for lists that the device makes.
+    clusters: OnceLock<Buffer>,
+}
+
+/// What a list is for: its draw calls differ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ListTarget {
+    /// A view.
+    View,
+    /// A shadow map.
+    ShadowMap,
+}
+
 /// A forest on the device.
 pub struct GpuForest {
     /// The stand of the component.
@@ -50,13 +73,17 @@ pub struct GpuForest {
     plants: Arc<Vec<BakedPlant>>,
     /// The current component of the entity, with the stand that is drawn: an empty one if plants are missing.
     pub forest: Forest,
-    /// [`PackedTree`]s.
-    pub trees: Buffer,
+    pages: Vec<GpuPage>,
+    /// [`TreeSize`]s and draw calls, for lists that the device makes.
+    sizes_buffer: OnceLock<Buffer>,
+    tables: [OnceLock<Arc<DrawTable>>; 2],
     /// [`VariantUniform`](super::VariantUniform)s.
     pub variants: Buffer,
     leaves: Leaves,
-    /// Size of each variant, for culling.
+    /// Size of each variant.
     pub sizes: Vec<PlantSize>,
+    /// The same for culling.
+    pub tree_sizes: Vec<TreeSize>,
     /// Largest scale of any tree.
     pub max_scale: f32,
     /// The levels in the order of [`Forest::levels`]; `None` for a representation without a renderer.
@@ -76,6 +103,57 @@ impl GpuForest {
     /// The baked plants, by variant.
     pub fn plants(&self) -> &[BakedPlant] {
         &self.plants
+    }
+
+    /// Number of pages.
+    pub fn page_count(&self) -> usize {
+        self.pages.len()
+    }
+
+    /// The trees of a page on the device.
+    pub fn tree_buffer(&self, page: usize) -> Option<&Buffer> {
+        self.pages.get(page).map(|page| &page.trees)
+    }
+
+    /// A page and its trees.
+    pub fn page_trees(&self, page: usize) -> Option<(&Page, &[PackedTree])> {
+        let page = &self.pages.get(page)?.page;
+        Some((page, self.forest.stand.trees.get(page.trees.clone())?))
+    }
+
+    /// What volumes of a page are made from.
+    pub fn drawn(&self, page: usize) -> Option<Drawn<'_>> {
+        let page = &self.pages.get(page)?.page;
+        let grid = self.forest.stand.grid;
+        Some(Drawn { page, grid, groupings: &self.groupings, variants: self.sizes.len() })
+    }
+
+    /// What the device makes a page's lists from. Uploaded when they are first made there.
+    pub fn list_sources(&self, gpu: &Gpu, page: usize, target: ListTarget) -> Option<ListSources<'_>> {
+        let page = self.pages.get(page)?;
+        let storage = BufferUsages::STORAGE;
+        let upload = || gpu.filled_buffer("canopy_clusters", storage, &page.page.clusters);
+        let sizes = || gpu.filled_buffer("canopy_tree_sizes", storage, &self.tree_sizes);
+        let draws = |target: LevelTarget| {
+            let calls = self.levels().flat_map(|(index, level)| {
+                level.gpu.draws(target).into_iter().map(move |draw| (index, draw))
+            });
+            Arc::new(DrawTable::new(gpu, &self.groupings, self.sizes.len(), calls))
+        };
+        let table = match target {
+            ListTarget::View => self.tables[0].get_or_init(|| draws(LevelTarget::View(ViewFormat::ANY))),
+            ListTarget::ShadowMap => self.tables[1].get_or_init(|| draws(LevelTarget::ShadowMap)),
+        };
+        Some(ListSources {
+            trees: &page.trees,
+            tree_count: page.page.trees.len(),
+            clusters: page.clusters.get_or_init(upload),
+            cluster_count: page.page.clusters.len(),
+            sizes: self.sizes_buffer.get_or_init(sizes),
+            table,
+            groupings: &self.groupings,
+            variants: self.sizes.len(),
+        })
     }
 
     /// Distances in metres from the centre of a shadow map at which each level casts into a map of `texel` metres per
@@ -102,12 +180,23 @@ impl GpuForest {
         casting
     }
 
-    fn new(component: &Forest, generation: u64, known: &Representations, upload: &mut ForestUpload) -> Self {
+    fn new(
+        component: &Forest,
+        generation: u64,
+        trees_per_buffer: usize,
+        known: &Representations,
+        upload: &mut ForestUpload,
+    ) -> Self {
         let forest = &Forest { stand: drawn_stand(component), ..component.clone() };
         let storage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
         let device = &upload.gpu.device;
         let sizes: Vec<PlantSize> = forest.plants.iter().map(BakedPlant::size).collect();
-        let trees = gpu::buffer_with::<PackedTree>(device, "canopy_trees", storage, &forest.stand.trees);
+        let on_device = |page: Page| {
+            let trees = forest.stand.trees.get(page.trees.clone()).unwrap_or(&[]);
+            let trees = gpu::buffer_with::<PackedTree>(device, "canopy_trees", storage, trees);
+            GpuPage { page, trees, clusters: OnceLock::new() }
+        };
+        let pages = pages(&forest.stand, &sizes, trees_per_buffer).into_iter().map(on_device).collect();
         let variants = gpu::buffer_with(device, "canopy_variants", storage, &variants(&forest.plants, &sizes));
         let level = |representation| {
             let renderer = known.get(representation).cloned();
@@ -129,9 +218,12 @@ impl GpuForest {
             stand: component.stand.clone(),
             plants: forest.plants.clone(),
             forest: forest.clone(),
-            trees,
+            pages,
+            sizes_buffer: OnceLock::new(),
+            tables: Default::default(),
             variants,
             leaves: Leaves::of(forest),
+            tree_sizes: sizes.iter().map(TreeSize::from).collect(),
             sizes,
             max_scale: forest.stand.cells.iter().map(|cell| cell.max_scale).fold(0.0, f32::max),
             groupings: levels.iter().map(grouping).collect(),
@@ -218,10 +310,18 @@ impl GpuForests {
     }
 }
 
-/// The most trees of a forest on a device of these limits: all of them lie in one storage buffer.
-pub fn most_trees(limits: &WgpuLimits) -> usize {
+/// The most trees that lie in one storage buffer of a device of these limits.
+fn trees_in_buffer(limits: &WgpuLimits) -> usize {
     let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
     usize::try_from(bytes).unwrap_or(usize::MAX) / size_of::<PackedTree>()
+}
+
+/// The most pages of a forest.
+const MOST_PAGES: usize = 64;
+
+/// The most trees of a forest on a device of these limits: so many lie in as many storage buffers as a forest may have.
+pub fn most_trees(limits: &WgpuLimits) -> usize {
+    trees_in_buffer(limits).saturating_mul(MOST_PAGES).min(u32::MAX as usize)
 }
 
 /// Uploads new and changed forests, and drops despawned ones.
@@ -235,6 +335,7 @@ pub fn prepare_forests(
     let forests = &mut *forests;
     let mut upload = ForestUpload { gpu: &gpu, transfer: &mut transfer };
     let limit = most_trees(&gpu.device.limits());
+    let trees_per_buffer = trees_in_buffer(&gpu.device.limits()).min(scene.tree_lists.trees_per_buffer);
     let fits = |forest: &Forest| {
         let count = forest.stand.trees.len();
         if count > limit {
@@ -259,7 +360,7 @@ pub fn prepare_forests(
             continue;
         }
         forests.generations += 1;
-        let made = GpuForest::new(forest, forests.generations, &representations, &mut upload);
+        let made = GpuForest::new(forest, forests.generations, trees_per_buffer, &representations, &mut upload);
         forests.forests.insert(*entity, made);
     }
 }

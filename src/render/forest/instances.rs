@@ -41,8 +41,16 @@ pub fn forest_view(forest: &GpuForest, anchor: DVec3, level: Option<LevelLook>) 
     }
 }
 
-/// Group 1 over a uniform buffer with dynamic offsets and a list of visible trees.
-pub fn instance_bind_group(gpu: &Gpu, forest: &GpuForest, uniform: &Buffer, visible: &Buffer) -> BindGroup {
+/// Group 1 over a uniform buffer with dynamic offsets and a list of visible trees of one page.
+pub fn instance_bind_group(
+    gpu: &Gpu,
+    forest: &GpuForest,
+    page: usize,
+    uniform: &Buffer,
+    visible: &Buffer,
+) -> BindGroup {
+    // A forest without trees has no page; its list is empty too.
+    let trees = forest.tree_buffer(page).unwrap_or(visible);
     gpu.bind_group(
         "canopy_instances",
         &instance_layout(),
@@ -52,7 +60,7 @@ pub fn instance_bind_group(gpu: &Gpu, forest: &GpuForest, uniform: &Buffer, visi
                 offset: 0,
                 size: std::num::NonZeroU64::new(size_of::<ForestViewUniform>() as u64),
             }),
-            forest.trees.as_entire_binding(),
+            trees.as_entire_binding(),
             visible.as_entire_binding(),
             forest.variants.as_entire_binding(),
         )),

@@ -9,11 +9,13 @@
 //! layers each; no motion vectors; one camera.
 
 mod draw;
+mod drawn_trees;
 mod gpu_forest;
 mod instance_layout;
 mod instances;
 mod leaves;
 mod levels;
+mod list_slot;
 mod lists;
 mod pass;
 mod pipelines;
@@ -36,10 +38,12 @@ use super::{
     shaders::CanopyShaders,
 };
 pub use draw::draw_levels;
-pub use gpu_forest::{ForestLevel, GpuForest, GpuForests, most_trees};
+pub use drawn_trees::{DrawnTrees, PageTrees};
+pub use gpu_forest::{ForestLevel, GpuForest, GpuForests, ListTarget, most_trees};
 pub use instance_layout::instance_layout;
 pub use instances::{forest_view, instance_bind_group};
-pub use lists::{ForestStatistics, LevelStatistics};
+pub use list_slot::{ListSlot, ListWork, PreparedPage};
+pub use lists::{ForestStatistics, LevelStatistics, PreparedForests, collect_view_counts};
 pub use pipelines::LevelPipelines;
 pub use representation::Representations;
 pub use uniforms::{

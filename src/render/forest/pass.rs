@@ -18,7 +18,9 @@ use super::{
     pipelines::LevelPipelines,
     representation::LevelTarget,
 };
-use crate::render::{bindings::FrameBindGroup, components::CanopyCamera, view::PreparedFrame};
+use crate::render::{
+    bindings::FrameBindGroup, components::CanopyCamera, frame_work::FrameWork, view::PreparedFrame,
+};
 
 /// Draws every forest into the camera's colour and depth, level by level.
 pub fn forest_pass(
@@ -29,6 +31,7 @@ pub fn forest_pass(
     prepared: Res<PreparedForests>,
     pipelines: Res<LevelPipelines>,
     cache: Res<PipelineCache>,
+    work: Res<FrameWork>,
     mut ctx: RenderContext,
 ) {
     let group = group.of(view.entity());
@@ -55,9 +58,8 @@ pub fn forest_pass(
     pass.set_bind_group(0, group, &[]);
     for (entity, forest) in forests.iter() {
         let Some(lists) = prepared.get(entity) else { continue };
-        draw_levels(&mut pass, forest, &lists.lists, level_target, &pipelines, &cache, |pass, level| {
-            pass.set_bind_group(1, &lists.bind_group, &[PreparedForest::offset(level)]);
-        });
+        let offset = PreparedForest::offset;
+        draw_levels(&mut pass, forest, &lists.pages, level_target, &pipelines, &cache, &work, offset);
     }
     span.end(&mut pass);
 }

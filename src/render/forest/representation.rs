@@ -12,7 +12,7 @@
 //! `examples/box_level.rs` is one with under a hundred lines. Shared code (lists of trees, thresholds, tints,
 //! statistics, reports) iterates over the list and does not refer to any single level.
 
-use std::{ops::Range, sync::Arc};
+use std::sync::Arc;
 
 use bevy::{
     app::App,
@@ -26,7 +26,9 @@ use bevy::{
 };
 use glam::Vec3;
 
+pub use super::drawn_trees::DrawnTrees;
 use super::{instance_layout::instance_layout, transfer::TransferLight};
+pub use crate::render::cull::{TreeDraw, TreeVertices};
 use crate::{
     bake::BakedPlant,
     cull::Grouping,
@@ -104,9 +106,13 @@ pub trait GpuLevel: Send + Sync + 'static {
     /// Triangles of a tree of `variant`.
     fn triangles(&self, variant: usize) -> usize;
 
-    /// Draws the trees in `ranges` (one per variant or a single one, by the renderer's [`Grouping`]) that belong to the
-    /// pipeline of `features`, which is set, as are groups 0 and 1. `visible[range]` are the trees' indices.
-    fn draw<'a>(&'a self, pass: &mut TrackedRenderPass<'a>, features: u32, target: LevelTarget, ranges: &[Range<u32>]);
+    /// Every draw call that [`draw`](Self::draw) may make into `target`, of all pipelines: a group of trees (a variant, or
+    /// 0, by the renderer's [`Grouping`]) and the vertices of each tree. They stay the same while the plants' shapes do.
+    fn draws(&self, target: LevelTarget) -> Vec<TreeDraw>;
+
+    /// Draws those `trees` that belong to the pipeline of `features`, which is set, as are groups 0 and 1, by draw calls
+    /// that [`draws`](Self::draws) lists: how many trees there are is known on the device only.
+    fn draw<'a>(&'a self, pass: &mut TrackedRenderPass<'a>, features: u32, target: LevelTarget, trees: &DrawnTrees<'a>);
 
     /// Overwrites the lighting on the device with that of other bakes of the same shapes.
     fn relight(&mut self, relight: &Relight, upload: &mut ForestUpload);

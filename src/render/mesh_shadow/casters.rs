@@ -16,12 +16,13 @@ use bevy::{
 use glam::{DVec3, Mat4, Vec3, Vec4Swizzles};
 
 use crate::{
-    cull::{DrawLists, Frustum, cull_light_view},
+    cull::{Frustum, Volume},
     render::{
         bindings::{caster_layout, uniforms::CascadeViewUniform},
         extract::ExtractedScene,
-        forest::{GpuForests, forest_view, instance_bind_group},
-        gpu::{self, Gpu, GrowingBuffer, UNIFORM_STRIDE},
+        cull::{CullJobs, ListMaker},
+        forest::{GpuForests, ListSlot, ListTarget, ListWork, PageTrees, PreparedPage, forest_view},
+        gpu::{self, Gpu, UNIFORM_STRIDE},
         report::FrameReport,
         view::PreparedFrame,
     },
@@ -34,10 +35,8 @@ const MAX_VIEWS: usize = 16;
 pub struct CastForest {
     /// Which forest.
     pub entity: Entity,
-    /// Ranges of trees.
-    pub lists: DrawLists,
-    /// Group 1, without a dynamic offset of its own.
-    pub bind_group: BindGroup,
+    /// Its trees, with group 1, whose dynamic offset is 0.
+    pub pages: Vec<PreparedPage>,
 }
 
 /// One of Bevy's maps and its casters.
@@ -51,7 +50,7 @@ pub struct CastView {
 /// Buffers of one forest in one map.
 struct CastBuffers {
     uniform: Buffer,
-    visible: GrowingBuffer,
+    lists: Vec<ListSlot>,
 }
 
 /// The maps of this frame.
@@ -73,6 +72,7 @@ pub fn prepare_mesh_shadows(
     cameras: Query<&ViewLightEntities>,
     lights: Query<(&LightEntity, &ExtractedView)>,
     gpu: Gpu,
+    mut jobs: ResMut<CullJobs>,
     report: Res<FrameReport>,
     mut shadows: ResMut<MeshShadows>,
 ) {
@@ -99,6 +99,8 @@ pub fn prepare_mesh_shadows(
     let uniforms = shadows
         .uniforms
         .get_or_insert_with(|| gpu::uniform_slots(&gpu.device, "canopy_mesh_shadow_views", MAX_VIEWS as u64));
+    // Bevy's maps are drawn anew in every frame, so their lists are made on the processor, where they can be short.
+    let mut work = ListWork { maker: ListMaker::PROCESSOR, gpu: &gpu, jobs: &mut jobs };
     let mut trees = 0;
     for entity in of_camera.lights.iter().copied() {
         let Ok((LightEntity::Directional { .. }, light)) = lights.get(entity) else { continue };
@@ -123,28 +125,27 @@ pub fn prepare_mesh_shadows(
         let frustum = Frustum::new(&clip_from_anchor);
         let mut cast = CastView { entity, forests: Vec::new() };
         for (entity, forest) in forests.iter() {
-            let lists = cull_light_view(
-                &forest.forest.stand,
-                &forest.sizes,
-                anchor - forest.forest.origin,
-                &frustum,
-                DVec3::from(direction),
-                &forest.casting_distances(0.0..scene.shadow.proxy_distance, texel),
-                &forest.groupings,
-            );
-            if lists.visible.is_empty() {
-                continue;
-            }
-            trees += lists.visible.len();
+            let casting = forest.casting_distances(0.0..scene.shadow.proxy_distance, texel);
             let buffers = shadows.buffers.entry((slot, entity)).or_insert_with(|| CastBuffers {
                 uniform: gpu::uniform_slots(&gpu.device, "canopy_mesh_shadow_forest", 1),
-                visible: GrowingBuffer::new(&gpu.device, "canopy_mesh_shadow_casters"),
+                lists: Vec::new(),
             });
             let uniform = forest_view(forest, anchor, None);
-            gpu.queue.write_buffer(&buffers.uniform, 0, bytemuck::bytes_of(&uniform));
-            buffers.visible.write(&gpu.device, &gpu.queue, &lists.visible);
-            let bind_group = instance_bind_group(&gpu, forest, &buffers.uniform, buffers.visible.buffer());
-            cast.forests.push(CastForest { entity, lists, bind_group });
+            gpu.write(&buffers.uniform, 0, bytemuck::bytes_of(&uniform));
+            buffers.lists.resize_with(forest.page_count(), ListSlot::default);
+            let (anchor, direction) = (anchor - forest.forest.origin, DVec3::from(direction));
+            let mut pages = Vec::with_capacity(buffers.lists.len());
+            for (page, slot) in buffers.lists.iter_mut().enumerate() {
+                let Some(drawn) = forest.drawn(page) else { continue };
+                let volume = Volume::light_view(&drawn, anchor, &frustum, direction, &casting);
+                pages.push(slot.prepare(&mut work, forest, page, ListTarget::ShadowMap, &volume, &buffers.uniform));
+            }
+            let listed = |page: &PreparedPage| match &page.trees {
+                PageTrees::Listed(lists) => lists.visible.len(),
+                PageTrees::Indirect { .. } => 0,
+            };
+            trees += pages.iter().map(listed).sum::<usize>();
+            cast.forests.push(CastForest { entity, pages });
         }
         shadows.views.push(cast);
     }

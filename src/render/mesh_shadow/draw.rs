@@ -14,6 +14,7 @@ use super::casters::MeshShadows;
 use crate::render::{
     components::CanopyCamera,
     forest::{GpuForests, LevelPipelines, draw_levels, representation::LevelTarget},
+    frame_work::FrameWork,
     gpu::UNIFORM_STRIDE,
 };
 
@@ -25,6 +26,7 @@ pub fn draw_mesh_shadows(
     maps: Query<&ShadowView>,
     pipelines: Res<LevelPipelines>,
     cache: Res<PipelineCache>,
+    work: Res<FrameWork>,
     mut ctx: RenderContext,
 ) {
     let Some(group) = &shadows.bind_group else { return };
@@ -44,8 +46,7 @@ pub fn draw_mesh_shadows(
         pass.set_bind_group(0, group, &[slot as u32 * UNIFORM_STRIDE as u32]);
         for forest in &cast.forests {
             let Some(of) = forests.get(forest.entity) else { continue };
-            pass.set_bind_group(1, &forest.bind_group, &[0]);
-            draw_levels(&mut pass, of, &forest.lists, LevelTarget::ShadowMap, &pipelines, &cache, |_, _| {});
+            draw_levels(&mut pass, of, &forest.pages, LevelTarget::ShadowMap, &pipelines, &cache, &work, |_| 0);
         }
         span.end(&mut pass);
     }

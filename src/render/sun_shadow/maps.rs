@@ -20,14 +20,15 @@ use bevy::{
 use glam::{DVec3, Mat4};
 
 use crate::{
-    cull::{DrawLists, cascades::CascadeBox},
+    cull::cascades::CascadeBox,
     render::{
         bindings::{
             SHADOW_FORMAT,
             uniforms::{CascadeUniform, MAX_CASCADES},
         },
         components::SunShadowSettings,
-        gpu::{self, GrowingBuffer},
+        forest::{ListSlot, PreparedPage},
+        gpu,
     },
 };
 
@@ -55,10 +56,8 @@ pub struct DrawnCascade {
 pub struct CascadeForest {
     /// Which forest.
     pub entity: Entity,
-    /// Ranges of trees.
-    pub lists: DrawLists,
-    /// Group 1, with the dynamic offset of the cascade.
-    pub bind_group: BindGroup,
+    /// Its trees, with group 1, whose dynamic offset is that of the cascade.
+    pub pages: Vec<PreparedPage>,
 }
 
 /// A cascade that must be drawn in this frame.
@@ -75,8 +74,8 @@ pub struct CascadeWork {
 pub struct CasterBuffers {
     /// One entry per cascade.
     pub uniform: Buffer,
-    /// Indices of the casting trees, one list per cascade.
-    pub visible: Vec<GrowingBuffer>,
+    /// The lists of the casting trees, by cascade and page.
+    pub lists: [Vec<ListSlot>; MAX_CASCADES],
 }
 
 /// The shadow maps and their state.

@@ -26,6 +26,7 @@ use bevy::{
 
 use super::sets::{CanopyPasses, CanopyRenderSystems};
 pub use maps::ShadowMaps;
+pub use redraw::collect_caster_counts;
 
 /// Draws the sun's shadow maps.
 pub struct SunShadowPassPlugin;

@@ -17,6 +17,7 @@ use super::{maps::ShadowMaps, meshes::MeshCasters};
 use crate::render::{
     components::CanopyCamera,
     forest::{GpuForests, LevelPipelines, draw_levels, representation::LevelTarget},
+    frame_work::FrameWork,
     gpu::UNIFORM_STRIDE,
 };
 
@@ -32,7 +33,7 @@ pub fn sun_shadow_pass(
     meshes: Res<RenderAssets<RenderMesh>>,
     allocator: Res<MeshAllocator>,
     cache: Res<PipelineCache>,
-    device: Res<RenderDevice>,
+    (device, frame_work): (Res<RenderDevice>, Res<FrameWork>),
     mut ctx: RenderContext,
 ) {
     let maps = &mut *maps;
@@ -63,8 +64,7 @@ pub fn sun_shadow_pass(
         pass.set_bind_group(0, cascade_group, &[offset]);
         for cast in &work.forests {
             let Some(forest) = forests.get(cast.entity) else { continue };
-            pass.set_bind_group(1, &cast.bind_group, &[offset]);
-            draw_levels(&mut pass, forest, &cast.lists, TARGET, &pipelines, &cache, |_, _| {});
+            draw_levels(&mut pass, forest, &cast.pages, TARGET, &pipelines, &cache, &frame_work, |_| offset);
         }
         let complete =
             mesh_group.as_ref().is_none_or(|group| casters.draw(&mut pass, group, &meshes, &allocator, &cache));

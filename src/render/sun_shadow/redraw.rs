@@ -13,8 +13,8 @@ use super::{
 use crate::{
     cull::{
         SeenShadows,
+        Volume,
         cascades::{CascadeBox, cascade_radii},
-        cull_cascade,
     },
     render::{
         bindings::{
@@ -22,8 +22,9 @@ use crate::{
             uniforms::{CascadeViewUniform, MAX_CASCADES},
         },
         extract::ExtractedScene,
-        forest::{GpuForests, forest_view, instance_bind_group},
-        gpu::{self, Gpu, GrowingBuffer, UNIFORM_STRIDE},
+        cull::{CullJobs, ListMaker},
+        forest::{GpuForests, ListSlot, ListTarget, ListWork, PageTrees, PreparedPage, forest_view},
+        gpu::{self, Gpu, UNIFORM_STRIDE},
         report::FrameReport,
         view::PreparedFrame,
     },
@@ -37,6 +38,7 @@ pub fn prepare_shadows(
     forests: Res<GpuForests>,
     meshes: Res<MeshCasters>,
     gpu: Gpu,
+    (maker, mut jobs): (Res<ListMaker>, ResMut<CullJobs>),
     report: Res<FrameReport>,
     mut maps: ResMut<ShadowMaps>,
 ) {
@@ -44,6 +46,8 @@ pub fn prepare_shadows(
     maps.work.clear();
     maps.cascades.clear();
     maps.casters.retain(|entity, _| forests.get(*entity).is_some());
+    collect(maps, &gpu, &forests);
+    let mut list_work = ListWork { maker: *maker, gpu: &gpu, jobs: &mut jobs };
     let (Some(view), Some(daylight)) = (&frame.view, &scene.daylight) else { return };
     let settings = scene.shadow;
     let light = &daylight.0;
@@ -104,31 +108,39 @@ pub fn prepare_shadows(
             direction: place.direction.as_vec3().to_array(),
             padding: 0.0,
         };
-        gpu.queue.write_buffer(&maps.cascade_uniforms, index as u64 * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));
+        gpu.write(&maps.cascade_uniforms, index as u64 * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));
         let mut work = CascadeWork { index, content, forests: Vec::new() };
         for ((entity, forest), casting) in forests.iter().zip(&casting) {
-            let lists = cull_cascade(
-                &forest.forest.stand,
-                &forest.sizes,
-                forest.forest.origin,
-                &place,
-                casting,
-                &forest.groupings,
-                seen.as_ref(),
-            );
             let buffers = maps.casters.entry(entity).or_insert_with(|| CasterBuffers {
                 uniform: gpu::uniform_slots(&gpu.device, "canopy_caster_views", MAX_CASCADES as u64),
-                visible: (0..MAX_CASCADES).map(|_| GrowingBuffer::new(&gpu.device, "canopy_casters")).collect(),
+                lists: Default::default(),
             });
             let uniform = forest_view(forest, place.center, None);
-            gpu.queue.write_buffer(&buffers.uniform, index as u64 * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));
-            let visible = &mut buffers.visible[index];
-            visible.write(&gpu.device, &gpu.queue, &lists.visible);
-            let bind_group = instance_bind_group(&gpu, forest, &buffers.uniform, visible.buffer());
-            work.forests.push(CascadeForest { entity, lists, bind_group });
+            gpu.write(&buffers.uniform, index as u64 * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));
+            let Some(slots) = buffers.lists.get_mut(index) else { continue };
+            slots.resize_with(forest.page_count(), ListSlot::default);
+            let mut pages = Vec::with_capacity(slots.len());
+            for (page, slot) in slots.iter_mut().enumerate() {
+                let Some(drawn) = forest.drawn(page) else { continue };
+                let volume = Volume::cascade(&drawn, forest.forest.origin, &place, casting, seen.as_ref());
+                pages.push(slot.prepare(
+                    &mut list_work,
+                    forest,
+                    page,
+                    ListTarget::ShadowMap,
+                    &volume,
+                    &buffers.uniform,
+                ));
+            }
+            work.forests.push(CascadeForest { entity, pages });
         }
-        let trees: usize = work.forests.iter().map(|forest| forest.lists.visible.len()).sum();
-        report.ran(name, format!("{trees} trees within {:.0} m", place.radius));
+        let listed = |page: &PreparedPage| match &page.trees {
+            PageTrees::Listed(lists) => Some(lists.visible.len()),
+            PageTrees::Indirect { .. } => None,
+        };
+        let trees: Option<usize> = work.forests.iter().flat_map(|forest| &forest.pages).map(listed).sum();
+        let trees = trees.map_or_else(|| "trees".to_owned(), |count| format!("{count} trees"));
+        report.ran(name, format!("{trees} within {:.0} m", place.radius));
         maps.work.push(work);
     }
     maps.cascade_bind_group = Some(gpu.bind_group(
@@ -140,6 +152,28 @@ pub fn prepare_shadows(
             size: std::num::NonZeroU64::new(size_of::<CascadeViewUniform>() as u64),
         })),
     ));
+}
+
+/// Takes the counts that came back from the device. Maps that were drawn with a list that was too short are drawn again;
+/// `true` if there are any.
+fn collect(maps: &mut ShadowMaps, gpu: &Gpu, forests: &GpuForests) -> bool {
+    let mut short = false;
+    for (entity, buffers) in &mut maps.casters {
+        let Some(forest) = forests.get(*entity) else { continue };
+        for (slots, drawn) in buffers.lists.iter_mut().zip(&mut maps.drawn) {
+            for (page, slot) in slots.iter_mut().enumerate() {
+                if slot.collect(gpu, forest, page, ListTarget::ShadowMap) {
+                    (short, *drawn) = (true, None);
+                }
+            }
+        }
+    }
+    short
+}
+
+/// [`collect_view_counts`](crate::render::forest::collect_view_counts) for the casters.
+pub fn collect_caster_counts(gpu: Gpu, forests: Res<GpuForests>, mut maps: ResMut<ShadowMaps>) -> bool {
+    collect(&mut maps, &gpu, &forests)
 }
 
 /// Height in scene metres below which nothing within `radius` metres of the camera can be in shadow.

@@ -1,7 +1,7 @@
 //! Crossed billboards [Franzke 2005, 4.3]: three planes per tree; one draw call with vertex pulling for the trees of
 //! all variants. The shadow caster is one vertical plane that faces the light's azimuth, and the horizontal one.
 
-use std::{ops::Range, sync::Arc};
+use std::sync::Arc;
 
 use bevy::{
     asset::Handle,
@@ -27,7 +27,9 @@ use crate::{
     render::{
         components::Forest,
         forest::{
-            representation::{ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight},
+            representation::{
+                DrawnTrees, ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight, TreeDraw, TreeVertices,
+            },
             uniforms::{CROSS_CASTER_VERTICES, CROSS_VERTICES, PLANES, cross_variants},
         },
         gpu::{self, Gpu},
@@ -218,6 +220,15 @@ struct DrawnCrosses {
     light_textures: Option<BindGroup>,
 }
 
+/// The one draw call.
+fn all_crosses(target: LevelTarget) -> TreeDraw {
+    let vertices = match target {
+        LevelTarget::View(_) => CROSS_VERTICES,
+        LevelTarget::ShadowMap => CROSS_CASTER_VERTICES,
+    };
+    TreeDraw { group: 0, vertices: TreeVertices::Pulled(vertices) }
+}
+
 impl GpuLevel for GpuCrosses {
     fn features(&self, target: LevelTarget) -> Vec<u32> {
         match (&self.drawn, target) {
@@ -233,18 +244,17 @@ impl GpuLevel for GpuCrosses {
         CROSS_VERTICES as usize / 3
     }
 
-    fn draw<'a>(&'a self, pass: &mut TrackedRenderPass<'a>, _: u32, target: LevelTarget, ranges: &[Range<u32>]) {
-        let Some(drawn) = &self.drawn else { return };
-        let Some(range) = ranges.first().filter(|range| !range.is_empty()) else { return };
+    fn draws(&self, target: LevelTarget) -> Vec<TreeDraw> {
+        self.drawn.iter().map(|_| all_crosses(target)).collect()
+    }
+
+    fn draw<'a>(&'a self, pass: &mut TrackedRenderPass<'a>, _: u32, target: LevelTarget, trees: &DrawnTrees<'a>) {
+        let Some(drawn) = self.drawn.as_ref().filter(|_| !trees.is_empty(0)) else { return };
         pass.set_bind_group(2, &drawn.bind_group, &[]);
-        let vertices = match target {
-            LevelTarget::View(_) => CROSS_VERTICES,
-            LevelTarget::ShadowMap => CROSS_CASTER_VERTICES,
-        };
         if let (LevelTarget::View(_), Some(textures)) = (target, &drawn.light_textures) {
             pass.set_bind_group(3, textures, &[]);
         }
-        pass.draw(range.start * vertices..range.end * vertices, 0..1);
+        trees.draw(pass, all_crosses(target));
     }
 
     fn relight(&mut self, relight: &Relight, upload: &mut ForestUpload) {

@@ -1,7 +1,7 @@
 //! The full model: a plant's parts, instanced, one draw call per variant and part. The shadow caster is the shadow
 //! proxy.
 
-use std::{ops::Range, sync::Arc};
+use std::sync::Arc;
 
 use bevy::{
     asset::Handle,
@@ -32,7 +32,9 @@ use crate::{
     render::{
         components::{Forest, SunLight},
         forest::{
-            representation::{ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight},
+            representation::{
+                DrawnTrees, ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight, TreeDraw, TreeVertices,
+            },
             textures::TextureCache,
             transfer::transfer_layout,
             uniforms::{PartUniform, indirect_light_color, part_uniform},
@@ -257,6 +259,14 @@ struct GpuMesh {
     index_count: u32,
 }
 
+impl GpuMesh {
+    /// The draw call for the trees of `variant`, unless there is nothing to draw.
+    fn draw(&self, variant: usize) -> Option<TreeDraw> {
+        let vertices = TreeVertices::Indexed(self.index_count);
+        (self.index_count > 0).then_some(TreeDraw { group: variant, vertices })
+    }
+}
+
 /// One part of a plant.
 struct GpuPart {
     surface: PartSurface,
@@ -272,6 +282,15 @@ struct GpuPart {
     light: PartLight,
     /// Group 3 of plants that are lit by radiance transfer.
     transfer: Option<BindGroup>,
+}
+
+impl GpuPart {
+    fn mesh(&self, target: LevelTarget) -> &GpuMesh {
+        match target {
+            LevelTarget::View(_) => &self.model,
+            LevelTarget::ShadowMap => &self.proxy,
+        }
+    }
 }
 
 /// The full models of a forest's plants.
@@ -297,25 +316,34 @@ impl GpuLevel for GpuModels {
         self.parts.get(variant).into_iter().flatten().map(|part| part.model.index_count as usize / 3).sum()
     }
 
-    fn draw<'a>(&'a self, pass: &mut TrackedRenderPass<'a>, features: u32, target: LevelTarget, ranges: &[Range<u32>]) {
+    fn draws(&self, target: LevelTarget) -> Vec<TreeDraw> {
+        let of_part = |(variant, part): (usize, &GpuPart)| part.mesh(target).draw(variant);
+        let parts = self.parts.iter().enumerate().flat_map(|(variant, parts)| parts.iter().map(move |part| (variant, part)));
+        parts.filter_map(of_part).collect()
+    }
+
+    fn draw<'a>(
+        &'a self,
+        pass: &mut TrackedRenderPass<'a>,
+        features: u32,
+        target: LevelTarget,
+        trees: &DrawnTrees<'a>,
+    ) {
         let (surface, light) = part_of(features);
-        for (range, parts) in ranges.iter().zip(&self.parts).filter(|(range, _)| !range.is_empty()) {
+        for (variant, parts) in self.parts.iter().enumerate().filter(|(variant, _)| !trees.is_empty(*variant)) {
             for part in parts.iter().filter(|part| part.surface.kind == surface.kind) {
-                let mesh = match target {
-                    LevelTarget::View(_) if (part.surface, part.light) != (surface, light) => continue,
-                    LevelTarget::View(_) => &part.model,
-                    LevelTarget::ShadowMap => &part.proxy,
-                };
-                if mesh.index_count == 0 {
+                if matches!(target, LevelTarget::View(_)) && (part.surface, part.light) != (surface, light) {
                     continue;
                 }
+                let mesh = part.mesh(target);
+                let Some(draw) = mesh.draw(variant) else { continue };
                 if let (LevelTarget::View(_), Some(group)) = (target, &part.transfer) {
                     pass.set_bind_group(3, group, &[]);
                 }
                 pass.set_bind_group(2, &part.bind_group, &[]);
                 pass.set_vertex_buffer(0, mesh.vertices.slice(..));
                 pass.set_index_buffer(mesh.indices.slice(..), IndexFormat::Uint32);
-                pass.draw_indexed(0..mesh.index_count, 0, range.clone());
+                trees.draw(pass, draw);
             }
         }
     }

@@ -1,0 +1,232 @@
+// What a view or a cascade can see, in whole numbers: the same on every device. CPU twin, with the same names:
+// src/cull/volume.rs, which says why and how large the numbers become.
+#define_import_path canopy::volume
+
+#import canopy::constants::{POSITION_STEPS, CELL_BITS, SCALE_SHIFT, SCALE_BITS, MAX_LEVELS, MAX_PLANES}
+#import canopy::constants::{COORDINATE_LIMIT, PLANE_SLACK, ENDLESS_DROP, SQUARE_LIMIT, CLUSTER_KEYS}
+#import canopy::instance::Tree
+
+// A distance on the ground plane: what is nearer has a smaller sum of squares, after the shift.
+struct Ring {
+    shift: u32,
+    square: u32,
+}
+
+struct LevelRange {
+    begin: Ring,
+    end: Ring,
+    first_group: u32,
+    // 1 if its trees are grouped by variant.
+    by_variant: u32,
+}
+
+struct VolumePlane {
+    normal: array<i32, 3>,
+    offset: i32,
+    drop_factor: i32,
+}
+
+struct Volume {
+    anchor_cell: array<i32, 2>,
+    anchor_step: array<i32, 2>,
+    anchor_y: i32,
+    y_scale: f32,
+    shift: u32,
+    size_factor: array<u32, 2>,
+    lowest: i32,
+    first_level_only: u32,
+    whole_levels: u32,
+    along_light: u32,
+    key_normal: array<i32, 3>,
+    key_offset: i32,
+    key_shift: u32,
+    plane_count: u32,
+    level_count: u32,
+    cluster_count: u32,
+    variant_count: u32,
+    limit: Ring,
+    levels: array<LevelRange, MAX_LEVELS>,
+    planes: array<VolumePlane, MAX_PLANES>,
+}
+
+// A run of trees of one cell, and the box around them: src/cull/clusters.rs.
+struct Cluster {
+    cell: u32,
+    first: u32,
+    count: u32,
+    low: array<i32, 2>,
+    high: array<i32, 2>,
+    bottom: f32,
+    top: f32,
+}
+
+// Size of a plant at scale 1 in 1/16 m.
+struct TreeSize {
+    radius: u32,
+    height: u32,
+}
+
+// A box in the units of plane tests.
+struct Bounds {
+    low: vec3<i32>,
+    high: vec3<i32>,
+}
+
+// What is known of a cluster without a look at its trees.
+struct ClusterLook {
+    // 0: no tree of it is drawn.
+    seen: u32,
+    // The level in which all its trees are drawn, plus 1; 0: they are looked at one by one.
+    whole: u32,
+    // Clusters of smaller keys are drawn earlier.
+    key: u32,
+}
+
+@group(0) @binding(0) var<storage, read> volume: Volume;
+
+fn is_beyond(ring: Ring, position: vec2<u32>) -> bool {
+    let shifted = min(position >> vec2(ring.shift), vec2(SQUARE_LIMIT));
+    return shifted.x * shifted.x + shifted.y * shifted.y < ring.square;
+}
+
+// Column and row of a cell, counted from the anchor's.
+fn cell_from_anchor(cell: u32) -> vec2<i32> {
+    let packed_cell = bitcast<i32>(cell);
+    let anchor = vec2(volume.anchor_cell[0], volume.anchor_cell[1]);
+    return vec2(extractBits(packed_cell, 0u, CELL_BITS), extractBits(packed_cell, CELL_BITS, CELL_BITS)) - anchor;
+}
+
+// Steps on the ground from the anchor, of what is `steps` from the corner of its cell.
+fn from_anchor(cell: u32, steps: vec2<i32>) -> vec2<i32> {
+    let anchor = vec2(volume.anchor_step[0], volume.anchor_step[1]);
+    return cell_from_anchor(cell) * i32(POSITION_STEPS) + (steps - anchor);
+}
+
+// A height in its units, relative to the anchor. A product with a power of two is exact.
+fn height_from_anchor(metres: f32) -> i32 {
+    return i32(floor(metres * volume.y_scale)) - volume.anchor_y;
+}
+
+fn cluster_bounds(cluster: Cluster, low: vec2<i32>, high: vec2<i32>) -> Bounds {
+    let west_north = low >> vec2(volume.shift);
+    let east_south = (high >> vec2(volume.shift)) + 1;
+    let bottom = height_from_anchor(cluster.bottom);
+    let top = height_from_anchor(cluster.top) + 1;
+    return Bounds(vec3(west_north.x, bottom, west_north.y), vec3(east_south.x, top, east_south.y));
+}
+
+fn ground_position(tree: Tree) -> vec2<i32> {
+    return from_anchor(tree.cell, vec2(i32(tree.xz & 0xffffu), i32(tree.xz >> 16u)));
+}
+
+// An upper bound of a tree's scale, times 256.
+fn scale_bound(look: u32) -> u32 {
+    let octaves = 8u * extractBits(look, SCALE_SHIFT, SCALE_BITS) + 8u;
+    return (((4096u + (octaves & 4095u)) << (octaves >> 12u)) >> 8u) + 1u;
+}
+
+fn size_units(steps: u32, scale: u32, factor: u32) -> i32 {
+    return i32(((((steps * scale) >> 8u) + 1u) * factor) >> 10u) + 1;
+}
+
+fn tree_bounds(tree: Tree, size: TreeSize, position: vec2<i32>) -> Bounds {
+    let scale = scale_bound(tree.look);
+    let radius = size_units(size.radius, scale, volume.size_factor[0]);
+    let height = size_units(size.height, scale, volume.size_factor[1]);
+    let foot = position >> vec2(volume.shift);
+    let y = height_from_anchor(tree.y);
+    let low = vec3(foot.x - radius, y, foot.y - radius);
+    return Bounds(low, vec3(foot.x + 1 + radius, y + 1 + height, foot.y + 1 + radius));
+}
+
+// The greatest product of a normal with a position in the box.
+fn farthest(normal: vec3<i32>, bounds: Bounds) -> i32 {
+    let product = normal * select(bounds.low, bounds.high, normal >= vec3(0));
+    return product.x + product.y + product.z;
+}
+
+fn clamped(bounds: Bounds) -> Bounds {
+    let limit = vec3(COORDINATE_LIMIT);
+    return Bounds(clamp(bounds.low, -limit, limit), clamp(bounds.high, -limit, limit));
+}
+
+// Whether anything in a box may be inside.
+fn sees(bounds: Bounds) -> bool {
+    let limit = vec3(COORDINATE_LIMIT);
+    if any(bounds.low > limit) || any(bounds.high < -limit) {
+        return false;
+    }
+    let inside = clamped(bounds);
+    let size = max(abs(inside.low), abs(inside.high));
+    let slack = ((size.x + size.y + size.z) >> 1u) + PLANE_SLACK;
+    let drop = max(inside.high.y - volume.lowest, 0);
+    for (var i = 0u; i < volume.plane_count; i++) {
+        let plane = volume.planes[i];
+        let product = farthest(vec3(plane.normal[0], plane.normal[1], plane.normal[2]), inside);
+        let endless = plane.drop_factor > 0 && drop >= ENDLESS_DROP;
+        let value = product + plane.offset + slack + plane.drop_factor * min(drop, ENDLESS_DROP);
+        if !endless && value < 0 {
+            return false;
+        }
+    }
+    return true;
+}
+
+// The levels in which a tree at `position` (steps from the anchor) is drawn, as bits.
+fn levels_at(position: vec2<i32>) -> u32 {
+    let at = vec2<u32>(abs(position));
+    var bits = 0u;
+    for (var i = 0u; i < volume.level_count; i++) {
+        if !is_beyond(volume.levels[i].begin, at) && is_beyond(volume.levels[i].end, at) {
+            bits |= 1u << i;
+        }
+    }
+    return select(bits, bits & (~bits + 1u), volume.first_level_only == 1u);
+}
+
+// The levels in which a tree of `size` is drawn, as bits; none if it is not seen.
+fn levels_of_tree(tree: Tree, size: TreeSize) -> u32 {
+    let position = ground_position(tree);
+    if !is_beyond(volume.limit, vec2<u32>(abs(position))) || !sees(tree_bounds(tree, size, position)) {
+        return 0u;
+    }
+    return levels_at(position);
+}
+
+// A cluster's key: less is drawn earlier.
+fn cluster_key(bounds: Bounds, near: vec2<u32>) -> u32 {
+    if volume.along_light == 1u {
+        let reach = farthest(vec3(volume.key_normal[0], volume.key_normal[1], volume.key_normal[2]), clamped(bounds));
+        return min(u32(max(volume.key_offset - reach, 0)) >> volume.key_shift, CLUSTER_KEYS - 1u);
+    }
+    let shifted = min(near >> vec2(volume.shift + 3u), vec2(SQUARE_LIMIT));
+    let square = (shifted.x * shifted.x + shifted.y * shifted.y) | 1u;
+    // A floating-point number of 7 bits.
+    let exponent = firstLeadingBit(square);
+    return (exponent << 7u) | (((square << (31u - exponent)) >> 24u) & 0x7fu);
+}
+
+fn look_at(cluster: Cluster) -> ClusterLook {
+    let low = from_anchor(cluster.cell, vec2(cluster.low[0], cluster.low[1]));
+    let high = from_anchor(cluster.cell, vec2(cluster.high[0], cluster.high[1]));
+    let near = vec2<u32>(max(max(low, -high), vec2(0)));
+    let far = vec2<u32>(max(abs(low), abs(high)));
+    let bounds = cluster_bounds(cluster, low, high);
+    if !is_beyond(volume.limit, near) || !sees(bounds) {
+        return ClusterLook(0u, 0u, 0u);
+    }
+    var possible = 0u;
+    var certain = 0u;
+    for (var i = 0u; i < volume.level_count; i++) {
+        let level = volume.levels[i];
+        if !is_beyond(level.begin, far) && is_beyond(level.end, near) {
+            possible |= 1u << i;
+        }
+        if !is_beyond(level.begin, near) && is_beyond(level.end, far) {
+            certain |= 1u << i;
+        }
+    }
+    let whole = certain & volume.whole_levels;
+    let sole = is_beyond(volume.limit, far) && whole == possible && countOneBits(whole) == 1u;
+    return ClusterLook(min(possible, 1u), select(0u, countTrailingZeros(whole) + 1u, sole), cluster_key(bounds, near));
+}
