@@ -6,7 +6,7 @@
 //! finished it. The camera moves in every frame. All sizes are in the run, frame after frame, so that sizes can be compared
 //! as well as makers; memory for all of them must be there.
 //!
-//! `cargo bench --bench lists -- --help`; docs/measurements/tree-lists.md has results.
+//! `cargo bench --bench lists -- --help` lists the arguments.
 
 #[path = "peer/field.rs"]
 #[expect(dead_code, reason = "the other benchmark uses the rest")]
@@ -52,8 +52,7 @@ struct Arguments {
     bench: bool,
 }
 
-const MAKERS: [(&str, TreeListMaker); 2] =
-    [("processor", TreeListMaker::Processor), ("device", TreeListMaker::Device)];
+const MAKERS: [(&str, TreeListMaker); 2] = [("processor", TreeListMaker::Processor), ("device", TreeListMaker::Device)];
 
 fn main() -> anyhow::Result<()> {
     let arguments = Arguments::parse();
@@ -89,7 +88,9 @@ fn main() -> anyhow::Result<()> {
             }
         }
     }
-    println!("| trees | sun | lists by | frame, ms: median (least to most) | of the processor's | of the fewest trees |");
+    println!(
+        "| trees | sun | lists by | frame, ms: median (least to most) | of the processor's | of the fewest trees |"
+    );
     println!("|--:|---|---|--:|--:|--:|");
     let medians: Vec<f64> = sides.iter().map(|(.., times)| median(times)).collect();
     for (index, (_, trees, name, ours, times)) in sides.iter().enumerate() {

@@ -100,6 +100,8 @@ const SORT_DIGITS: u32 = 16u;
 // Counters of the digits, those of digit 0 of all threads first.
 var<workgroup> counters: array<u32, SORT_DIGITS * SORT_THREADS>;
 var<workgroup> sums: array<u32, SORT_THREADS>;
+// Trees of a level that are sorted by variant.
+var<workgroup> sorted_count: u32;
 
 // Sum of `value` over the threads before this one [Hillis and Steele 1986].
 fn sum_before(thread: u32, value: u32) -> u32 {
@@ -324,11 +326,17 @@ fn group_trees(@builtin(local_invocation_id) id: vec3<u32>) {
         let start = results[LIST_STARTS + level];
         let count = select(0u, drawn_count(level), exists);
         let sorted = select(0u, count, is_sorted && volume.variant_count > 1u);
-        // Variants have ten bits: four passes, so that the trees are in the list again.
-        sort_trees_by(thread, start, sorted, 0u, true);
-        sort_trees_by(thread, start, sorted, 4u, false);
-        sort_trees_by(thread, start, sorted, 8u, true);
-        sort_trees_by(thread, start, sorted, 12u, false);
+        if thread == 0u {
+            sorted_count = sorted;
+        }
+        // The same for all threads, so that they meet at the barriers.
+        if workgroupUniformLoad(&sorted_count) > 0u {
+            // Variants have ten bits: four passes, so that the trees are in the list again.
+            sort_trees_by(thread, start, sorted, 0u, true);
+            sort_trees_by(thread, start, sorted, 4u, false);
+            sort_trees_by(thread, start, sorted, 8u, true);
+            sort_trees_by(thread, start, sorted, 12u, false);
+        }
         let groups = select(select(0u, 1u, exists), volume.variant_count, is_sorted);
         let ranges = LIST_HEADER + 2u * volume.levels[level].first_group;
         for (var group = thread; group < groups; group += SORT_THREADS) {

@@ -91,9 +91,8 @@ pub fn pages(stand: &PackedStand, sizes: &[PlantSize], most_trees: usize) -> Vec
         let Some(trees) = stand.trees.get(all.clone()) else { continue };
         for (index, group) in trees.chunks(CLUSTER_TREES).enumerate() {
             let first = all.start + index * CLUSTER_TREES;
-            let fits = |page: &Page| {
-                page.trees.len() + group.len() <= most_trees && page.clusters.len() < MOST_CLUSTERS
-            };
+            let fits =
+                |page: &Page| page.trees.len() + group.len() <= most_trees && page.clusters.len() < MOST_CLUSTERS;
             if !pages.last().is_some_and(fits) {
                 let empty = DVec3::INFINITY;
                 pages.push(Page { trees: first..first, clusters: Vec::new(), min: empty, max: -empty });

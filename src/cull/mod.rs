@@ -12,6 +12,7 @@
 
 pub mod cascades;
 pub mod clusters;
+pub mod device_lists;
 mod frustum;
 mod lists;
 mod select;

@@ -120,11 +120,7 @@ mod tests {
     }
 
     /// Lists of all pages, with the first tree of each.
-    fn lists_of(
-        stand: &PackedStand,
-        most_trees: usize,
-        volume: impl Fn(&Drawn) -> Volume,
-    ) -> Vec<(DrawLists, usize)> {
+    fn lists_of(stand: &PackedStand, most_trees: usize, volume: impl Fn(&Drawn) -> Volume) -> Vec<(DrawLists, usize)> {
         let sizes = SIZES.each_ref().map(TreeSize::from);
         pages(stand, &SIZES, most_trees)
             .iter()
@@ -260,8 +256,7 @@ mod tests {
         });
         let stand = PackedStand::new(&Stand { trees: trees.collect() }, 64.0, &SIZES).expect("trees");
         let frustum = Frustum::new(&Mat4::perspective_infinite_reverse_rh(1.0, 1.0, 0.1));
-        let lists =
-            lists_of(&stand, usize::MAX, |drawn| Volume::view(drawn, DVec3::ZERO, &frustum, &levels(), 1e4));
+        let lists = lists_of(&stand, usize::MAX, |drawn| Volume::view(drawn, DVec3::ZERO, &frustum, &levels(), 1e4));
         assert_eq!(lists[0].0.count(0), 0);
         assert_eq!(lists[0].0.count(1), 300);
     }

@@ -70,7 +70,8 @@ impl Ring {
     /// it).
     fn new(metres: f64, step: f64, round: fn(f64) -> f64) -> Self {
         let steps = metres.max(0.0) / step;
-        if !(steps < f64::from(RING_LIMIT) * f64::from(1u32 << 15)) {
+        let told = f64::from(RING_LIMIT) * f64::from(1u32 << 15);
+        if steps.is_nan() || steps >= told {
             return Self::NEVER;
         }
         let mut shift = 0;
@@ -201,6 +202,7 @@ impl Volume {
         let step = grid.size / f64::from(POSITION_STEPS);
         let cell = (anchor / grid.size).floor();
         let cells = IVec2::new(cell.x as i32, cell.z as i32).saturating_sub(grid.base);
+        let near = cells.clamp(IVec2::splat(-FARTHEST_CELL), IVec2::splat(FARTHEST_CELL));
         let inside = |value: f64, cell: f64| ((value / grid.size - cell) * f64::from(POSITION_STEPS)) as i32;
         let mut shift = 0;
         let unit = |shift: u32| step * f64::from(1u32 << shift);
@@ -212,7 +214,7 @@ impl Volume {
         let y_scale = (-unit.log2()).round().exp2();
         let factor = |unit: f64| (1024.0 / (f64::from(SIZE_STEPS) * unit)).ceil() as u32 + 1;
         let mut volume = Self {
-            anchor_cell: cells.clamp(IVec2::splat(-FARTHEST_CELL), IVec2::splat(FARTHEST_CELL)).to_array(),
+            anchor_cell: near.to_array(),
             anchor_step: [inside(anchor.x, cell.x), inside(anchor.z, cell.z)],
             anchor_y: (anchor.y * y_scale).floor().clamp(-1e9, 1e9) as i32,
             y_scale: y_scale as f32,
@@ -221,7 +223,8 @@ impl Volume {
             level_count: drawn.groupings.len().min(MAX_LEVELS) as u32,
             cluster_count: drawn.page.clusters.len() as u32,
             variant_count: drawn.variants as u32,
-            limit: Ring::NEVER,
+            // From so far away nothing is seen, and steps would not fit into a word.
+            limit: if near == cells { Ring::NEVER } else { Ring::default() },
             ..Self::default()
         };
         let mut group = 0;
@@ -268,7 +271,9 @@ impl Volume {
         let farthest = (drawn.page.min - camera).abs().max((drawn.page.max - camera).abs()).length();
         let range = farthest.min(f64::from(view_distance) + (drawn.page.max - drawn.page.min).y);
         let (mut volume, unit, y_unit) = Self::around(camera, range, drawn);
-        volume.limit = Ring::new(view_distance.into(), step, f64::round);
+        if volume.limit == Ring::NEVER {
+            volume.limit = Ring::new(view_distance.into(), step, f64::round);
+        }
         for (index, level) in volume.levels.iter_mut().enumerate().take(drawn.groupings.len()) {
             // Coordinates are rounded down, by less than a unit each. A tree near the end of a band is listed if in doubt;
             // its alpha test decides.

@@ -4,8 +4,8 @@ use std::sync::{Arc, Mutex};
 
 use bevy::render::{
     render_resource::{
-        Buffer, BufferAsyncError, BufferDescriptor, BufferUsages, CommandEncoderDescriptor, Extent3d, MapMode, PollType,
-        TexelCopyBufferInfo, TexelCopyBufferLayout, Texture,
+        Buffer, BufferAsyncError, BufferDescriptor, BufferUsages, CommandEncoderDescriptor, Extent3d, MapMode,
+        PollType, TexelCopyBufferInfo, TexelCopyBufferLayout, Texture,
     },
     renderer::{RenderDevice, RenderQueue},
 };

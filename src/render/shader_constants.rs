@@ -7,7 +7,6 @@ use std::fmt::Write as _;
 
 use super::{
     bindings::uniforms,
-    cull,
     forest::{transfer, uniforms as forest},
 };
 use crate::{
@@ -15,7 +14,7 @@ use crate::{
         levels::cross,
         lighting::{AmbientTerm, implicit::packing},
     },
-    cull::{clusters, volume},
+    cull::{clusters, device_lists, volume},
     light::{atmosphere::SkyView, night, stand},
     lod,
     scatter::packed,
@@ -89,11 +88,11 @@ pub fn constants() -> Vec<(&'static str, &'static str, Value)> {
         ("SQUARE_LIMIT", "Largest coordinate that is squared.", volume::SQUARE_LIMIT.into()),
         ("CLUSTER_KEYS", "Keys of clusters lie below this.", volume::KEYS.into()),
         ("CLUSTER_BITS", "Bits of a cluster's index, below its key.", clusters::CLUSTER_BITS.into()),
-        ("SORT_THREADS", "Threads of the workgroup that sorts.", cull::SORT_THREADS.into()),
-        ("TEST_THREADS", "Threads of a workgroup that looks at clusters.", cull::TEST_THREADS.into()),
-        ("LIST_STARTS", "Word of the results at which the levels' starts lie.", uint(cull::STARTS)),
-        ("LIST_TOTALS", "The same of their numbers of trees.", uint(cull::TOTALS)),
-        ("LIST_HEADER", "Words before the ranges of the groups.", uint(cull::HEADER)),
+        ("SORT_THREADS", "Threads of the workgroup that sorts.", device_lists::SORT_THREADS.into()),
+        ("TEST_THREADS", "Threads of a workgroup that looks at clusters.", device_lists::TEST_THREADS.into()),
+        ("LIST_STARTS", "Word of the results at which the levels' starts lie.", uint(device_lists::STARTS)),
+        ("LIST_TOTALS", "The same of their numbers of trees.", uint(device_lists::TOTALS)),
+        ("LIST_HEADER", "Words before the ranges of the groups.", uint(device_lists::HEADER)),
         ("AMBIENT_FITTED", "Leaves that are lit by k_a with fitted constants.", (AmbientTerm::Fitted as u32).into()),
         ("AMBIENT_PUBLISHED", "Leaves that are lit by k_a as published.", (AmbientTerm::Published as u32).into()),
         ("PLANES", "Planes of a cross.", uint(forest::PLANES)),

@@ -10,12 +10,15 @@ use bytemuck::{Pod, Zeroable};
 
 use super::{
     draws::DrawTable,
-    pass::{CullJob, CullJobs},
-    pipelines::{HEADER, TEST_THREADS, list_layout},
+    pass::{CountCopy, CullJob, CullJobs},
+    pipelines::list_layout,
     readback::Readback,
 };
 use crate::{
-    cull::{Grouping, Volume},
+    cull::{
+        Grouping, Volume,
+        device_lists::{HEADER, TEST_THREADS},
+    },
     render::gpu::Gpu,
 };
 
@@ -101,7 +104,7 @@ impl TreeList {
     pub fn new(gpu: &Gpu, sources: &ListSources) -> Option<Self> {
         let sorted = sources.variants > 1 && sources.groupings.contains(&Grouping::ByVariant);
         let room = ListRoom {
-            capacity: (sources.tree_count / 4).max(FIRST_CAPACITY).min(2 * sources.tree_count.max(32)) as u32,
+            capacity: (sources.tree_count / 4).max(FIRST_CAPACITY).min(sources.tree_count.max(64)) as u32,
             staging: if sorted { FIRST_STAGING.min(sources.tree_count) as u32 } else { 0 },
             group_count: sources.groups() as u32,
             draw_count: sources.table.len() as u32,
@@ -148,6 +151,14 @@ impl TreeList {
     /// The arguments of the draw calls, and the first byte of them.
     pub fn arguments(&self) -> (&Buffer, u64) {
         (&self.results, 4 * (HEADER as u64 + 2 * u64::from(self.room.group_count)))
+    }
+
+    /// Bytes of its buffers.
+    pub fn bytes(&self) -> u64 {
+        [&self.volume, &self.room_buffer, &self.work, &self.list, &self.results]
+            .map(|buffer| buffer.size())
+            .iter()
+            .sum()
     }
 
     /// The volume that it was made for last.
@@ -210,7 +221,12 @@ impl TreeList {
             self.held = Some(*volume);
         }
         let bytes = 4 * (HEADER as u64 + 2 * u64::from(self.room.group_count));
-        let copy = self.readback.begin().map(|target| (self.results.clone(), bytes, self.readback.clone(), target.clone()));
+        let copy = self.readback.begin().map(|target| CountCopy {
+            results: self.results.clone(),
+            bytes,
+            target: target.clone(),
+            readback: self.readback.clone(),
+        });
         self.counted = copy.is_some();
         jobs.0.push(CullJob { bind_group: self.bind_group.clone(), clusters: volume.cluster_count, copy });
     }
@@ -224,8 +240,8 @@ fn buffers(gpu: &Gpu, sources: &ListSources, room: &ListRoom) -> Option<(Buffer,
     let bytes = [work, u64::from(room.capacity)].map(|words| 4 * words.max(1));
     let largest = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
     let groups = clusters.div_ceil(TEST_THREADS.into());
-    let fits = bytes.iter().all(|bytes| *bytes <= largest)
-        && groups <= limits.max_compute_workgroups_per_dimension.into();
+    let fits =
+        bytes.iter().all(|bytes| *bytes <= largest) && groups <= limits.max_compute_workgroups_per_dimension.into();
     let create = |label, size, usage| {
         gpu.buffer(&BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
     };

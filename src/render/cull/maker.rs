@@ -12,8 +12,11 @@ use bevy::{
 };
 use wgpu::{DeviceType, DownlevelFlags};
 
-use super::pipelines::{ListPipelines, STORAGE_BUFFERS, WORKGROUP_BYTES, SORT_THREADS};
-use crate::render::{components::TreeListMaker, extract::ExtractedScene, report::FrameReport, shaders::CanopyShaders};
+use super::pipelines::{ListPipelines, STORAGE_BUFFERS, WORKGROUP_BYTES};
+use crate::{
+    cull::device_lists::SORT_THREADS,
+    render::{components::TreeListMaker, extract::ExtractedScene, report::FrameReport, shaders::CanopyShaders},
+};
 
 /// Where this frame's lists of trees are made.
 #[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,7 +69,7 @@ pub fn choose_maker(
     let asked = match scene.tree_lists.maker {
         TreeListMaker::Processor => Some("the program asks for it"),
         TreeListMaker::Automatic if info.device_type == DeviceType::Cpu => {
-            Some("this device is a software driver, which makes them no faster")
+            Some("this device is a software driver, for which the processor is the default")
         }
         TreeListMaker::Automatic | TreeListMaker::Device => None,
     };

@@ -40,8 +40,8 @@ use super::{frame_work::FrameWork, sets::CanopyRenderSystems};
 pub use draws::{DrawTable, TreeDraw, TreeDrawWords, TreeVertices};
 pub use list::{ListCounts, ListRoom, ListSources, TreeList};
 pub use maker::{ListMaker, unavailable};
-pub use pass::{CullJob, CullJobs};
-pub use pipelines::{HEADER, SORT_THREADS, STARTS, TEST_THREADS, TOTALS};
+pub use pass::{CountCopy, CullJob, CullJobs};
+pub use readback::Readback;
 
 /// Makes lists of trees on the device.
 pub struct CullPlugin;
@@ -56,10 +56,7 @@ impl Plugin for CullPlugin {
             .init_gpu_resource::<pipelines::ListPipelines>()
             .add_systems(
                 Render,
-                (
-                    maker::choose_maker.in_set(CanopyRenderSystems::View),
-                    pass::read_back.in_set(RenderSystems::Cleanup),
-                ),
+                (maker::choose_maker.in_set(CanopyRenderSystems::View), pass::read_back.in_set(RenderSystems::Cleanup)),
             )
             .add_systems(RenderGraph, pass::make_lists.before(camera_driver));
     }

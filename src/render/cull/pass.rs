@@ -11,11 +11,8 @@ use bevy::{
     },
 };
 
-use super::{
-    pipelines::{ListPipelines, TEST_THREADS},
-    readback::Readback,
-};
-use crate::render::frame_work::FrameWork;
+use super::{pipelines::ListPipelines, readback::Readback};
+use crate::{cull::device_lists::TEST_THREADS, render::frame_work::FrameWork};
 
 /// A list to make in this frame.
 pub struct CullJob {
@@ -23,9 +20,20 @@ pub struct CullJob {
     pub bind_group: BindGroup,
     /// Number of clusters.
     pub clusters: u32,
-    /// Where the header and the ranges are copied from, how many bytes, and where to; `None` while an earlier copy is on
-    /// its way.
-    pub copy: Option<(Buffer, u64, Readback, Buffer)>,
+    /// The copy of its counts; `None` while an earlier one is on its way.
+    pub copy: Option<CountCopy>,
+}
+
+/// A copy of the counts of a list, for the processor.
+pub struct CountCopy {
+    /// The results of the list.
+    pub results: Buffer,
+    /// How many bytes of them.
+    pub bytes: u64,
+    /// Where to.
+    pub target: Buffer,
+    /// Who reads it.
+    pub readback: Readback,
 }
 
 /// The lists to make in this frame.
@@ -42,10 +50,8 @@ pub fn make_lists(
 ) {
     let Some(pipelines) = pipelines.ready(&cache).filter(|_| !jobs.0.is_empty()) else { return };
     let encoder = ctx.command_encoder();
-    let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor {
-        label: Some("canopy_tree_lists"),
-        timestamp_writes: None,
-    });
+    let mut pass =
+        encoder.begin_compute_pass(&ComputePassDescriptor { label: Some("canopy_tree_lists"), timestamp_writes: None });
     for (step, pipeline) in pipelines.into_iter().enumerate() {
         pass.set_pipeline(pipeline);
         for job in &jobs.0 {
@@ -57,8 +63,8 @@ pub fn make_lists(
         }
     }
     drop(pass);
-    for (results, bytes, _, target) in jobs.0.iter().filter_map(|job| job.copy.as_ref()) {
-        encoder.copy_buffer_to_buffer(results, 0, target, 0, *bytes);
+    for copy in jobs.0.iter().filter_map(|job| job.copy.as_ref()) {
+        encoder.copy_buffer_to_buffer(&copy.results, 0, &copy.target, 0, copy.bytes);
         FrameWork::add(&work.commands, 1);
     }
 }
@@ -66,8 +72,8 @@ pub fn make_lists(
 /// Asks for the copies of the frame that was submitted.
 pub fn read_back(mut jobs: ResMut<CullJobs>) {
     for job in jobs.0.drain(..) {
-        if let Some((_, _, readback, _)) = job.copy {
-            readback.map();
+        if let Some(copy) = job.copy {
+            copy.readback.map();
         }
     }
 }

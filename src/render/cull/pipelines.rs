@@ -11,25 +11,14 @@ use bevy::{
 
 use super::list::ListRoom;
 use crate::{
-    lod::MAX_LEVELS,
+    cull::device_lists::SORT_THREADS,
     render::shaders::{CanopyShaders, ShaderFile},
 };
 
-/// Threads of the workgroup that sorts.
-pub const SORT_THREADS: u32 = 128;
-/// Threads of a workgroup that looks at clusters.
-pub const TEST_THREADS: u32 = 64;
 /// Storage buffers of the compute stage.
 pub const STORAGE_BUFFERS: u32 = 8;
-/// Bytes that a workgroup shares: 16 counters and a sum for each thread.
-pub const WORKGROUP_BYTES: u32 = 17 * SORT_THREADS * 4;
-/// Word of the results at which the starts of the levels lie.
-pub const STARTS: usize = 4;
-/// The same of their numbers of trees.
-pub const TOTALS: usize = STARTS + MAX_LEVELS;
-/// Words before the ranges of the groups.
-pub const HEADER: usize = TOTALS + MAX_LEVELS;
-
+/// Bytes that a workgroup shares: 16 counters and a sum for each thread, and one number more.
+pub const WORKGROUP_BYTES: u32 = 4 * (17 * SORT_THREADS + 1);
 /// Entry points of `shaders/cull/lists.wgsl`, in their order.
 const STEPS: [&str; 4] = ["test_clusters", "sort_clusters", "write_trees", "group_trees"];
 

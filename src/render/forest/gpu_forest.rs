@@ -115,6 +115,12 @@ impl GpuForest {
         self.pages.get(page).map(|page| &page.trees)
     }
 
+    /// Bytes of the trees, and of what lists on the device are made from.
+    pub fn tree_bytes(&self) -> u64 {
+        let of_page = |page: &GpuPage| page.trees.size() + page.clusters.get().map_or(0, |clusters| clusters.size());
+        self.pages.iter().map(of_page).sum()
+    }
+
     /// A page and its trees.
     pub fn page_trees(&self, page: usize) -> Option<(&Page, &[PackedTree])> {
         let page = &self.pages.get(page)?.page;
@@ -135,9 +141,9 @@ impl GpuForest {
         let upload = || gpu.filled_buffer("canopy_clusters", storage, &page.page.clusters);
         let sizes = || gpu.filled_buffer("canopy_tree_sizes", storage, &self.tree_sizes);
         let draws = |target: LevelTarget| {
-            let calls = self.levels().flat_map(|(index, level)| {
-                level.gpu.draws(target).into_iter().map(move |draw| (index, draw))
-            });
+            let calls = self
+                .levels()
+                .flat_map(|(index, level)| level.gpu.draws(target).into_iter().map(move |draw| (index, draw)));
             Arc::new(DrawTable::new(gpu, &self.groupings, self.sizes.len(), calls))
         };
         let table = match target {

@@ -13,6 +13,7 @@ use crate::{
         cull::{CullJobs, ListCounts, ListMaker, TreeList},
         frame_work::FrameWork,
         gpu::{Gpu, GrowingBuffer},
+        report::FrameReport,
     },
 };
 
@@ -32,6 +33,8 @@ pub struct ListWork<'a, 'w> {
     pub gpu: &'a Gpu<'w>,
     /// What the device makes in this frame.
     pub jobs: &'a mut CullJobs,
+    /// Is told where the device's buffers are too small.
+    pub report: &'a FrameReport,
 }
 
 /// The buffers of one list.
@@ -81,6 +84,10 @@ impl ListSlot {
             && let Some(prepared) = self.prepare_on_device(work, forest, page, target, volume, uniform)
         {
             return prepared;
+        }
+        if work.maker.why_processor.is_none() {
+            work.report
+                .ran("tree lists", "some are made on the processor: this device's buffers are too small for them");
         }
         self.list = None;
         self.prepare_on_processor(work.gpu, forest, page, volume, uniform)

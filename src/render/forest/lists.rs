@@ -165,7 +165,7 @@ pub fn prepare_view_lists(
     prepared.0.retain(|entity, _| order.contains(entity));
     *statistics = ForestStatistics::default();
     let Some(view) = &frame.view else { return };
-    let mut work = ListWork { maker: *maker, gpu: &gpu, jobs: &mut jobs };
+    let mut work = ListWork { maker: *maker, gpu: &gpu, jobs: &mut jobs, report: &report };
     for (entity, forest) in forests.iter() {
         let settings = &forest.forest;
         let camera = view.camera - settings.origin;

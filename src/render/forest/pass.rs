@@ -18,9 +18,7 @@ use super::{
     pipelines::LevelPipelines,
     representation::LevelTarget,
 };
-use crate::render::{
-    bindings::FrameBindGroup, components::CanopyCamera, frame_work::FrameWork, view::PreparedFrame,
-};
+use crate::render::{bindings::FrameBindGroup, components::CanopyCamera, frame_work::FrameWork, view::PreparedFrame};
 
 /// Draws every forest into the camera's colour and depth, level by level.
 pub fn forest_pass(

@@ -19,8 +19,8 @@ use crate::{
     cull::{Frustum, Volume},
     render::{
         bindings::{caster_layout, uniforms::CascadeViewUniform},
-        extract::ExtractedScene,
         cull::{CullJobs, ListMaker},
+        extract::ExtractedScene,
         forest::{GpuForests, ListSlot, ListTarget, ListWork, PageTrees, PreparedPage, forest_view},
         gpu::{self, Gpu, UNIFORM_STRIDE},
         report::FrameReport,
@@ -100,7 +100,7 @@ pub fn prepare_mesh_shadows(
         .uniforms
         .get_or_insert_with(|| gpu::uniform_slots(&gpu.device, "canopy_mesh_shadow_views", MAX_VIEWS as u64));
     // Bevy's maps are drawn anew in every frame, so their lists are made on the processor, where they can be short.
-    let mut work = ListWork { maker: ListMaker::PROCESSOR, gpu: &gpu, jobs: &mut jobs };
+    let mut work = ListWork { maker: ListMaker::PROCESSOR, gpu: &gpu, jobs: &mut jobs, report: &report };
     let mut trees = 0;
     for entity in of_camera.lights.iter().copied() {
         let Ok((LightEntity::Directional { .. }, light)) = lights.get(entity) else { continue };

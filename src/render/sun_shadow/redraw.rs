@@ -12,8 +12,7 @@ use super::{
 };
 use crate::{
     cull::{
-        SeenShadows,
-        Volume,
+        SeenShadows, Volume,
         cascades::{CascadeBox, cascade_radii},
     },
     render::{
@@ -21,8 +20,8 @@ use crate::{
             SharedPlacement, SharedTextures, caster_layout,
             uniforms::{CascadeViewUniform, MAX_CASCADES},
         },
-        extract::ExtractedScene,
         cull::{CullJobs, ListMaker},
+        extract::ExtractedScene,
         forest::{GpuForests, ListSlot, ListTarget, ListWork, PageTrees, PreparedPage, forest_view},
         gpu::{self, Gpu, UNIFORM_STRIDE},
         report::FrameReport,
@@ -47,7 +46,7 @@ pub fn prepare_shadows(
     maps.cascades.clear();
     maps.casters.retain(|entity, _| forests.get(*entity).is_some());
     collect(maps, &gpu, &forests);
-    let mut list_work = ListWork { maker: *maker, gpu: &gpu, jobs: &mut jobs };
+    let mut list_work = ListWork { maker: *maker, gpu: &gpu, jobs: &mut jobs, report: &report };
     let (Some(view), Some(daylight)) = (&frame.view, &scene.daylight) else { return };
     let settings = scene.shadow;
     let light = &daylight.0;

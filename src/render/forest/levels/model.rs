@@ -318,7 +318,8 @@ impl GpuLevel for GpuModels {
 
     fn draws(&self, target: LevelTarget) -> Vec<TreeDraw> {
         let of_part = |(variant, part): (usize, &GpuPart)| part.mesh(target).draw(variant);
-        let parts = self.parts.iter().enumerate().flat_map(|(variant, parts)| parts.iter().map(move |part| (variant, part)));
+        let parts =
+            self.parts.iter().enumerate().flat_map(|(variant, parts)| parts.iter().map(move |part| (variant, part)));
         parts.filter_map(of_part).collect()
     }
 
