@@ -86,6 +86,7 @@ pub fn constants() -> Vec<(&'static str, &'static str, Value)> {
         ("CASTER_VERTICES", "Vertices of a tree's cross as a caster.", forest::CROSS_CASTER_VERTICES.into()),
         ("ISOTROPIC_LEVELS", "Mips for which the isotropic fraction is known.", uint(cross::ISOTROPIC_LEVELS)),
         ("ISOTROPIC_VECTORS", "Vectors of four of them.", uint(cross::ISOTROPIC_LEVELS / 4)),
+        ("SUN_SCALE", "Scale of the crosses' sun textures: the value of 1.", cross::SUN_SCALE.into()),
         ("LIGHT_SCALE", "Scale of lighting textures: the value of 1.", cross::LIGHT_SCALE.into()),
         ("NORMAL_STEPS", "Steps of a packed normal on either side of 0.", packing::STEPS.into()),
         ("NORMAL_LEAST_LENGTH", "Its length where the ambient visibility is 0.", packing::LEAST_LENGTH.into()),

@@ -65,7 +65,7 @@ mod shared {
     }
 }
 
-type Bake = fn(&Plant, &BakedLighting, &BakeSettings) -> BakedLevel;
+type Bake = fn(&Arc<Plant>, &BakedLighting, &BakeSettings) -> BakedLevel;
 
 /// The representations that need a bake, and the functions that bake them.
 const BAKERS: [(Representation, Bake); 2] =
@@ -83,18 +83,18 @@ pub const BAKED: &[Representation] = &{
 };
 
 /// Bakes `plant` under `lighting` for the representations that `settings` list; one that needs no bake is passed over.
-pub fn bake_levels(plant: &Plant, lighting: &BakedLighting, settings: &BakeSettings) -> Vec<BakedLevel> {
+pub fn bake_levels(plant: &Arc<Plant>, lighting: &BakedLighting, settings: &BakeSettings) -> Vec<BakedLevel> {
     let listed = |(representation, _): &&(Representation, Bake)| settings.representations.contains(representation);
     BAKERS.iter().filter(listed).map(|(_, bake)| bake(plant, lighting, settings)).collect()
 }
 
-fn bake_proxy(plant: &Plant, _: &BakedLighting, settings: &BakeSettings) -> BakedLevel {
+fn bake_proxy(plant: &Arc<Plant>, _: &BakedLighting, settings: &BakeSettings) -> BakedLevel {
     let triangles: usize = plant.parts.iter().map(|part| part.mesh.triangles.len()).sum();
     let target = (triangles as f64 * f64::from(settings.shadow_share)).round() as usize;
     BakedLevel::ShadowProxy(Arc::new(shadow_proxy::shadow_proxy(plant, target)))
 }
 
-fn bake_crosses(plant: &Plant, lighting: &BakedLighting, settings: &BakeSettings) -> BakedLevel {
+fn bake_crosses(plant: &Arc<Plant>, lighting: &BakedLighting, settings: &BakeSettings) -> BakedLevel {
     BakedLevel::Cross(Arc::new(cross::bake_cross(plant, lighting, &settings.cross)))
 }
 
@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn each_baker_makes_the_level_of_its_representation() {
-        let (plant, settings) = (Plant::default(), BakeSettings::default());
+        let (plant, settings) = (Arc::new(Plant::default()), BakeSettings::default());
         let made = bake_levels(&plant, &BakedLighting::Local, &settings);
         let names: Vec<_> = made.iter().map(BakedLevel::representation).collect();
         assert_eq!(names, BAKERS.map(|(representation, _)| representation));

@@ -79,7 +79,7 @@ fn has_light(plant: &BakedPlant) -> bool {
     plant.cross().is_some_and(|cross| !cross.textures.light.is_empty())
 }
 
-/// Group 2: colours, properties, sampler, and the data of each plant's crosses.
+/// Group 2: colours, properties, sampler, the data of each plant's crosses, and the light of the sun.
 fn cross_layout() -> BindGroupLayoutDescriptor {
     let float = TextureSampleType::Float { filterable: true };
     BindGroupLayoutDescriptor::new(
@@ -91,6 +91,7 @@ fn cross_layout() -> BindGroupLayoutDescriptor {
                 texture_2d_array(float),
                 sampler(SamplerBindingType::Filtering),
                 storage_buffer_read_only_sized(false, None).visibility(ShaderStages::VERTEX_FRAGMENT),
+                texture_2d_array(float),
             ),
         ),
     )
@@ -135,19 +136,21 @@ impl LevelRenderer for CrossRenderer {
                 plant.plant.name
             );
         }
-        let (layers, limit) = (plants.len() * PLANES, upload.gpu.device.limits().max_texture_array_layers as usize);
+        let (layers, limit) =
+            (plants.len() * PLANES * SUN_LAYERS, upload.gpu.device.limits().max_texture_array_layers as usize);
         if layers > limit {
             error!(
                 "a forest's {} plants need {layers} texture layers for their crossed billboards, but this device has at \
                  most {limit}: they are not drawn so; use at most {} plants in a forest, or another list of levels",
                 plants.len(),
-                limit / PLANES
+                limit / (PLANES * SUN_LAYERS)
             );
             return Box::new(GpuCrosses { drawn: None });
         }
-        let (properties, variants, bind_group) = upload_textures(plants, upload.gpu);
+        let (properties, sun, variants, bind_group) = upload_textures(plants, upload.gpu);
         let (light, light_textures) = (CrossLight::of(plants), upload_light(plants, upload.gpu));
-        Box::new(GpuCrosses { drawn: Some(DrawnCrosses { properties, variants, bind_group, light, light_textures }) })
+        let drawn = DrawnCrosses { properties, sun, variants, bind_group, light, light_textures };
+        Box::new(GpuCrosses { drawn: Some(drawn) })
     }
 
     fn same_shape(&self, old: &BakedPlant, new: &BakedPlant) -> bool {
@@ -208,6 +211,8 @@ struct GpuCrosses {
 struct DrawnCrosses {
     /// Normals, ambient occlusion (k_a) and foliage, three layers per variant.
     properties: Texture,
+    /// The light of the sun, six layers per variant.
+    sun: Texture,
     /// [`CrossVariantUniform`](crate::render::forest::CrossVariantUniform)s.
     variants: Buffer,
     /// Group 2.
@@ -255,8 +260,13 @@ impl GpuLevel for GpuCrosses {
         };
         let pairs = || relight.old.iter().zip(relight.new);
         for (index, (_, new)) in pairs().enumerate().filter(|(_, pair)| changed(pair)) {
-            for (plane, chain) in new.cross().into_iter().flat_map(|cross| &cross.textures.properties).enumerate() {
+            let Some(cross) = new.cross() else { continue };
+            for (plane, chain) in cross.textures.properties.iter().enumerate() {
                 gpu::write_layer(&upload.gpu.queue, &drawn.properties, (index * PLANES + plane) as u32, &chain.view());
+            }
+            for (layer, chain) in cross.textures.sun.iter().enumerate() {
+                let layer = (index * PLANES * SUN_LAYERS + layer) as u32;
+                gpu::write_layer(&upload.gpu.queue, &drawn.sun, layer, &chain.view());
             }
         }
         upload.gpu.queue.write_buffer(&drawn.variants, 0, bytemuck::cast_slice(&cross_variants(relight.new)));
@@ -268,28 +278,33 @@ impl GpuLevel for GpuCrosses {
     }
 }
 
-/// Three layers per plant of the textures that `of` takes from a cross. A plant without a cross gets those of another
+/// Layers of the sun's light per plane.
+const SUN_LAYERS: usize = 2;
+
+/// `count` layers per plant of the textures that `of` takes from a cross. A plant without a cross gets those of another
 /// one; its planes have no extent, so they are never seen.
-fn layers(plants: &[BakedPlant], of: fn(&Cross) -> &[MipChain]) -> Vec<MipView<'_>> {
+fn layers(plants: &[BakedPlant], count: usize, of: fn(&Cross) -> &[MipChain]) -> Vec<MipView<'_>> {
     let crosses = || plants.iter().filter_map(BakedPlant::cross);
     let Some(blank) = crosses().find_map(|cross| of(cross).first()) else { return Vec::new() };
-    let mut all = Vec::with_capacity(plants.len() * PLANES);
+    let mut all = Vec::with_capacity(plants.len() * count);
     for plant in plants {
         let own = plant.cross().map_or(&[][..], |cross| of(cross));
-        all.extend((0..PLANES).map(|plane| own.get(plane).unwrap_or(blank).view()));
+        all.extend((0..count).map(|layer| own.get(layer).unwrap_or(blank).view()));
     }
     all
 }
 
-/// The property texture of all crosses, the data of each plant's crosses, and their bind group.
-fn upload_textures(plants: &[BakedPlant], gpu: &Gpu) -> (Texture, Buffer, BindGroup) {
-    let colors = layers(plants, |cross| &cross.textures.color);
-    let properties = layers(plants, |cross| &cross.textures.properties);
+/// The textures of all crosses' properties and of the sun's light, the data of each plant's crosses, and their bind group.
+fn upload_textures(plants: &[BakedPlant], gpu: &Gpu) -> (Texture, Texture, Buffer, BindGroup) {
+    let colors = layers(plants, PLANES, |cross| &cross.textures.color);
+    let properties = layers(plants, PLANES, |cross| &cross.textures.properties);
+    let sun = layers(plants, PLANES * SUN_LAYERS, |cross| &cross.textures.sun);
     let upload = |label: &str, format: TextureFormat, layers: &[MipView]| {
         gpu::texture_array(&gpu.device, &gpu.queue, label, format, layers, gpu::SMALLEST_TESTED_MIP)
     };
     let (_, colors) = upload("canopy_cross_color", TextureFormat::Rgba8UnormSrgb, &colors);
-    let (texture, properties) = upload("canopy_cross_properties", TextureFormat::Rgba8Unorm, &properties);
+    let (property_texture, properties) = upload("canopy_cross_properties", TextureFormat::Rgba8Unorm, &properties);
+    let (sun_texture, sun) = upload("canopy_cross_sun", TextureFormat::Rgba8Snorm, &sun);
     let sampler = gpu.device.create_sampler(&SamplerDescriptor {
         label: Some("canopy_cross"),
         address_mode_u: AddressMode::ClampToEdge,
@@ -304,9 +319,9 @@ fn upload_textures(plants: &[BakedPlant], gpu: &Gpu) -> (Texture, Buffer, BindGr
     let bind_group = gpu.bind_group(
         "canopy_cross",
         &cross_layout(),
-        &BindGroupEntries::sequential((&colors, &properties, &sampler, variants.as_entire_binding())),
+        &BindGroupEntries::sequential((&colors, &properties, &sampler, variants.as_entire_binding(), &sun)),
     );
-    (texture, variants, bind_group)
+    (property_texture, sun_texture, variants, bind_group)
 }
 
 /// The lighting textures, of those plants that have them.
