@@ -2,7 +2,7 @@
 #import canopy::constants::{CROSS_VERTICES, PLANES, ISOTROPIC_LEVELS, LIGHT_SCALE, SUN_SCALE, WHOLE, FADE_SPAN, GONE}
 #import canopy::cross_variant::cross_variants
 #import canopy::frame::{frame, light}
-#import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published}
+#import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, Crown, crown_of, depth_in_crown}
 #import canopy::lighting::{Surface, shade_leaves, even_sky, leaf_transmission}
 #import canopy::output::finish
 #import canopy::sky::sky_transfer
@@ -30,10 +30,9 @@ struct Varying {
     @location(7) @interpolate(flat) front: vec3<f32>,
     // A packed `Look`.
     @location(5) look: vec4<f32>,
-    // The middle of the crown, metres from the camera.
+    // A `Crown`.
     @location(6) @interpolate(flat) crown_center: vec3<f32>,
-    // One over its half extents, across and upwards.
-    @location(8) @interpolate(flat) inverse_extents: vec2<f32>,
+    @location(8) @interpolate(flat) crown_inverse_extents: vec2<f32>,
     // The functions of the sun textures at the key light's direction, times their scale.
     @location(9) @interpolate(flat) sun_basis: vec4<f32>,
     @location(10) @interpolate(flat) more_sun_basis: vec4<f32>,
@@ -94,10 +93,9 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     // From behind, the other half of the crown faces the viewer: it is mirrored across the plane.
     out.front = normal * select(1.0, -1.0, toward > 0.0);
     out.look = pack_look(Look(threshold, position.from_foot.y, position.from_foot.y / height, tree.tint));
-    let planes = &cross_variants[tree.variant].planes;
-    out.crown_center = plant_vertex_position(tree, vec3((*planes)[0].center.xy, (*planes)[1].center.z)).relative;
-    let across = max(length((*planes)[0].u.xyz), length((*planes)[1].u.xyz));
-    out.inverse_extents = 1.0 / max(vec2(across, length((*planes)[0].v.xyz)) * tree.scale, vec2(1e-3));
+    let crown = crown_of(tree);
+    out.crown_center = crown.center;
+    out.crown_inverse_extents = crown.inverse_extents;
     let to_light = light.key_direction;
     let sun = vec3(dot(to_light, out.right), dot(to_light, out.up), dot(to_light, out.front));
     set_sun_basis(select(sun, sun.xzy, level), &out);
@@ -109,17 +107,6 @@ fn set_sun_basis(sun: vec3<f32>, out: ptr<function, Varying>) {
     let high = 2.0 * abs(sun.y) - 1.0;
     (*out).sun_basis = SUN_SCALE * vec4(1.0, high, sun.x, sun.z);
     (*out).more_sun_basis = SUN_SCALE * vec4(sun.x * high, sun.z * high, sun.x * sun.z, sun.x * sun.x - sun.z * sun.z);
-}
-
-// Distance from a point in the crown to where the key light enters it, metres; the crown is the ellipsoid in its extents.
-fn depth_in_crown(relative: vec3<f32>, center: vec3<f32>, inverse_extents: vec2<f32>) -> f32 {
-    let scale = inverse_extents.xyx;
-    let place = (relative - center) * scale;
-    let along = light.key_direction * scale;
-    let square = dot(along, along);
-    let middle = dot(place, along);
-    let inside = middle * middle + square * (1.0 - dot(place, place));
-    return max(sqrt(max(inside, 0.0)) - middle, 0.0) / square;
 }
 
 fn decode_octahedral(e: vec2<f32>) -> vec3<f32> {
@@ -194,7 +181,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     if visibility > 0.0 {
         // The plant's own shade is in the sun textures. What the maps and the stand add is that of other plants, which the
         // light meets before it enters the crown.
-        let entry = in.relative + light.key_direction * depth_in_crown(in.relative, in.crown_center, in.inverse_extents);
+        let entry = in.relative + light.key_direction * depth_in_crown(in.relative, Crown(in.crown_center, in.crown_inverse_extents), light.key_direction);
         let cascades = cascaded_visibility(entry, light.key_direction, 0.25, in.clip.xy);
         visibility *= mix(mix(1.0, stand.key_transmittance, foliage), cascades.visibility, cascades.weight);
     }
