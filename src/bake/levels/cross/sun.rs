@@ -80,7 +80,9 @@ impl Sample {
 /// The coefficients of each sample of each plane.
 pub(super) fn coefficients(plant: &Arc<Plant>, planes: &[CrossPlane], samples: &[Vec<Sample>]) -> Vec<Vec<[Vec4; 2]>> {
     let suns = suns();
-    let Some(weights) = weights() else { return samples.iter().map(|list| vec![[Vec4::ZERO; 2]; list.len()]).collect() };
+    let Some(weights) = weights() else {
+        return samples.iter().map(|list| vec![[Vec4::ZERO; 2]; list.len()]).collect();
+    };
     let tracer = PlantTracer::new(plant);
     let extent = tracer.bounds().map_or(0.0, |bounds| bounds.size().max_element());
     let start = START * extent;
@@ -154,4 +156,109 @@ fn weights() -> Option<Vec<[f32; SUN_FUNCTIONS]>> {
         row.map(|weight| weight as f32)
     });
     Some(solved.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{CrossSettings, planes, render_plane};
+    use super::*;
+    use crate::bake::lighting::BakedLighting;
+    use crate::plant::grow::{GrowParameters, grow};
+    use crate::trace::Ray;
+
+    fn toward(azimuth_deg: f32, elevation_deg: f32) -> Vec3 {
+        let (sin, cos) = azimuth_deg.to_radians().sin_cos();
+        let (height, across) = elevation_deg.to_radians().sin_cos();
+        Vec3::new(across * sin, height, across * cos)
+    }
+
+    #[test]
+    fn the_fit_gives_back_what_the_basis_holds() {
+        let (suns, weights) = (suns(), weights().unwrap());
+        let wanted = [0.3, -0.1, 0.2, 0.05, 0.1, -0.2, 0.02, 0.07];
+        let value = |sun: Vec3| -> f32 { basis(sun).iter().zip(wanted).map(|(f, c)| f * c).sum() };
+        let mut fitted = [0.0; SUN_FUNCTIONS];
+        for (sun, weights) in suns.iter().zip(&weights) {
+            fitted.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += weight * value(*sun));
+        }
+        assert!(fitted.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-5), "{fitted:?}");
+        assert!(suns.iter().all(|sun| sun.y > 0.0 && sun.is_normalized()));
+    }
+
+    #[test]
+    fn the_axes_have_the_zenith_in_the_middle() {
+        let plant = grow(&GrowParameters::broadleaf(), 1, 5000).unwrap();
+        for plane in planes(&plant) {
+            let axes = axes(&plane);
+            assert!((axes * Vec3::Y).abs_diff_eq(Vec3::Y, 1e-6), "{plane:?}");
+            assert!((axes * plane.normal).y.abs() < 1e-6 || plane.normal.y == 1.0, "{plane:?}");
+            assert!((axes * axes.transpose()).abs_diff_eq(Mat3::IDENTITY, 1e-6), "{plane:?}");
+        }
+    }
+
+    /// Blocks of 8 × 8 texels against rays to suns that no fit has seen; a light that does not know where the sun is, is the
+    /// control.
+    #[test]
+    fn clumps_of_a_crown_are_as_bright_as_rays_say() {
+        for parameters in [GrowParameters::broadleaf(), GrowParameters::conifer()] {
+            let plant = Arc::new(grow(&parameters, 1, 5000).unwrap());
+            let tracer = PlantTracer::new(&plant);
+            let planes = planes(&plant);
+            let settings = CrossSettings { resolution: 64, supersampling: 2, ..CrossSettings::default() };
+            let images: Vec<Image> =
+                planes.iter().map(|p| render_plane(&plant, &BakedLighting::Local, None, p, &settings)).collect();
+            let samples: Vec<Vec<Sample>> = images.iter().map(Image::samples).collect();
+            let all = coefficients(&plant, &planes, &samples);
+            let start = 1e-4 * tracer.bounds().unwrap().size().max_element();
+            let mut light = [0.0f64; 2];
+            let (mut error, mut control, mut square) = (0.0f64, 0.0f64, 0.0f64);
+            for (azimuth, elevation) in [(20.0, 8.0), (140.0, 20.0), (260.0, 40.0), (75.0, 63.0)] {
+                let sun = toward(azimuth, elevation);
+                for (image, (plane, coefficients)) in images.iter().zip(planes.iter().zip(&all)) {
+                    let functions = basis(axes(plane) * sun);
+                    // Sums of light by the texture, by rays, by the mean over all suns; and of coverage.
+                    let mut blocks = [[0.0f64; 4]; 64];
+                    for ((texel, sample), coefficients) in image.seen.iter().zip(coefficients) {
+                        let texel = *texel as usize;
+                        let coverage = f64::from(image.texels[texel].coverage);
+                        let [low, high] = coefficients.map(|c| c.to_array());
+                        let by_texture: f32 = low.iter().chain(&high).zip(functions).map(|(c, f)| c * f).sum();
+                        let origin = sample.position + start * sun;
+                        let ray = Ray { origin, direction: sun, t_max: f32::INFINITY };
+                        let by_rays = if tracer.occluded(&ray) { 0.0 } else { sample.shown(sun) };
+                        let block = &mut blocks[texel / 64 / 8 * 8 + texel % 64 / 8];
+                        let values = [by_texture, by_rays, low[0], 1.0];
+                        block.iter_mut().zip(values).for_each(|(sum, value)| *sum += coverage * f64::from(value));
+                    }
+                    for [by_texture, by_rays, mean, coverage] in blocks.into_iter().filter(|block| block[3] > 4.0) {
+                        light[0] += by_texture;
+                        light[1] += by_rays;
+                        error += (by_texture - by_rays).powi(2) / coverage;
+                        control += (mean - by_rays).powi(2) / coverage;
+                        square += by_rays.powi(2) / coverage;
+                    }
+                }
+            }
+            let ratio = light[0] / light[1];
+            let [error, control] = [error, control].map(|sum| (sum / square).sqrt());
+            assert!((0.93..1.07).contains(&ratio), "{ratio} of the light");
+            assert!(error < 0.35 && error < 0.6 * control, "relative RMSE {error}, without direction {control}");
+        }
+    }
+
+    #[test]
+    fn a_lone_leaf_is_lit_from_both_sides() {
+        let leaf = Sample { position: Vec3::ZERO, normal: Vec3::Z, transmission: 0.5 };
+        assert!((leaf.shown(Vec3::Z) - 1.0 / 1.5).abs() < 1e-6);
+        assert!((leaf.shown(-Vec3::Z) - 0.5 / 1.5).abs() < 1e-6);
+        let broken = Sample { transmission: f32::INFINITY, ..leaf };
+        assert_eq!(broken.shown(Vec3::Z), 0.0);
+    }
+
+    #[test]
+    fn an_empty_plant_has_no_light() {
+        let plant = Arc::new(Plant::default());
+        let planes = planes(&plant);
+        assert_eq!(coefficients(&plant, &planes, &[vec![], vec![], vec![]]), vec![Vec::new(); 3]);
+    }
 }
