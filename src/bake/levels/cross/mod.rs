@@ -14,9 +14,9 @@
 //! Cost: three images of (resolution * supersampling)² samples. Limits: a plane looks right along its normal and
 //! lacks parallax in other directions; a plane seen from behind shows the texture of its front, mirrored.
 
-mod color;
-mod light;
-mod properties;
+pub(super) mod color;
+pub(super) mod light;
+pub(super) mod properties;
 
 pub use light::LIGHT_SCALE;
 
@@ -181,7 +181,7 @@ pub fn bake_cross(plant: &Plant, lighting: &BakedLighting, settings: &CrossSetti
 }
 
 /// Mean over the planes' images, level by level; levels beyond the coarsest mip repeat it.
-fn mean_isotropic_fraction(images: &[Vec<IsotropicSum>]) -> [f32; ISOTROPIC_LEVELS] {
+pub(in crate::bake::levels) fn mean_isotropic_fraction(images: &[Vec<IsotropicSum>]) -> [f32; ISOTROPIC_LEVELS] {
     std::array::from_fn(|level| {
         let (mut isotropic, mut weight) = (0.0, 0.0);
         for sum in images.iter().filter_map(|levels| levels.get(level).or(levels.last())) {
@@ -226,7 +226,7 @@ fn foliage_height(plant: &Plant) -> Option<f32> {
     height.is_finite().then_some(height)
 }
 
-fn mean_transmission(plant: &Plant) -> Vec3 {
+pub(in crate::bake::levels) fn mean_transmission(plant: &Plant) -> Vec3 {
     let (mut sum, mut total) = (Vec3::ZERO, 0.0);
     for part in plant.parts.iter().filter(|part| part.kind == PartKind::Foliage) {
         let area: f64 = geometry::triangles(&part.mesh).map(|(_, c)| f64::from(geometry::area(&part.mesh, c))).sum();
@@ -241,9 +241,9 @@ fn mean_transmission(plant: &Plant) -> Vec3 {
 /// The mean of a texel's samples. All but `coverage` are weighted with it: sums over the samples that see the plant,
 /// divided by the number of all samples.
 #[derive(Clone, Copy, Debug, Default)]
-struct Texel {
+pub(in crate::bake::levels) struct Texel {
     /// Share of the samples that see the plant, 0..1.
-    coverage: f32,
+    pub coverage: f32,
     /// Linear base colour.
     color: Vec3,
     /// Normal in the plane's frame; that of a leaf is flipped towards the viewer.
@@ -265,48 +265,54 @@ fn render_plane(
     settings: &CrossSettings,
 ) -> Vec<Texel> {
     const ROWS: u32 = 8;
-    let (resolution, samples) = (settings.resolution, settings.supersampling);
     let view = View { center: plane.center, right: plane.u, up: plane.v, toward: plane.normal };
-    let side = resolution * samples;
-    let raster = Raster::new(plant, &view, side, side, ROWS * samples);
+    let side = settings.resolution * settings.supersampling;
+    let raster = Raster::new(plant, &view, side, side, ROWS * settings.supersampling);
     let shader =
         Shader { plant, lighting, sides, raster: &raster, to_plane: plane.frame().transpose(), toward: plane.normal };
-    let (side, samples, resolution) = (side as usize, samples as usize, resolution as usize);
-    let bands: Vec<Vec<Texel>> = (0..raster.band_count())
-        .into_par_iter()
-        .map(|band| {
-            let hits = raster.draw(band);
-            let mut texels = vec![Texel::default(); hits.len() / (samples * samples)];
-            for (at, hit) in hits.iter().enumerate().filter(|(_, hit)| hit.is_some()) {
-                let (row, column) = (at / side / samples, at % side / samples);
-                shader.add(hit, &mut texels[row * resolution + column]);
-            }
-            let share = 1.0 / (samples * samples) as f32;
-            for texel in &mut texels {
-                texel.coverage *= share;
-                texel.color *= share;
-                texel.normal *= share;
-                texel.ambient *= share;
-                texel.foliage *= share;
-                texel.light *= share;
-            }
-            texels
-        })
-        .collect();
-    bands.concat()
+    shader.texels(settings.supersampling as usize)
 }
 
 /// Looks up what a sample sees.
-struct Shader<'a> {
-    plant: &'a Plant,
-    lighting: &'a BakedLighting,
-    raster: &'a Raster,
-    sides: Option<&'a [Vec<light::Sides>]>,
-    to_plane: Mat3,
-    toward: Vec3,
+pub(in crate::bake::levels) struct Shader<'a> {
+    pub plant: &'a Plant,
+    pub lighting: &'a BakedLighting,
+    pub raster: &'a Raster,
+    pub sides: Option<&'a [Vec<light::Sides>]>,
+    pub to_plane: Mat3,
+    pub toward: Vec3,
 }
 
 impl Shader<'_> {
+    /// The image that the raster shows, row by row from the top: means of `samples`² of its samples. The rows of a band
+    /// and the columns of the image must be multiples of `samples`.
+    pub fn texels(&self, samples: usize) -> Vec<Texel> {
+        let side = self.raster.width();
+        let row_texels = side / samples;
+        let bands: Vec<Vec<Texel>> = (0..self.raster.band_count())
+            .into_par_iter()
+            .map(|band| {
+                let hits = self.raster.draw(band);
+                let mut texels = vec![Texel::default(); hits.len() / (samples * samples)];
+                for (at, hit) in hits.iter().enumerate().filter(|(_, hit)| hit.is_some()) {
+                    let (row, column) = (at / side / samples, at % side / samples);
+                    self.add(hit, &mut texels[row * row_texels + column]);
+                }
+                let share = 1.0 / (samples * samples) as f32;
+                for texel in &mut texels {
+                    texel.coverage *= share;
+                    texel.color *= share;
+                    texel.normal *= share;
+                    texel.ambient *= share;
+                    texel.foliage *= share;
+                    texel.light *= share;
+                }
+                texels
+            })
+            .collect();
+        bands.concat()
+    }
+
     fn add(&self, hit: &Hit, texel: &mut Texel) {
         let part = &self.plant.parts[hit.part as usize];
         let mesh = &part.mesh;
