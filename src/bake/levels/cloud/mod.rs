@@ -402,3 +402,97 @@ fn first_levels(mut chain: MipChain) -> MipChain {
     chain.levels.truncate(LEVELS);
     chain
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::bake::levels::rasterize::projected_area;
+    use crate::bake::lighting::{LightingSettings, transfer::TransferSettings};
+    use crate::plant::grow::{GrowParameters, grow};
+
+    fn small() -> CloudSettings {
+        CloudSettings { planes: 40, resolution: 256, supersampling: 2, ..CloudSettings::default() }
+    }
+
+    #[test]
+    fn a_cloud_covers_what_the_tree_covers_with_few_triangles_and_little_memory()
+    -> Result<(), Box<dyn std::error::Error>> {
+        for parameters in [GrowParameters::broadleaf(), GrowParameters::conifer()] {
+            let plant = grow(&parameters, 1, 6000)?;
+            let cloud = bake_cloud(&plant, &BakedLighting::Local, &small());
+            assert!(cloud.fits(&plant, false) && !cloud.fits(&plant, true));
+            assert!((20..=40).contains(&cloud.planes.len()) && cloud.triangles() <= 130, "{}", cloud.triangles());
+            assert!(cloud.texture_bytes() < 256 * 256 * 11);
+            assert!((0.8..3.0).contains(&cloud.leaf_scale), "{}", cloud.leaf_scale);
+            let bounds = plant.bounds().ok_or("no bounds")?;
+            assert!(cloud.deviation > 0.0 && cloud.deviation < 0.1 * bounds.size().length());
+            // From directions that the calibration does not know.
+            let (mut ours, mut full) = (0.0, 0.0);
+            for toward in [Vec3::new(0.5, 0.1, -0.8), Vec3::new(-0.9, 0.2, 0.3), Vec3::new(0.1, 0.9, 0.4)] {
+                let view = View::framing(bounds, toward.normalize());
+                let wide = View { right: 1.3 * view.right, up: 1.3 * view.up, ..view };
+                ours += projected_area(&cloud.plant(&plant), &wide, 400);
+                full += projected_area(&plant, &wide, 400);
+            }
+            assert!((ours / full - 1.0).abs() < 0.08, "{}: {}", plant.name, ours / full);
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn the_same_on_any_number_of_threads_and_with_a_lighting_texture_for_transfer()
+    -> Result<(), Box<dyn std::error::Error>> {
+        let plant = Arc::new(grow(&GrowParameters::broadleaf(), 2, 4000)?);
+        let transfer = TransferSettings { rays: 64, ..TransferSettings::default() };
+        let lighting = BakedLighting::bake(&plant, &LightingSettings::Transfer(transfer));
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            pool.install(|| bake_cloud(&plant, &lighting, &small()))
+        };
+        let cloud = on(1);
+        assert!(cloud == on(3));
+        assert!(cloud.fits(&plant, true) && cloud.textures.light.is_some());
+        Ok(())
+    }
+
+    #[test]
+    fn an_allowed_deviation_asks_for_more_planes() -> Result<(), Box<dyn std::error::Error>> {
+        let plant = grow(&GrowParameters::broadleaf(), 1, 4000)?;
+        let few = CloudSettings { planes: 5, wood: 0.0, resolution: 128, supersampling: 1, ..CloudSettings::default() };
+        let coarse = bake_cloud(&plant, &BakedLighting::Local, &few);
+        let allowed = 0.5 * coarse.deviation / plant.height();
+        let fine = bake_cloud(&plant, &BakedLighting::Local, &CloudSettings { deviation: allowed, ..few });
+        assert!(coarse.planes.len() <= 5 && fine.planes.len() > 5);
+        assert!(fine.deviation <= allowed * plant.height());
+        // Better than as published, at as many planes.
+        let published = CloudSettings { clustering: Clustering::KMeans, planes: 40, ..few };
+        let published = bake_cloud(&plant, &BakedLighting::Local, &published);
+        let ours = bake_cloud(&plant, &BakedLighting::Local, &CloudSettings { planes: 40, ..few });
+        assert!(ours.deviation < 0.8 * published.deviation, "{} {}", ours.deviation, published.deviation);
+        assert_eq!(ours.wood.triangles(), 0);
+        Ok(())
+    }
+
+    #[test]
+    fn plants_of_nothing_one_triangle_no_leaves_and_no_wood_are_survived() -> Result<(), Box<dyn std::error::Error>> {
+        let whole = grow(&GrowParameters::broadleaf(), 1, 4000)?;
+        let only = |kind| {
+            let parts = whole.parts.iter().filter(|part| part.kind == kind).cloned().collect();
+            Plant { name: String::new(), parts }
+        };
+        let mut single = only(PartKind::Foliage);
+        single.parts[0].mesh.triangles.truncate(1);
+        let mut broken = only(PartKind::Foliage);
+        broken.parts[0].mesh.positions.iter_mut().for_each(|position| *position = Vec3::ZERO);
+        let tiny = CloudSettings { planes: 9, resolution: 128, supersampling: 1, ..CloudSettings::default() };
+        for plant in [Plant::default(), single, only(PartKind::Wood), only(PartKind::Foliage), broken] {
+            let cloud = bake_cloud(&plant, &BakedLighting::Local, &tiny);
+            assert!(cloud.fits(&plant, false));
+            let nonsense = CloudSettings { planes: 0, deviation: f32::NAN, turn: 9.0, wood: f32::INFINITY, ..tiny };
+            assert!(bake_cloud(&plant, &BakedLighting::Local, &nonsense).fits(&plant, false));
+        }
+        Ok(())
+    }
+}
