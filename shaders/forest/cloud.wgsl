@@ -105,9 +105,12 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
 #endif
     let properties = textureSampleLevel(property_textures, texture_sampler, in.uv, variant, level);
     let local = decode_octahedral(properties.xy);
-    let normal = normalize(in.right * local.x + in.up * local.y + in.front * local.z);
-
+    let stored_normal = normalize(in.right * local.x + in.up * local.y + in.front * local.z);
     let foliage = properties.a;
+    // A leaf has two sides, of which the viewer sees one, also in a plane that is seen at an angle. A realigned normal
+    // points out of the crown from any side.
+    let behind = (dot(stored_normal, in.relative) > 0.0) & (variants[variant].realigned < 0.5) & (foliage > 0.5);
+    let normal = select(stored_normal, -stored_normal, behind);
     var surface: Surface;
     surface.albedo = mix(texel.rgb, tint_foliage(texel.rgb, look.tint), foliage);
     surface.normal = normal;
