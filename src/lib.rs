@@ -49,6 +49,7 @@ mod files;
 pub mod light;
 pub mod lod;
 pub mod math;
+pub mod measure;
 pub mod plant;
 mod plugin;
 pub mod progress;

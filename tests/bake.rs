@@ -402,7 +402,7 @@ fn what_is_not_listed_is_not_baked() {
     };
     let (all, _) = bake(BakeSettings::default().representations);
     assert!(all.cross().is_some() && all.shadow_proxy().is_some() && all.levels.len() == 2);
-    const MODEL: &[Representation] = &[Representation::MODEL, Representation::named("cloud")];
+    const MODEL: &[Representation] = &[Representation::MODEL, Representation::named("box")];
     for from_cache in [false, true] {
         let (models, source) = bake(MODEL);
         assert_eq!(matches!(source, BakeSource::Cache), from_cache, "{source:?}");

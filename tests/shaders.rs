@@ -14,8 +14,8 @@ use canopy::{
             CascadeUniform, CascadeViewUniform, FrameUniform, LightUniform, NOISE_PERIOD, ShadowUniform,
         },
         forest::{
-            CrossVariantUniform, ForestViewUniform, PartUniform, PlaneUniform, PlantVertex, TransferUniform,
-            VariantUniform,
+            CloudPlaneUniform, CloudVariantUniform, CrossVariantUniform, ForestViewUniform, PartUniform, PlaneUniform,
+            PlantVertex, TransferUniform, VariantUniform,
         },
         shaders::{ShaderFile, sources},
         terrain::{GpuTile, GpuTileVertex},
@@ -267,6 +267,12 @@ fn gpu_structs_are_what_the_shaders_think() {
     );
     twin!(
         layouts,
+        "CloudPlane",
+        CloudPlaneUniform { center, texture_left, u, texture_top, v, texture_right, normal, texture_bottom }
+    );
+    twin!(layouts, "CloudVariant", CloudVariantUniform { transmission, light_layer, isotropic_fraction });
+    twin!(
+        layouts,
         "Transfer",
         TransferUniform {
             scale,
@@ -295,6 +301,8 @@ fn every_bound_struct_has_its_twin_tested() {
         "ForestView",
         "Variant",
         "CrossVariant",
+        "CloudPlane",
+        "CloudVariant",
         "Part",
         "Transfer",
         "Tree",

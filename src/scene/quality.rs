@@ -6,13 +6,14 @@ use super::check::Check;
 use crate::lod::{FadeBand, Levels, MAX_LEVELS, Representation};
 
 /// The representations that a scene file can name.
-const REPRESENTATIONS: [Representation; 2] = [Representation::MODEL, Representation::CROSS];
+const REPRESENTATIONS: [Representation; 4] =
+    [Representation::MODEL, Representation::THINNED, Representation::CLOUD, Representation::CROSS];
 
 /// One level of detail in a scene file: `(draw: "model", until: 60, fade: 20)`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct QualityLevel {
-    /// Name of the representation: `"model"` or `"cross"`.
+    /// Name of the representation: `"model"`, `"thinned"`, `"cloud"` or `"cross"`.
     pub draw: String,
     /// Distance in metres at which it begins to give way to the next level, 0 to 200000. Without effect in the last
     /// level.
@@ -126,7 +127,8 @@ impl Quality {
         for (index, level) in self.levels.iter().enumerate() {
             let place = |field: &str| format!("quality.levels[{index}].{field}");
             if !REPRESENTATIONS.iter().any(|known| known.name() == level.draw) {
-                let names = REPRESENTATIONS.map(|known| format!("\"{}\"", known.name())).join(" or ");
+                let [others @ .., last] = REPRESENTATIONS.map(|known| format!("\"{}\"", known.name()));
+                let names = format!("{} or {last}", others.join(", "));
                 check.problem(&place("draw"), format!("is \"{}\"", level.draw), format!("write {names}"));
             }
             if index + 1 == self.levels.len() {

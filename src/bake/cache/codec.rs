@@ -26,7 +26,7 @@ use crate::bake::lighting::BakedLighting;
 use crate::plant::Plant;
 
 /// Version of the format *and* of the bakes: to be raised whenever either gives other bytes for the same input.
-pub(super) const VERSION: u32 = 16;
+pub(super) const VERSION: u32 = 17;
 
 const MAGIC: [u8; 8] = *b"CANOPYBK";
 const HEAD: usize = 52;
@@ -100,6 +100,7 @@ mod tests {
     use glam::{Vec2, Vec3};
 
     use super::*;
+    use crate::bake::levels::DEFAULT;
     use crate::bake::levels::cross::{Cross, CrossPlane, CrossTextures};
     use crate::bake::lighting::ExpressiveLighting;
     use crate::bake::lighting::TransferLighting;
@@ -146,7 +147,7 @@ mod tests {
         }
     }
 
-    const KEY: CacheKey = CacheKey { hash: [7; 32], representations: BAKED };
+    const KEY: CacheKey = CacheKey { hash: [7; 32], representations: DEFAULT };
 
     /// The same with radiance transfer.
     fn transferred() -> BakedPlant {

@@ -6,8 +6,9 @@
 //! how.
 //!
 //! Limits: at most 1,024 variants per forest; crosses for as many variants as a texture array has room for, three
-//! layers each; no motion vectors; one camera.
+//! layers each, and clouds, one layer each; no motion vectors; one camera.
 
+mod cloud_uniforms;
 mod draw;
 mod gpu_forest;
 mod instance_layout;
@@ -35,6 +36,7 @@ use super::{
     sets::{CanopyPasses, CanopyRenderSystems},
     shaders::CanopyShaders,
 };
+pub use cloud_uniforms::{CloudPlaneUniform, CloudVariantUniform};
 pub use draw::draw_levels;
 pub use gpu_forest::{ForestLevel, GpuForest, GpuForests, most_trees};
 pub use instance_layout::instance_layout;

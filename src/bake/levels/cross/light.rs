@@ -33,10 +33,10 @@ use crate::math::MipChain;
 pub const LIGHT_SCALE: f32 = 0.4;
 
 /// The two sides of a vertex in the plant's frame: the vector, and in w the first coefficient.
-pub(super) type Sides = [Vec4; 2];
+pub(in crate::bake::levels) type Sides = [Vec4; 2];
 
 /// Those of each vertex of each part; `None` where a plant is not lit by transfer.
-pub(super) fn vertex_sides(lighting: &BakedLighting) -> Option<Vec<Vec<Sides>>> {
+pub(in crate::bake::levels) fn vertex_sides(lighting: &BakedLighting) -> Option<Vec<Vec<Sides>>> {
     let BakedLighting::Transfer(transfer) = lighting else { return None };
     let baked = transfer.packed.unpack();
     let (count, channels) = (baked.settings.coefficients().max(1), baked.settings.channels.count());
@@ -56,14 +56,14 @@ pub(super) fn vertex_sides(lighting: &BakedLighting) -> Option<Vec<Vec<Sides>>> 
 }
 
 /// What a sample stores whose viewer sees `near`, with light of the share `transmission` from `far`.
-pub(super) fn stored(near: Vec4, far: Vec4, transmission: f32, to_plane: &Mat3) -> Vec4 {
+pub(in crate::bake::levels) fn stored(near: Vec4, far: Vec4, transmission: f32, to_plane: &Mat3) -> Vec4 {
     let sum = (near + far * transmission) / (1.0 + transmission);
     let sum = (*to_plane * sum.truncate()).extend(sum.w);
     if sum.is_finite() { sum } else { Vec4::ZERO }
 }
 
 /// Mips of the light, a texture of `resolution`² texels (a power of two) on top. One of no plant at all is in the open.
-pub(super) fn mips(texels: &[Texel], resolution: usize) -> MipChain {
+pub(in crate::bake::levels) fn mips(texels: &[Texel], resolution: usize) -> MipChain {
     let values = texels.iter().map(|texel| (texel.light, texel.coverage)).collect();
     signed_mips(values, resolution, LIGHT_SCALE, Vec3::ZERO.extend(0.282))
 }

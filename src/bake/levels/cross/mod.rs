@@ -14,9 +14,9 @@
 //! Cost: three images of (resolution * supersampling)² samples. Limits: a plane looks right along its normal and
 //! lacks parallax in other directions; a plane seen from behind shows the texture of its front, mirrored.
 
-mod color;
-mod light;
-mod properties;
+pub(super) mod color;
+pub(super) mod light;
+pub(super) mod properties;
 mod signed_mips;
 mod sun;
 
@@ -200,7 +200,7 @@ pub fn bake_cross(plant: &Arc<Plant>, lighting: &BakedLighting, settings: &Cross
 }
 
 /// Mean over the planes' images, level by level; levels beyond the coarsest mip repeat it.
-fn mean_isotropic_fraction(images: &[Vec<IsotropicSum>]) -> [f32; ISOTROPIC_LEVELS] {
+pub(in crate::bake::levels) fn mean_isotropic_fraction(images: &[Vec<IsotropicSum>]) -> [f32; ISOTROPIC_LEVELS] {
     std::array::from_fn(|level| {
         let (mut isotropic, mut weight) = (0.0, 0.0);
         for sum in images.iter().filter_map(|levels| levels.get(level).or(levels.last())) {
@@ -245,7 +245,7 @@ fn foliage_height(plant: &Plant) -> Option<f32> {
     height.is_finite().then_some(height)
 }
 
-fn mean_transmission(plant: &Plant) -> Vec3 {
+pub(in crate::bake::levels) fn mean_transmission(plant: &Plant) -> Vec3 {
     let (mut sum, mut total) = (Vec3::ZERO, 0.0);
     for part in plant.parts.iter().filter(|part| part.kind == PartKind::Foliage) {
         let area: f64 = geometry::triangles(&part.mesh).map(|(_, c)| f64::from(geometry::area(&part.mesh, c))).sum();
@@ -260,9 +260,9 @@ fn mean_transmission(plant: &Plant) -> Vec3 {
 /// The mean of a texel's samples. All but `coverage` are weighted with it: sums over the samples that see the plant,
 /// divided by the number of all samples.
 #[derive(Clone, Copy, Debug, Default)]
-struct Texel {
+pub(in crate::bake::levels) struct Texel {
     /// Share of the samples that see the plant, 0..1.
-    coverage: f32,
+    pub coverage: f32,
     /// Linear base colour.
     color: Vec3,
     /// Normal in the plane's frame; that of a leaf is flipped towards the viewer.
@@ -276,9 +276,9 @@ struct Texel {
 }
 
 /// What a plane shows.
-struct Image {
+pub(in crate::bake::levels) struct Image {
     /// Row by row from the top.
-    texels: Vec<Texel>,
+    pub texels: Vec<Texel>,
     /// Of each texel that shows the plant: which one, and one of its samples, chosen at random.
     seen: Vec<(u32, sun::Sample)>,
 }
@@ -298,56 +298,22 @@ fn render_plane(
     settings: &CrossSettings,
 ) -> Image {
     const ROWS: u32 = 8;
-    let (resolution, samples) = (settings.resolution, settings.supersampling);
     let view = View { center: plane.center, right: plane.u, up: plane.v, toward: plane.normal };
-    let side = resolution * samples;
-    let raster = Raster::new(plant, &view, side, side, ROWS * samples);
+    let side = settings.resolution * settings.supersampling;
+    let raster = Raster::new(plant, &view, side, side, ROWS * settings.supersampling);
     let shader =
         Shader { plant, lighting, sides, raster: &raster, to_plane: plane.frame().transpose(), toward: plane.normal };
-    let (side, samples, resolution) = (side as usize, samples as usize, resolution as usize);
-    let bands: Vec<Image> = (0..raster.band_count())
-        .into_par_iter()
-        .map(|band| {
-            let hits = raster.draw(band);
-            let first = band * ROWS as usize * resolution;
-            let mut texels = vec![Texel::default(); hits.len() / (samples * samples)];
-            let mut chosen: Vec<Option<(u32, &Hit)>> = vec![None; texels.len()];
-            for (at, hit) in hits.iter().enumerate().filter(|(_, hit)| hit.is_some()) {
-                let (row, column) = (at / side / samples, at % side / samples);
-                let texel = row * resolution + column;
-                shader.add(hit, &mut texels[texel]);
-                let lot = mix32((first * samples * samples + at) as u32);
-                if chosen[texel].is_none_or(|(other, _)| lot > other) {
-                    chosen[texel] = Some((lot, hit));
-                }
-            }
-            let share = 1.0 / (samples * samples) as f32;
-            for texel in &mut texels {
-                texel.coverage *= share;
-                texel.color *= share;
-                texel.normal *= share;
-                texel.ambient *= share;
-                texel.foliage *= share;
-                texel.light *= share;
-            }
-            let chosen = chosen.into_iter().enumerate();
-            let seen = chosen.filter_map(|(texel, chosen)| Some(((first + texel) as u32, shader.sample(chosen?.1))));
-            let seen = seen.collect();
-            Image { texels, seen }
-        })
-        .collect();
-    let (texels, seen): (Vec<_>, Vec<_>) = bands.into_iter().map(|band| (band.texels, band.seen)).unzip();
-    Image { texels: texels.concat(), seen: seen.concat() }
+    shader.image(settings.supersampling as usize)
 }
 
 /// Looks up what a sample sees.
-struct Shader<'a> {
-    plant: &'a Plant,
-    lighting: &'a BakedLighting,
-    raster: &'a Raster,
-    sides: Option<&'a [Vec<light::Sides>]>,
-    to_plane: Mat3,
-    toward: Vec3,
+pub(in crate::bake::levels) struct Shader<'a> {
+    pub plant: &'a Plant,
+    pub lighting: &'a BakedLighting,
+    pub raster: &'a Raster,
+    pub sides: Option<&'a [Vec<light::Sides>]>,
+    pub to_plane: Mat3,
+    pub toward: Vec3,
 }
 
 /// The surface that a sample sees.
@@ -372,6 +338,43 @@ impl Seen {
 }
 
 impl Shader<'_> {
+    /// What the raster shows, row by row from the top: means of `samples`² of its samples. The rows of a band and the
+    /// columns of the image must be multiples of `samples`.
+    pub fn image(&self, samples: usize) -> Image {
+        let side = self.raster.width();
+        let row_texels = side / samples;
+        let of_band = |band: usize| {
+            let hits = self.raster.draw(band);
+            let first = self.raster.first_row(band) / samples * row_texels;
+            let mut texels = vec![Texel::default(); hits.len() / (samples * samples)];
+            let mut chosen: Vec<Option<(u32, &Hit)>> = vec![None; texels.len()];
+            for (at, hit) in hits.iter().enumerate().filter(|(_, hit)| hit.is_some()) {
+                let (row, column) = (at / side / samples, at % side / samples);
+                let texel = row * row_texels + column;
+                self.add(hit, &mut texels[texel]);
+                let lot = mix32((first * samples * samples + at) as u32);
+                if chosen[texel].is_none_or(|(other, _)| lot > other) {
+                    chosen[texel] = Some((lot, hit));
+                }
+            }
+            let share = 1.0 / (samples * samples) as f32;
+            for texel in &mut texels {
+                texel.coverage *= share;
+                texel.color *= share;
+                texel.normal *= share;
+                texel.ambient *= share;
+                texel.foliage *= share;
+                texel.light *= share;
+            }
+            let chosen = chosen.into_iter().enumerate();
+            let seen = chosen.filter_map(|(texel, chosen)| Some(((first + texel) as u32, self.sample(chosen?.1))));
+            Image { texels, seen: seen.collect() }
+        };
+        let bands: Vec<Image> = (0..self.raster.band_count()).into_par_iter().map(of_band).collect();
+        let (texels, seen): (Vec<_>, Vec<_>) = bands.into_iter().map(|band| (band.texels, band.seen)).unzip();
+        Image { texels: texels.concat(), seen: seen.concat() }
+    }
+
     fn seen(&self, hit: &Hit) -> Seen {
         let part = &self.plant.parts[hit.part as usize];
         let mesh = &part.mesh;

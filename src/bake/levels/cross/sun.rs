@@ -259,6 +259,7 @@ mod tests {
     fn an_empty_plant_has_no_light() {
         let plant = Arc::new(Plant::default());
         let planes = planes(&plant);
-        assert_eq!(coefficients(&plant, &planes, &[vec![], vec![], vec![]]), vec![Vec::new(); 3]);
+        let none = coefficients(&plant, &planes, &[vec![], vec![], vec![]]);
+        assert!(none.len() == 3 && none.iter().all(Vec::is_empty));
     }
 }
