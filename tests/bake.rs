@@ -154,7 +154,7 @@ fn picture_area(cross: &Cross, index: usize, level: usize) -> f32 {
 
 #[test]
 fn a_cross_covers_what_the_plant_covers_in_every_mip() {
-    let plant = tree(1500, 4);
+    let plant = Arc::new(tree(1500, 4));
     let cross = bake_cross(&plant, &BakedLighting::Local, &CrossSettings::default());
     let bounds = plant.bounds().unwrap();
     for (index, plane) in cross.planes.iter().enumerate() {
@@ -177,7 +177,7 @@ fn a_cross_covers_what_the_plant_covers_in_every_mip() {
 
 #[test]
 fn a_cross_has_no_foreign_colour_anywhere() {
-    let plant = tree(1500, 5);
+    let plant = Arc::new(tree(1500, 5));
     let cross = bake_cross(&plant, &BakedLighting::Local, &CrossSettings { resolution: 128, ..Default::default() });
     for chain in &cross.textures.color {
         // Leaves are green (60, 120, 30), bark is brown: red never exceeds what lies between, blue stays low.

@@ -188,7 +188,9 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let sun_layer = 2u * in.layer;
     let sun = textureSampleLevel(sun_textures, texture_sampler, in.uv, sun_layer, level);
     let more_sun = textureSampleLevel(sun_textures, texture_sampler, in.uv, sun_layer + 1u, level);
-    let lit = max(dot(sun, in.sun_basis) + dot(more_sun, in.more_sun_basis), 0.0);
+    var lit = max(dot(sun, in.sun_basis) + dot(more_sun, in.more_sun_basis), 0.0);
+    // The level plane's texture has its lit side. From below one sees what comes through.
+    lit *= select(1.0, dot(surface.transmission, vec3(0.2126, 0.7152, 0.0722)), in.front.y < -0.5);
     var color = shade_leaves(surface, lit, visibility, sky);
     color = tint_level(color);
     return finish(in.relative, color, coverage);

@@ -65,7 +65,7 @@ fn local(plant: &Plant) -> BakedPlant {
 /// `plant` with another light.
 fn lit(plant: &Plant, lighting: ExpressiveLighting) -> BakedPlant {
     let lighting = BakedLighting::Expressive(lighting);
-    let cross = BakedLevel::Cross(Arc::new(bake_cross(plant, &lighting, &CrossSettings::default())));
+    let cross = BakedLevel::Cross(Arc::new(bake_cross(&Arc::new(plant.clone()), &lighting, &CrossSettings::default())));
     BakedPlant { lighting: Arc::new(lighting), ..local(plant) }.with_level(cross)
 }
 
