@@ -72,6 +72,8 @@ shader_files! {
     SunShadowCross = "sun_shadow/cross.wgsl",
     SunShadowMesh = "sun_shadow/mesh.wgsl",
     SkyPass = "sky/sky.wgsl",
+    GroundNoise = "terrain/ground_noise.wgsl",
+    GroundColor = "terrain/ground_color.wgsl",
     Terrain = "terrain/terrain.wgsl",
 }
 
