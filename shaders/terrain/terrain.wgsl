@@ -4,7 +4,7 @@
 #import canopy::ground_color::ground_color
 #import canopy::lighting::{Surface, shade_matt, even_sky}
 #import canopy::output::finish
-#import canopy::stand::ground_light
+#import canopy::stand::{ground_light, stand_light}
 #import canopy::sun_visibility::{sample_ground, terrain_visibility, cascaded_visibility}
 
 struct TileVertex {
@@ -64,6 +64,9 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     return out;
 }
 
+// Mean depth in the canopy of what is seen of it from above, 0..1.
+const CROWN_DEPTH: f32 = 0.1;
+
 @fragment
 fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let smooth_normal = normalize(in.normal);
@@ -96,7 +99,9 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     if visibility > 0.0 {
         let cascades = cascaded_visibility(in.relative, smooth_normal, 1.0, in.clip.xy);
         // Beyond the maps: the fraction of light that passes between the crowns.
-        visibility *= mix(stand.key_transmittance, cascades.visibility, cascades.weight);
+        let passed = mix(stand.key_transmittance, cascades.visibility, cascades.weight);
+        // A canopy is rough: in low light its crowns shade each other near their tops, as those of drawn trees do.
+        visibility *= mix(passed, stand_light(cover, CROWN_DEPTH).key_transmittance, far);
     }
     return finish(in.relative, shade_matt(surface, visibility, even_sky(surface, stand)), 1.0);
 }

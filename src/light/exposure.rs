@@ -38,8 +38,8 @@ pub struct ExposureSettings {
     pub compensation: f32,
     /// Maximum desaturation by night vision, 0 (colours at night as by day) to 1 (rods alone).
     pub scotopic_strength: f32,
-    /// Fraction of adaptation to the shade of a stand that the camera is in, 0 (as on open ground) to 1 (as to an hour with
-    /// that much light). A camera in a wood sees bright gaps too, so that its eye does not adapt in full.
+    /// Fraction of adaptation in EV to the shade of a stand that the camera is in, 0 (as on open ground) to 1 (the floor of a
+    /// wood as bright as a meadow). A camera in a wood sees bright gaps too, so that its eye does not adapt in full.
     pub stand_adaptation: f32,
     /// EV100 that is kept whatever the light, -10 to 25; `None`: the exposure follows the light.
     pub fixed_ev100: Option<f32>,
@@ -55,7 +55,7 @@ impl Default for ExposureSettings {
             rod_adaptation: 0.87,
             compensation: 0.0,
             scotopic_strength: 0.85,
-            stand_adaptation: 0.8,
+            stand_adaptation: 0.9,
             fixed_ev100: None,
         }
     }
@@ -99,7 +99,10 @@ impl ExposureSettings {
     /// Shares below [`DARKEST_SHARE`] count as that, those of 1 and more, or that are no number, as open ground.
     pub fn ev100_in_stand(&self, illuminance: f32, share: f32) -> f32 {
         let share = if share < 1.0 { share.max(DARKEST_SHARE) } else { 1.0 };
-        self.ev100(illuminance * share.powf(self.stand_adaptation))
+        match self.fixed_ev100 {
+            Some(fixed) => fixed,
+            None => self.ev100(illuminance) + self.stand_adaptation * share.log2(),
+        }
     }
 }
 
@@ -197,7 +200,7 @@ mod tests {
         let mut last = s.ev100(1e5);
         for share in [0.5, 0.1, 0.02, DARKEST_SHARE] {
             let ev = s.ev100_in_stand(1e5, share);
-            assert!(ev < last && ev > s.ev100(1e5 * share), "{share}: {ev}");
+            assert!(ev < last && ev > s.ev100(1e5) + share.log2(), "{share}: {ev}");
             last = ev;
         }
         assert_eq!(s.ev100_in_stand(1e5, 0.0), last);

@@ -86,8 +86,8 @@ pub struct StandSample {
 pub struct StandLight {
     /// Row by row: depths from 0 to 1, then the ground; in each row covers from 0 to 1.
     samples: Vec<StandSample>,
-    /// Natural logarithm of the horizontal illuminance between the crowns over that on open ground: rows of depths from 0
-    /// to 1, in each row covers from 0 to 1.
+    /// Mean logarithm of the horizontal illuminance between the crowns, in sun flecks and beside them, less that on open
+    /// ground: rows of depths from 0 to 1, in each row covers from 0 to 1.
     shares: Vec<f32>,
 }
 
@@ -127,7 +127,7 @@ impl StandLight {
                 };
                 samples[row * COVERS + column] = sample;
                 if row < DEPTHS {
-                    shares[row * COVERS + column] = streams.share((depth / layer.length).min(1.0)).ln();
+                    shares[row * COVERS + column] = streams.share_ln((depth / layer.length).min(1.0));
                 }
             }
         }
@@ -140,8 +140,9 @@ impl StandLight {
     }
 
     /// The fraction of the horizontal illuminance on open ground that there is between crowns of the cover `cover` at the
-    /// depth `depth`, with no crown of its own around it: 1 without cover and at depth 0, never 0. Smooth: its logarithm is
-    /// interpolated. Both arguments are clamped to 0..=1.
+    /// depth `depth`, with no crown of its own around it: 1 without cover and at depth 0, never 0. It is the geometric mean of
+    /// sun flecks and shade, which is what an eye adapts to. Both arguments are clamped to 0..=1; the logarithm is
+    /// interpolated.
     pub fn share(&self, cover: f32, depth: f32) -> f32 {
         self.share_ln(cover, depth).exp()
     }
@@ -272,8 +273,9 @@ struct Sun {
 struct Streams {
     /// Downwelling and upwelling radiance at each boundary between layers.
     bounds: Vec<(Vec3, Vec3)>,
-    /// Luminance of the irradiance on a level surface at each of them, scattered light included.
-    level: Vec<f32>,
+    /// Mean logarithm of the luminance of the irradiance on level surfaces at each of them, scattered light included: some
+    /// are in the sun, the others in the shade.
+    level_ln: Vec<f32>,
 }
 
 impl Streams {
@@ -310,17 +312,24 @@ impl Streams {
         }
         let finite =
             |flux: Vec3| Vec3::from((flux / PI).to_array().map(|v| if v.is_finite() { v.max(0.0) } else { 0.0 }));
-        let level = firsts.iter().zip(&down).map(|(first, down)| luminance(*first + *down)).collect();
-        Self { bounds: down.into_iter().zip(up).map(|(down, up)| (finite(down), finite(up))).collect(), level }
+        let sunlight = sun.illuminance * sun.sine.max(0.0);
+        let level_ln = (0..=LAYERS)
+            .map(|bound| {
+                let lit = layer.transmittance(layer.length * bound as f32 / LAYERS as f32, sun.sine);
+                let shade = firsts[bound] - sunlight * lit + down[bound];
+                lit * luminance(shade + sunlight).ln() + (1.0 - lit) * luminance(shade).ln()
+            })
+            .collect();
+        Self { bounds: down.into_iter().zip(up).map(|(down, up)| (finite(down), finite(up))).collect(), level_ln }
     }
 
-    /// Irradiance of a level surface at a fraction of the crowns' length, 0..=1, over that above the crowns; at least
-    /// [`LEAST_SHARE`], and 1 where there is no light at all.
-    fn share(&self, depth: f32) -> f32 {
+    /// Mean logarithm of the irradiance of level surfaces at a fraction of the crowns' length, 0..=1, less that above the
+    /// crowns; at least that of [`LEAST_SHARE`], and 0 where there is no light at all.
+    fn share_ln(&self, depth: f32) -> f32 {
         let (bound, t) = position(depth, LAYERS + 1);
-        let here = self.level[bound] + (self.level[bound + 1] - self.level[bound]) * t;
-        let share = here / self.level[0];
-        if share.is_finite() { share.clamp(LEAST_SHARE, 1.0) } else { 1.0 }
+        let here = self.level_ln[bound] + (self.level_ln[bound + 1] - self.level_ln[bound]) * t;
+        let share = here - self.level_ln[0];
+        if share.is_nan() { 0.0 } else { share.clamp(LEAST_SHARE.ln(), 0.0) }
     }
 
     /// Downwelling and upwelling radiance at a fraction of the crowns' length, 0..=1.

@@ -3,12 +3,12 @@
 //!
 //! ```text
 //! share(p) = exp(mean over a disc around p of ln E(cover, depth) / E(open ground))
-//! EV100    = the exposure curve at  E(hour) * share^stand_adaptation,  in steps of 1/64 EV
+//! EV100    = EV100(hour) + stand_adaptation * log2(share),  in steps of 1/64 EV
 //! ```
 //!
 //! `E` is the illuminance between the crowns from the table of [`StandLight`]; the cover is the ground's, and the depth 0 a
-//! little above the mean height of the trees, 1 on the ground. The disc has a radius of 40 m: exposure changes by a few
-//! percent over a metre at most. Cost: 100 look-ups a frame, some 20 µs, and half a millisecond for a new light.
+//! little above the mean height of the trees, 1 on the ground. The disc has a radius of 48 m: exposure changes by a few
+//! percent over a metre at most. Cost: 113 look-ups a frame, some 20 µs, and half a millisecond for a new light.
 
 use std::{fmt, sync::Arc};
 
@@ -22,7 +22,7 @@ use crate::{
 };
 
 /// Radius in metres of the disc whose mean logarithm counts.
-const RADIUS: f64 = 40.0;
+const RADIUS: f64 = 48.0;
 /// Metres between the points of the disc.
 const SPACING: f64 = 8.0;
 /// Height over the mean of the trees' heights at which a camera is in the open.
