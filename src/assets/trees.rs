@@ -49,7 +49,7 @@ pub struct StandPlan<'a> {
 }
 
 /// Width in metres of the wooded surroundings of a scene that states none.
-const SURROUNDINGS: f64 = 1500.0;
+const SURROUNDINGS: f64 = 1000.0;
 /// The most trees that such surroundings have for each tree of the data.
 const MOST_SURROUNDING: f64 = 2.0;
 

@@ -47,7 +47,7 @@ pub struct ScatteredTrees {
     pub area: Option<Area>,
     /// Metres beyond the terrain's data over which the wood goes on by the same rules, 0 (it ends with the data) to 50000;
     /// without effect where `area` says where it ends. In the outer half it thins out into ground that has the colour of
-    /// crowns. Default: 1500 in a scene, or less where that would be more than twice the trees of the data or farther than
+    /// crowns. Default: 1000 in a scene, or less where that would be more than twice the trees of the data or farther than
     /// `quality.view_distance`; 0 for a forest that a program spawns.
     pub surroundings: Option<f64>,
     /// Treeless patches where smooth noise is high: `(wavelength: 400, share: 0.1, edge: 0.15)`. Default: none.
