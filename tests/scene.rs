@@ -339,7 +339,7 @@ fn impossible_values_are_placed() {
     faulty("position: (1, 2, 3)", "position: (1, -2, 3)", 14, &["`camera.start.position[1]`"]);
     faulty("pitch: -5", "pitch: -95", 7, &["from -90 to 90"]);
     faulty("seconds: 5", "seconds: 0", 9, &["not after the key before it"]);
-    faulty("field_of_view: 60", "field_of_view: 180", 15, &["from 5 to 120"]);
+    faulty("field_of_view: 60", "field_of_view: 180", 15, &["from 1 to 170"]);
     faulty("shadow_map_size: 1024", "shadow_map_size: 1000", 17, &["1024, 2048"]);
     faulty("cascades: 3", "cascades: 5", 10, &["1 to 4"]);
     faulty("msaa: 1", "msaa: 2", 6, &["write 1 (off) or 4"]);

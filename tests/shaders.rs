@@ -10,9 +10,7 @@ use std::{
 
 use canopy::{
     render::{
-        bindings::uniforms::{
-            CascadeUniform, CascadeViewUniform, FrameUniform, LightUniform, NOISE_PERIOD, ShadowUniform,
-        },
+        bindings::uniforms::{CascadeUniform, CascadeViewUniform, FrameUniform, LightUniform, ShadowUniform},
         forest::{
             CloudPlaneUniform, CloudVariantUniform, CrossVariantUniform, ForestViewUniform, PartUniform, PlaneUniform,
             PlantVertex, TransferUniform, VariantUniform,
@@ -363,9 +361,4 @@ fn plant_vertices_are_what_the_shaders_read() {
         }
     }
     assert!(inputs > 0);
-}
-
-#[test]
-fn the_grounds_noise_has_no_seam() {
-    assert!(NOISE_PERIOD.log2().fract() == 0.0, "not a power of two");
 }

@@ -32,6 +32,7 @@ impl Ours {
             world.spawn(Ground {
                 terrain: field.terrain.clone(),
                 cover: Some(field.cover.clone()),
+                surroundings: 0.0,
                 error_pixels: 1.0,
                 view_distance: GROUND_REACH,
             });

@@ -29,7 +29,9 @@ pub use fly::fly;
 pub use headless::{Renderer, render};
 pub use info::info;
 pub use interrupt::{Interrupt, listen as listen_to_interrupts, received as interrupt_received};
-pub use parse::{ArgumentError, parse_lighting, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size};
+pub use parse::{
+    ArgumentError, parse_exposure, parse_lighting, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size,
+};
 pub use plan::{Frame, PlanError, RenderPlan};
 pub use reference::reference;
 pub use rendered_image::RenderedImage;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use canopy::{
-    app::{parse_lighting, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size},
+    app::{parse_exposure, parse_lighting, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size},
     scene::{Lighting, LocalTime, Pose},
 };
 use clap::{Args, Parser, Subcommand};
@@ -58,6 +58,10 @@ pub struct Common {
     /// species' own].
     #[arg(long, global = true, value_name = "LIGHT", value_parser = parse_lighting)]
     pub lighting: Option<Lighting>,
+    /// Keep this exposure value at ISO 100, -10 to 25 (14: a sunny day, 10: the inside of a wood) [default: the scene's, or
+    /// else it follows the light at the camera].
+    #[arg(long, global = true, value_name = "EV", value_parser = parse_exposure, allow_hyphen_values = true)]
+    pub exposure: Option<f64>,
     /// Print which passes ran, which were skipped, and why.
     #[arg(long, global = true)]
     pub explain: bool,

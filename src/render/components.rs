@@ -117,6 +117,9 @@ pub struct Ground {
     /// Canopy cover, if a forest stands on it.
     #[reflect(ignore, clone)]
     pub cover: Option<Arc<CoverMap>>,
+    /// Metres beyond the terrain's data on which trees stand too, thinning out in the outer half; 0: none. Farther out the
+    /// ground has the colour of crowns, as many as the data has.
+    pub surroundings: f64,
     /// Maximum distance in pixels between the drawn and the true surface, 0.25 to 32. Lower: more triangles.
     pub error_pixels: f64,
     /// Distance in metres to which the ground is drawn, its mirrored surroundings included.

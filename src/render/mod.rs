@@ -19,6 +19,7 @@
 pub mod bindings;
 pub mod components;
 pub mod diagnostics;
+pub mod exposure;
 pub mod extract;
 mod follow;
 pub mod forest;

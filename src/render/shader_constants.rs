@@ -17,7 +17,7 @@ use crate::{
     light::{atmosphere::SkyView, night, stand},
     lod,
     scatter::packed,
-    terrain::tiles,
+    terrain::{ground_noise, tiles},
 };
 
 /// A scalar of WGSL.
@@ -56,6 +56,14 @@ pub fn constants() -> Vec<(&'static str, &'static str, Value)> {
         ("STAND_COVERS", "Canopy covers of the table of light in a stand.", float(stand::COVERS)),
         ("STAND_DEPTHS", "Its depths in the crowns; one more row is the ground's.", float(stand::DEPTHS)),
         ("TILE_SIDE", "Vertices along a side of a terrain tile.", uint(tiles::TILE_QUADS + 1)),
+        (
+            "NOISE_OCTAVE_DEVIATION",
+            "Standard deviation of an octave of the ground's noise.",
+            ground_noise::OCTAVE_DEVIATION.into(),
+        ),
+        ("NOISE_WEIGHT_RATIO", "Weight of an octave relative to the one before.", ground_noise::WEIGHT_RATIO.into()),
+        ("LEAF_OCTAVE", "Octave in whose cells fallen leaves lie.", Value::Int(ground_noise::LEAF_OCTAVE)),
+        ("LEAF_SEED", "Their seed.", ground_noise::LEAF_SEED.into()),
         ("POSITION_STEPS", "Steps of a tree's position along a cell's side.", packed::POSITION_STEPS.into()),
         ("YAW_BITS", "Bits of a tree's yaw, the lowest of `look`.", packed::YAW_BITS.into()),
         ("YAWS", "Yaws that a tree can have.", uint(transfer::YAWS)),

@@ -75,6 +75,8 @@ shader_files! {
     SunShadowCloud = "sun_shadow/cloud.wgsl",
     SunShadowMesh = "sun_shadow/mesh.wgsl",
     SkyPass = "sky/sky.wgsl",
+    GroundNoise = "terrain/ground_noise.wgsl",
+    GroundColor = "terrain/ground_color.wgsl",
     Terrain = "terrain/terrain.wgsl",
 }
 

@@ -85,8 +85,8 @@ pub fn grove(msaa: u32) -> Built {
     build(
         &format!(
             "(name: \"grove\", seed: 7, terrain: Noise(size: 200, amplitude: 6, wavelength: 120, base: 300, seed: 3), \
-             species: [{BROADLEAF}], trees: Scattered(stems_per_hectare: 110, min_distance: 3, clearings: \
-             (wavelength: 90, share: 0.25)), {PLACE}, {quality})"
+             species: [{BROADLEAF}], trees: Scattered(stems_per_hectare: 110, min_distance: 3, surroundings: 0, \
+             clearings: (wavelength: 90, share: 0.25)), {PLACE}, {quality})"
         ),
         &[],
     )

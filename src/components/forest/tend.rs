@@ -239,7 +239,7 @@ fn show(
     let trees = built.stand.trees.len();
     let mut target = commands.entity(entity);
     match (built.cover, ground) {
-        (Some(map), Some(ground)) => target.try_insert(ForestCover { ground, map }),
+        (Some(map), Some(ground)) => target.try_insert(ForestCover { ground, map, surroundings: built.surroundings }),
         _ => target.try_remove::<ForestCover>(),
     };
     if trees > 0 {

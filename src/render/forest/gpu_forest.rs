@@ -131,7 +131,7 @@ impl GpuForest {
             forest: forest.clone(),
             trees,
             variants,
-            leaves: Leaves::of(forest),
+            leaves: Leaves::of(&forest.stand, &forest.plants),
             sizes,
             max_scale: forest.stand.cells.iter().map(|cell| cell.max_scale).fold(0.0, f32::max),
             groupings: levels.iter().map(grouping).collect(),

@@ -41,6 +41,7 @@ pub use draw::draw_levels;
 pub use gpu_forest::{ForestLevel, GpuForest, GpuForests, most_trees};
 pub use instance_layout::instance_layout;
 pub use instances::{forest_view, instance_bind_group};
+pub(super) use leaves::Leaves;
 pub use lists::{ForestStatistics, LevelStatistics};
 pub use pipelines::LevelPipelines;
 pub use representation::Representations;
