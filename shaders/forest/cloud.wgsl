@@ -129,8 +129,8 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     // A plane shows leaves as large as they are seen along its normal. Seen at an angle, those that face the viewer are too
     // small and the others too large: their light tends to that of leaves of all directions as a viewer there sees them.
     let along = dot(in.front, surface.viewer);
-    let shared = mix(isotropic_fraction(variant, level), 1.0, saturate(1.0 - along * along) * (1.0 - variants[variant].realigned));
-    surface.isotropic_fraction = shared * foliage;
+    let isotropic = mix(isotropic_fraction(variant, level), 1.0, saturate(1.0 - along * along) * (1.0 - variants[variant].realigned));
+    surface.isotropic_fraction = isotropic * foliage;
     surface.specular_reflectance = reflectance * foliage;
     surface.roughness = variants[variant].roughness;
     surface.lobe_gain = variants[variant].lobe_gain;
