@@ -28,7 +28,7 @@ pub fn cost() {
         let spacing = 1.2 * f64::from(plant.plant.bounds().map_or(1.0, |bounds| bounds.size().x.max(bounds.size().z)));
         let place = |index: usize| Tree {
             position: DVec3::new((index % SIDE) as f64, 0.0, (index / SIDE) as f64) * spacing,
-            yaw: index as f64,
+            yaw: index as f32,
             scale: 1.0,
             variant: 0,
             tint: 0.0,

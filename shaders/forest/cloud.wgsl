@@ -1,6 +1,6 @@
 // Planes of billboard clouds [Franzke 2005, 4.3]: six pulled vertices a plane, an instance a tree.
 #import canopy::cloud_plane::{CloudVariant, planes, plane_corner, plane_uv}
-#import canopy::constants::{ISOTROPIC_LEVELS, LIGHT_SCALE, AMBIENT_FITTED}
+#import canopy::constants::{ISOTROPIC_LEVELS, LIGHT_SCALE, AMBIENT_FITTED, WHOLE, FADE_SPAN, GONE}
 #import canopy::frame::{frame, light}
 #import canopy::instance::{trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, leaf_visibility}
 #import canopy::lighting::{Surface, shade, even_sky, leaf_transmission}
@@ -70,9 +70,15 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     out.right = rotate(plane.u, tree.yaw) / max(length(plane.u), 1e-6);
     out.up = rotate(plane.v, tree.yaw) / max(length(plane.v), 1e-6);
     // From behind, the other sides of its leaves face the viewer: it is mirrored across the plane.
-    let from_behind = dot(normal, plant_vertex_position(tree, plane.center).relative) > 0.0;
-    out.front = select(normal, -normal, from_behind);
-    let threshold = level_threshold(length(tree.position.xz));
+    let toward = dot(normal, normalize(plant_vertex_position(tree, plane.center).relative));
+    out.front = select(normal, -normal, toward > 0.0);
+    // A plane fades out when it is seen edge-on, where its leaves are streaks.
+    let edge = WHOLE + FADE_SPAN * (1.0 - smoothstep(0.06, 0.22, abs(toward)));
+    let threshold = max(level_threshold(length(tree.position.xz)), edge);
+    if threshold >= GONE {
+        // No texel would pass the alpha test.
+        out.clip = vec4(0.0, 0.0, 0.5, 1.0);
+    }
     out.look = pack_look(Look(threshold, position.from_foot.y, position.from_foot.y / height, tree.tint));
     return out;
 }
@@ -120,7 +126,11 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let transmission = leaf_transmission(texel.rgb, cloud_variants[variant].transmission, reflectance) * foliage;
     surface.transmission = transmission * (1.0 - published);
     surface.viewer = -normalize(in.relative);
-    surface.isotropic_fraction = isotropic_fraction(variant, level) * foliage;
+    // A plane shows leaves as large as they are seen along its normal. Seen at an angle, those that face the viewer are too
+    // small and the others too large: their light tends to that of leaves of all directions as a viewer there sees them.
+    let along = dot(in.front, surface.viewer);
+    let isotropic = mix(isotropic_fraction(variant, level), 1.0, saturate(1.0 - along * along) * (1.0 - variants[variant].realigned));
+    surface.isotropic_fraction = isotropic * foliage;
     surface.specular_reflectance = reflectance * foliage;
     surface.roughness = variants[variant].roughness;
     surface.lobe_gain = variants[variant].lobe_gain;

@@ -163,24 +163,27 @@ impl Renderer {
 
     fn with_settings(settings: WgpuSettings, size: (u32, u32), msaa: u32) -> Result<Self, AppError> {
         let mut app = App::new();
-        app.add_plugins(
-            DefaultPlugins
-                .set(WindowPlugin {
-                    primary_window: None,
-                    exit_condition: ExitCondition::DontExit,
-                    ..WindowPlugin::default()
-                })
-                .set(RenderPlugin {
-                    render_creation: RenderCreation::Automatic(Box::new(settings)),
-                    synchronous_pipeline_compilation: true,
-                    ..RenderPlugin::default()
-                })
-                .set(LogPlugin { level: Level::WARN, filter: adapter::LOG_FILTER.to_owned(), ..LogPlugin::default() })
-                .disable::<WinitPlugin>()
-                // The program has its own handler; others keep theirs.
-                .disable::<TerminalCtrlCHandlerPlugin>()
-                .disable::<PipelinedRenderingPlugin>(),
-        );
+        let mut plugins = DefaultPlugins
+            .set(WindowPlugin {
+                primary_window: None,
+                exit_condition: ExitCondition::DontExit,
+                ..WindowPlugin::default()
+            })
+            .set(RenderPlugin {
+                render_creation: RenderCreation::Automatic(Box::new(settings)),
+                synchronous_pipeline_compilation: true,
+                ..RenderPlugin::default()
+            })
+            .set(LogPlugin { level: Level::WARN, filter: adapter::LOG_FILTER.to_owned(), ..LogPlugin::default() })
+            .disable::<WinitPlugin>()
+            // The program has its own handler; others keep theirs.
+            .disable::<TerminalCtrlCHandlerPlugin>()
+            .disable::<PipelinedRenderingPlugin>();
+        // A second renderer of the process writes into the first one's log.
+        if tracing::dispatcher::has_been_set() {
+            plugins = plugins.disable::<LogPlugin>();
+        }
+        app.add_plugins(plugins);
         app.add_plugins(CanopyPlugins).insert_resource(LightUpdates::Blocking);
         while app.plugins_state() == PluginsState::Adding {
             bevy::tasks::tick_global_task_pools_on_main_thread();

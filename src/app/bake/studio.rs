@@ -90,6 +90,8 @@ pub struct Studio {
     center: DVec3,
     /// The larger of its height and width, metres.
     extent: f64,
+    /// Whether an image was drawn.
+    warm: bool,
 }
 
 impl Studio {
@@ -124,7 +126,7 @@ impl Studio {
             ))
             .id();
         renderer.set_shadow(SunShadowSettings::default());
-        Ok(Self { renderer, plant, forest: None, backdrop, colors, size, center, extent })
+        Ok(Self { renderer, plant, forest: None, backdrop, colors, size, center, extent, warm: false })
     }
 
     /// Shows the tree as one representation at all distances; with `None` it is gone.
@@ -163,11 +165,14 @@ impl Studio {
         let mut images = Vec::with_capacity(2);
         for color in self.colors.clone() {
             self.set_backdrop(&view, color);
-            // A new tree, sun or backdrop reaches the device in the first frame.
-            self.renderer.update()?;
+            if !self.warm {
+                // The backdrop's mesh and materials reach the device.
+                self.renderer.update()?;
+            }
             self.renderer.update()?;
             images.push(self.renderer.read()?);
         }
+        self.warm = true;
         let [black, white]: [RenderedImage; 2] =
             images.try_into().map_err(|_| AppError::Render("an image is missing".to_owned()))?;
         Ok(Cutout::new(self.size as usize, &black.pixels, &white.pixels))
