@@ -61,6 +61,9 @@ struct Arguments {
     /// Draw that forest without shadow maps. They are drawn for what appears, and for nothing else.
     #[arg(long)]
     no_shadows: bool,
+    /// Bring that forest onto the device in one frame, as for images.
+    #[arg(long)]
+    blocking: bool,
     /// Instead: builds and draws forests of these numbers of trees.
     #[arg(long, num_args = 1..)]
     trees: Vec<u64>,

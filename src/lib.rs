@@ -79,8 +79,8 @@ pub mod prelude {
         lod::{FadeBand, Levels, Representation},
         progress::{Progress, Silent},
         render::components::{
-            CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, LightUpdates, SunShadowSettings,
-            ViewOptions,
+            CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, ForestUpdates, Ground, LightUpdates,
+            SunShadowSettings, ViewOptions,
         },
         render::diagnostics::CanopyDiagnosticsPlugin,
         scene::{Overrides, Scene, SceneSource},

@@ -42,7 +42,7 @@ use crate::{
     plugin::CanopyPlugins,
     progress::Progress,
     render::{
-        components::{CanopyCamera, LightUpdates, SunShadowSettings},
+        components::{CanopyCamera, ForestUpdates, LightUpdates, SunShadowSettings},
         readback::read_rgb,
         report::{FrameReport, PassOutcome},
         shaders::CanopyShaders,
@@ -181,7 +181,7 @@ impl Renderer {
                 .disable::<TerminalCtrlCHandlerPlugin>()
                 .disable::<PipelinedRenderingPlugin>(),
         );
-        app.add_plugins(CanopyPlugins).insert_resource(LightUpdates::Blocking);
+        app.add_plugins(CanopyPlugins).insert_resource(LightUpdates::Blocking).insert_resource(ForestUpdates::Blocking);
         while app.plugins_state() == PluginsState::Adding {
             bevy::tasks::tick_global_task_pools_on_main_thread();
         }

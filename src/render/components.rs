@@ -159,6 +159,20 @@ impl LightUpdates {
     }
 }
 
+/// When a [`Forest`] that is new, or has other trees or shapes than before, is brought onto the device.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Resource, Default)]
+pub enum ForestUpdates {
+    /// In the frame that first draws it, which waits. For images and tests.
+    Blocking,
+    /// Over several frames, none of which does much more than its neighbours. Each writes some 8 MB of plants and trees.
+    /// Then the pipelines are made, one a frame where Bevy makes them in the frame. The forest is drawn once all of it is
+    /// there; one that replaces another is drawn in its place until then. Its shadow comes last: one cascade a frame,
+    /// beginning with the finest.
+    #[default]
+    Spread,
+}
+
 /// Settings of the shadow maps of sun and moon, on the entity of the [`Sun`](crate::components::Sun), which requires
 /// it.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
@@ -214,9 +228,10 @@ impl Plugin for ComponentsPlugin {
         ))
         .register_type::<(CanopyCamera, CanopyOrigin, SunShadowSettings, ViewOptions, CastsCanopyShadow)>()
         .register_type::<(Forest, Ground)>()
-        .register_type::<LightUpdates>()
+        .register_type::<(LightUpdates, ForestUpdates)>()
         .init_resource::<CanopyOrigin>()
-        .init_resource::<LightUpdates>();
+        .init_resource::<LightUpdates>()
+        .init_resource::<ForestUpdates>();
     }
 }
 

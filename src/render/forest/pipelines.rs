@@ -10,7 +10,7 @@ use bevy::{
 };
 
 use super::{
-    gpu_forest::GpuForests,
+    gpu_forest::{ForestLevel, GpuForests},
     representation::{LevelRenderer, LevelTarget},
 };
 use crate::{
@@ -37,16 +37,43 @@ impl LevelPipelines {
         self.0.get(&(renderer.representation(), features, target)).and_then(|id| cache.get_render_pipeline(*id))
     }
 
-    /// Whether all pipelines that `forests` need for `target` are ready.
-    pub fn ready(&self, forests: &GpuForests, target: LevelTarget, cache: &PipelineCache) -> bool {
-        forests.levels().all(|level| {
+    /// Whether all pipelines that `levels` need for `target` are ready.
+    pub fn ready<'a>(
+        &self,
+        mut levels: impl Iterator<Item = &'a ForestLevel>,
+        target: LevelTarget,
+        cache: &PipelineCache,
+    ) -> bool {
+        levels.all(|level| {
             let features = level.gpu.features(target);
             features.into_iter().all(|features| self.get(&*level.renderer, features, target, cache).is_some())
         })
     }
+
+    /// Requests the pipelines that `level` needs for `target`, of those that were not requested before at most `limit`,
+    /// which decreases with each.
+    fn request(&mut self, level: &ForestLevel, target: LevelTarget, cache: &PipelineCache, limit: &mut usize) {
+        for features in level.gpu.features(target) {
+            if *limit == 0 {
+                return;
+            }
+            self.0.entry((level.renderer.representation(), features, target)).or_insert_with(|| {
+                *limit -= 1;
+                cache.queue_render_pipeline(level.renderer.pipeline(features, target))
+            });
+        }
+    }
 }
 
-/// Requests the pipelines that the view and its shadow maps need.
+/// What the view and its shadow maps draw trees into; nothing without a view.
+pub fn targets(scene: &ExtractedScene, frame: &PreparedFrame) -> impl Iterator<Item = LevelTarget> {
+    let view = frame.view.as_ref().map(|view| LevelTarget::View(view.attachment));
+    let shadow = view.is_some() && (scene.shadow.cascades > 0 || scene.mesh_shadows);
+    view.into_iter().chain(shadow.then_some(LevelTarget::ShadowMap))
+}
+
+/// Requests the pipelines that the view and its shadow maps need: those of forests that are drawn, and one a frame of
+/// those that arrive.
 pub fn prepare_pipelines(
     scene: Res<ExtractedScene>,
     frame: Res<PreparedFrame>,
@@ -54,16 +81,9 @@ pub fn prepare_pipelines(
     cache: Res<PipelineCache>,
     mut pipelines: ResMut<LevelPipelines>,
 ) {
-    let Some(view) = &frame.view else { return };
-    let shadow = (scene.shadow.cascades > 0 || scene.mesh_shadows).then_some(LevelTarget::ShadowMap);
-    for target in [LevelTarget::View(view.attachment)].into_iter().chain(shadow) {
-        for level in forests.levels() {
-            for features in level.gpu.features(target) {
-                pipelines
-                    .0
-                    .entry((level.renderer.representation(), features, target))
-                    .or_insert_with(|| cache.queue_render_pipeline(level.renderer.pipeline(features, target)));
-            }
-        }
+    let mut one = 1;
+    for target in targets(&scene, &frame) {
+        forests.levels().for_each(|level| pipelines.request(level, target, &cache, &mut { usize::MAX }));
+        forests.arriving_levels().for_each(|level| pipelines.request(level, target, &cache, &mut one));
     }
 }

@@ -26,7 +26,8 @@ use bevy::{
 };
 use glam::Vec3;
 
-use super::{instance_layout::instance_layout, transfer::TransferLight};
+use super::instance_layout::instance_layout;
+pub use super::upload::{DeviceWrites, ForestUpload};
 use crate::{
     bake::BakedPlant,
     cull::Grouping,
@@ -34,7 +35,7 @@ use crate::{
     render::{
         bindings::{SHADOW_FORMAT, caster_layout, frame_layout},
         components::{Forest, SunLight},
-        gpu::{Gpu, opaque_depth, reversed_depth},
+        gpu::{opaque_depth, reversed_depth},
         view::ViewFormat,
     },
 };
@@ -121,14 +122,6 @@ pub struct Relight<'a> {
     pub new: &'a [BakedPlant],
     /// How the sun lights each plant; the default beyond the end of the list.
     pub suns: &'a [SunLight],
-}
-
-/// The resources that an upload writes to.
-pub struct ForestUpload<'a, 'w> {
-    /// The device.
-    pub gpu: &'a Gpu<'w>,
-    /// The light for radiance transfer, which records what plants need of it.
-    pub transfer: &'a mut TransferLight,
 }
 
 /// All representations that can be drawn: a resource of the main world until the app is finished, then of the render

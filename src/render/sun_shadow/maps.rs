@@ -31,15 +31,41 @@ use crate::{
     },
 };
 
+/// A forest that casts: its entity, its generation, its origin, and the distances at which each level casts.
+pub type ForestKey = (Entity, u64, DVec3, Vec<Range<f64>>);
+
 /// Everything that a cascade's map depends on. Equal keys have equal maps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CascadeKey {
     /// Position of the cascade.
     pub place: CascadeBox,
-    /// Per forest: its generation, its origin, and the distances at which each level casts.
-    pub forests: Vec<(Entity, u64, DVec3, Vec<Range<f64>>)>,
+    /// The forests that cast.
+    pub forests: Vec<ForestKey>,
     /// State of the ordinary meshes that cast.
     pub meshes: u64,
+}
+
+impl CascadeKey {
+    /// The state of a map that takes up no new forest yet, if `self` has one that `drawn` has not; `drawn` is what the
+    /// map holds. A forest that was replaced where it stands keeps the shadow of the one before, as long as nothing else
+    /// has changed.
+    pub fn without_new_forests(&self, drawn: Option<&Self>) -> Option<Self> {
+        let known = |entity| drawn?.forests.iter().find(|known| known.0 == entity);
+        let kept = Self {
+            forests: self.forests.iter().filter_map(|forest| known(forest.0)).cloned().collect(),
+            ..self.clone()
+        };
+        let replaced = |(old, new): (&ForestKey, &ForestKey)| (old.0, old.2) == (new.0, new.2);
+        let same_places = kept.forests.iter().all(|old| self.forests.iter().any(|new| replaced((old, new))));
+        if drawn == Some(&kept) && same_places && kept != *self {
+            return Some(kept);
+        }
+        let older = Self {
+            forests: self.forests.iter().filter(|forest| known(forest.0).is_some()).cloned().collect(),
+            ..self.clone()
+        };
+        (older != *self).then_some(older)
+    }
 }
 
 /// The state that a layer was drawn for.
@@ -171,5 +197,38 @@ impl ShadowMaps {
             self.drawn = vec![None; count];
         }
         self.drawn.resize(self.layers.len(), None);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::ecs::world::World;
+
+    use super::*;
+
+    #[test]
+    fn a_map_waits_with_new_forests_and_with_nothing_else() {
+        let mut world = World::new();
+        let [old, new] = [(); 2].map(|()| world.spawn_empty().id());
+        let place = |x: f64| CascadeBox::new(DVec3::X * x, 30.0, 1024, DVec3::Y, 10.0);
+        let forest = |entity, generation, x: f64| -> ForestKey { (entity, generation, DVec3::X * x, vec![0.0..80.0]) };
+        let key = |x, forests: &[ForestKey]| CascadeKey { place: place(x), forests: forests.to_vec(), meshes: 7 };
+
+        // What is the same needs no waiting; neither does what moved.
+        let drawn = key(0.0, &[forest(old, 1, 0.0)]);
+        assert_eq!(drawn.without_new_forests(Some(&drawn)), None);
+        assert_eq!(key(500.0, &drawn.forests).without_new_forests(Some(&drawn)), None);
+        assert_eq!(key(0.0, &[forest(old, 2, 9.0)]).without_new_forests(Some(&drawn)), None);
+        // A new forest is left out, whatever the map holds.
+        let both = |x| key(x, &[forest(old, 1, 0.0), forest(new, 2, 0.0)]);
+        for x in [0.0, 500.0] {
+            assert_eq!(both(x).without_new_forests(Some(&drawn)), Some(key(x, &drawn.forests)));
+        }
+        assert_eq!(both(0.0).without_new_forests(None), Some(key(0.0, &[])));
+        let other = key(0.0, &[forest(new, 2, 0.0)]);
+        assert_eq!(key(0.0, &[forest(old, 3, 0.0)]).without_new_forests(Some(&other)), Some(key(0.0, &[])));
+        // One that was replaced keeps its shadow while the map stays where it is.
+        assert_eq!(key(0.0, &[forest(old, 2, 0.0)]).without_new_forests(Some(&drawn)), Some(drawn.clone()));
+        assert_eq!(key(500.0, &[forest(old, 2, 0.0)]).without_new_forests(Some(&drawn)), None);
     }
 }

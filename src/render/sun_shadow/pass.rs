@@ -37,7 +37,7 @@ pub fn sun_shadow_pass(
 ) {
     let maps = &mut *maps;
     let Some(cascade_group) = &maps.cascade_bind_group else { return };
-    if !pipelines.ready(&forests, TARGET, &cache) {
+    if !pipelines.ready(forests.levels(), TARGET, &cache) {
         return;
     }
     let diagnostics = ctx.diagnostic_recorder();

@@ -21,6 +21,7 @@ use crate::{
             SharedPlacement, SharedTextures, caster_layout,
             uniforms::{CascadeViewUniform, MAX_CASCADES},
         },
+        components::ForestUpdates,
         extract::ExtractedScene,
         forest::{GpuForests, forest_view, instance_bind_group},
         gpu::{self, Gpu, GrowingBuffer, UNIFORM_STRIDE},
@@ -73,6 +74,8 @@ pub fn prepare_shadows(
         .map(|&radius| CascadeBox::new(view.camera, radius, maps.map_size, direction, f64::from(tallest)))
         .collect();
 
+    // Where forests arrive over several frames, one map a frame takes up those that are new.
+    let mut takes_new = true;
     for (index, &place) in maps.cascades.iter().enumerate() {
         // Near the camera, a finer map already contains the trees' shadows.
         let served = index.checked_sub(1).map_or(0.0, |finer| 0.7 * maps.cascades[finer].radius);
@@ -80,10 +83,16 @@ pub fn prepare_shadows(
             let casting = forest.casting_distances(served..settings.proxy_distance, place.texel);
             (entity, forest.generation, forest.forest.origin, casting)
         });
-        let key = CascadeKey { place, forests: content.collect(), meshes: meshes.state() };
+        let mut key = CascadeKey { place, forests: content.collect(), meshes: meshes.state() };
         let name = format!("sun_shadow cascade {index}");
         let this_view = (view.camera, view.clip_from_relative);
         let drawn = maps.drawn[index].as_ref();
+        let spread = scene.forest_updates == ForestUpdates::Spread;
+        if let Some(older) = spread.then(|| key.without_new_forests(drawn.map(|drawn| &drawn.key))).flatten()
+            && !std::mem::take(&mut takes_new)
+        {
+            key = older;
+        }
         let fits = |drawn: &DrawnCascade| drawn.key == key && drawn.seen_by.is_none_or(|seen_by| seen_by == this_view);
         if drawn.is_some_and(fits) {
             report.skipped(name, "light, box and casters have not changed");
@@ -97,7 +106,7 @@ pub fn prepare_shadows(
         let margin = 6.0 * place.texel + 0.6 * f64::from(widest);
         let lowest = lowest_receiver(&scene, view.camera, place.radius) - margin;
         let seen = (!same_light).then_some(SeenShadows { camera: view.camera, frustum: &view.frustum, lowest, margin });
-        let casting: Vec<_> = key.forests.iter().map(|(.., casting)| casting.clone()).collect();
+        let casting = key.forests.clone();
         let content = DrawnCascade { key, seen_by: seen.as_ref().map(|_| this_view) };
         let uniform = CascadeViewUniform {
             clip_from_anchor: place.clip_from_anchor().to_cols_array_2d(),
@@ -106,7 +115,8 @@ pub fn prepare_shadows(
         };
         gpu.queue.write_buffer(&maps.cascade_uniforms, index as u64 * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));
         let mut work = CascadeWork { index, content, forests: Vec::new() };
-        for ((entity, forest), casting) in forests.iter().zip(&casting) {
+        for (entity, .., casting) in &casting {
+            let (entity, Some(forest)) = (*entity, forests.get(*entity)) else { continue };
             let lists = cull_cascade(
                 &forest.forest.stand,
                 &forest.sizes,

@@ -30,7 +30,7 @@ use crate::{
             representation::{ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight},
             uniforms::{CROSS_CASTER_VERTICES, CROSS_VERTICES, PLANES, cross_variants},
         },
-        gpu::{self, Gpu},
+        gpu,
         shaders::{CanopyShaders, ShaderFile},
     },
 };
@@ -145,8 +145,8 @@ impl LevelRenderer for CrossRenderer {
             );
             return Box::new(GpuCrosses { drawn: None });
         }
-        let (properties, variants, bind_group) = upload_textures(plants, upload.gpu);
-        let (light, light_textures) = (CrossLight::of(plants), upload_light(plants, upload.gpu));
+        let (properties, variants, bind_group) = upload_textures(plants, upload);
+        let (light, light_textures) = (CrossLight::of(plants), upload_light(plants, upload));
         Box::new(GpuCrosses { drawn: Some(DrawnCrosses { properties, variants, bind_group, light, light_textures }) })
     }
 
@@ -263,33 +263,46 @@ impl GpuLevel for GpuCrosses {
         if pairs().filter(changed).any(|(old, new)| has_light(old) || has_light(new)) {
             // Adding or removing a plant's lighting textures moves the layers of the others.
             drawn.light = CrossLight::of(relight.new);
-            drawn.light_textures = upload_light(relight.new, upload.gpu);
+            drawn.light_textures = upload_light(&Arc::new(relight.new.to_vec()), upload);
         }
     }
 }
 
-/// Three layers per plant of the textures that `of` takes from a cross. A plant without a cross gets those of another
-/// one; its planes have no extent, so they are never seen.
-fn layers(plants: &[BakedPlant], of: fn(&Cross) -> &[MipChain]) -> Vec<MipView<'_>> {
-    let crosses = || plants.iter().filter_map(BakedPlant::cross);
-    let Some(blank) = crosses().find_map(|cross| of(cross).first()) else { return Vec::new() };
-    let mut all = Vec::with_capacity(plants.len() * PLANES);
-    for plant in plants {
-        let own = plant.cross().map_or(&[][..], |cross| of(cross));
-        all.extend((0..PLANES).map(|plane| own.get(plane).unwrap_or(blank).view()));
-    }
-    all
+/// A layer, of three per plant, of the textures that `of` takes from a cross. A plant without a cross gets those of
+/// another one; its planes have no extent, so they are never seen.
+fn layer(plants: &[BakedPlant], index: usize, of: fn(&Cross) -> &[MipChain]) -> Option<MipView<'_>> {
+    let own = plants.get(index / PLANES)?.cross().and_then(|cross| of(cross).get(index % PLANES));
+    let blank = || plants.iter().filter_map(BakedPlant::cross).find_map(|cross| of(cross).first());
+    own.or_else(blank).map(MipChain::view)
+}
+
+/// A layer of the lighting textures, of those plants that have them.
+fn light_layer(plants: &[BakedPlant], index: usize) -> Option<MipView<'_>> {
+    let crosses = plants.iter().filter_map(BakedPlant::cross);
+    crosses.flat_map(|cross| &cross.textures.light).nth(index).map(MipChain::view)
 }
 
 /// The property texture of all crosses, the data of each plant's crosses, and their bind group.
-fn upload_textures(plants: &[BakedPlant], gpu: &Gpu) -> (Texture, Buffer, BindGroup) {
-    let colors = layers(plants, |cross| &cross.textures.color);
-    let properties = layers(plants, |cross| &cross.textures.properties);
-    let upload = |label: &str, format: TextureFormat, layers: &[MipView]| {
-        gpu::texture_array(&gpu.device, &gpu.queue, label, format, layers, gpu::SMALLEST_TESTED_MIP)
-    };
-    let (_, colors) = upload("canopy_cross_color", TextureFormat::Rgba8UnormSrgb, &colors);
-    let (texture, properties) = upload("canopy_cross_properties", TextureFormat::Rgba8Unorm, &properties);
+fn upload_textures(plants: &Arc<Vec<BakedPlant>>, upload: &mut ForestUpload) -> (Texture, Buffer, BindGroup) {
+    let has_crosses = plants.iter().any(|plant| plant.cross().is_some());
+    let (layers, smallest) = (if has_crosses { plants.len() * PLANES } else { 0 }, gpu::SMALLEST_TESTED_MIP);
+    let (_, colors) = upload.texture_array(
+        "canopy_cross_color",
+        TextureFormat::Rgba8UnormSrgb,
+        layers,
+        smallest,
+        plants,
+        |plants, index| layer(plants, index, |cross| &cross.textures.color),
+    );
+    let (texture, properties) = upload.texture_array(
+        "canopy_cross_properties",
+        TextureFormat::Rgba8Unorm,
+        layers,
+        smallest,
+        plants,
+        |plants, index| layer(plants, index, |cross| &cross.textures.properties),
+    );
+    let gpu = upload.gpu;
     let sampler = gpu.device.create_sampler(&SamplerDescriptor {
         label: Some("canopy_cross"),
         address_mode_u: AddressMode::ClampToEdge,
@@ -310,15 +323,16 @@ fn upload_textures(plants: &[BakedPlant], gpu: &Gpu) -> (Texture, Buffer, BindGr
 }
 
 /// The lighting textures, of those plants that have them.
-fn upload_light(plants: &[BakedPlant], gpu: &Gpu) -> Option<BindGroup> {
-    let crosses = plants.iter().filter_map(BakedPlant::cross);
-    let layers: Vec<MipView> = crosses.flat_map(|cross| &cross.textures.light).map(MipChain::view).collect();
-    if layers.is_empty() {
+fn upload_light(plants: &Arc<Vec<BakedPlant>>, upload: &mut ForestUpload) -> Option<BindGroup> {
+    let layers = plants.iter().filter_map(BakedPlant::cross).map(|cross| cross.textures.light.len()).sum();
+    if layers == 0 {
         return None;
     }
     let (label, format) = ("canopy_cross_light", TextureFormat::Rgba8Snorm);
-    let (_, view) = gpu::texture_array(&gpu.device, &gpu.queue, label, format, &layers, gpu::SMALLEST_TESTED_MIP);
-    Some(gpu.bind_group(label, &light_layout(), &BindGroupEntries::single(&view)))
+    let (_, view) = upload.texture_array(label, format, layers, gpu::SMALLEST_TESTED_MIP, plants, |plants, index| {
+        light_layer(plants, index)
+    });
+    Some(upload.gpu.bind_group(label, &light_layout(), &BindGroupEntries::single(&view)))
 }
 
 /// Whether crosses have the same planes, colours and outlines. A bake with another lighting creates equal ones in other
