@@ -22,8 +22,8 @@ use super::Arguments;
 
 /// Frames before the forest is spawned.
 const NEIGHBOURS: usize = 4;
-/// Frames after the one that draws it first. In the second half of them it has all its shadows.
-const AFTER: usize = 10;
+/// Frames after the one that draws it first. In the last ones it has all its shadows.
+const AFTER: usize = 24;
 
 /// Times the frames around the appearance of a forest.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
@@ -66,7 +66,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         }
         let first = times.len() - 1;
         times.extend(frames(&mut renderer, AFTER)?);
-        let stays = median(&times[first + 1 + AFTER / 2..]);
+        let stays = median(&times[times.len() - NEIGHBOURS..]);
         let (longest, worst) = (times[NEIGHBOURS..].iter().copied().fold(0.0, f64::max), worst(&times));
         println!(
             "| {turn} | {} | {} | {:.3} | {} | {stays:.3} | {:.2} | {worst:.2} |",

@@ -167,8 +167,8 @@ pub enum ForestUpdates {
     Blocking,
     /// Over several frames, none of which does much more than its neighbours. Each writes some 8 MB of plants and trees.
     /// Then the pipelines are made, one a frame where Bevy makes them in the frame. The forest is drawn once all of it is
-    /// there; one that replaces another is drawn in its place until then. Its shadow comes last: one cascade a frame,
-    /// beginning with the finest.
+    /// there; until then one that it replaces stays. Its shadow comes last: one cascade after the other
+    /// from the finest, each drawn over four frames.
     #[default]
     Spread,
 }

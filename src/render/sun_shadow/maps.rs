@@ -11,7 +11,7 @@ use bevy::{
     platform::collections::HashMap,
     render::{
         render_resource::{
-            BindGroup, Buffer, Extent3d, TextureDescriptor, TextureDimension, TextureUsages, TextureView,
+            BindGroup, Buffer, Extent3d, Texture, TextureDescriptor, TextureDimension, TextureUsages, TextureView,
             TextureViewDescriptor, TextureViewDimension,
         },
         renderer::RenderDevice,
@@ -87,12 +87,32 @@ pub struct CascadeForest {
     pub bind_group: BindGroup,
 }
 
+/// Number of frames over which a map is drawn that takes up forests which arrive over several frames.
+pub const PARTS: usize = 4;
+
+/// A map that takes up new forests: drawn beside the cascade's own, a part of its casters in each frame, and copied over it
+/// when it is complete.
+pub struct FreshMap {
+    /// Which layer it is for.
+    pub index: usize,
+    /// The state that it is drawn for.
+    pub content: DrawnCascade,
+    /// Parts that are drawn, of [`PARTS`].
+    pub parts: usize,
+    /// The map.
+    pub texture: Texture,
+    /// Its view, for drawing.
+    pub view: TextureView,
+}
+
 /// A cascade that must be drawn in this frame.
 pub struct CascadeWork {
     /// Which layer.
     pub index: usize,
     /// The state that the map is drawn for.
     pub content: DrawnCascade,
+    /// Whether only the next part of it is drawn, into the [`FreshMap`].
+    pub fresh: bool,
     /// Casters.
     pub forests: Vec<CascadeForest>,
 }
@@ -108,6 +128,8 @@ pub struct CasterBuffers {
 /// The shadow maps and their state.
 #[derive(Resource)]
 pub struct ShadowMaps {
+    /// All layers.
+    pub texture: Texture,
     /// All layers, for sampling.
     pub view: TextureView,
     /// One view per layer, for drawing.
@@ -116,6 +138,8 @@ pub struct ShadowMaps {
     pub cascades: Vec<CascadeBox>,
     /// The state of each layer.
     pub drawn: Vec<Option<DrawnCascade>>,
+    /// The map that is drawn over several frames, if there is one.
+    pub fresh: Option<FreshMap>,
     /// Cascades to draw in this frame.
     pub work: Vec<CascadeWork>,
     /// Group 0 of the casters.
@@ -132,12 +156,14 @@ impl FromWorld for ShadowMaps {
     fn from_world(world: &mut World) -> Self {
         let device = world.resource::<RenderDevice>();
         // One texel is enough while no shadow is requested: a scene allocates nothing large that it does not use.
-        let (view, layers) = create_maps(device, 1, 1);
+        let (texture, view, layers) = create_maps(device, 1, 1);
         Self {
+            texture,
             view,
             layers,
             cascades: Vec::new(),
             drawn: Vec::new(),
+            fresh: None,
             work: Vec::new(),
             cascade_bind_group: None,
             map_size: 1,
@@ -147,17 +173,8 @@ impl FromWorld for ShadowMaps {
     }
 }
 
-fn create_maps(device: &RenderDevice, size: u32, count: usize) -> (TextureView, Vec<TextureView>) {
-    let texture = device.create_texture(&TextureDescriptor {
-        label: Some("canopy_sun_shadow"),
-        size: Extent3d { width: size, height: size, depth_or_array_layers: count.max(1) as u32 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: TextureDimension::D2,
-        format: SHADOW_FORMAT,
-        usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING,
-        view_formats: &[],
-    });
+fn create_maps(device: &RenderDevice, size: u32, count: usize) -> (Texture, TextureView, Vec<TextureView>) {
+    let texture = create_texture(device, size, count);
     let layer = |index: usize| {
         texture.create_view(&TextureViewDescriptor {
             dimension: Some(TextureViewDimension::D2),
@@ -168,7 +185,24 @@ fn create_maps(device: &RenderDevice, size: u32, count: usize) -> (TextureView, 
     };
     let all = texture
         .create_view(&TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..Default::default() });
-    (all, (0..count).map(layer).collect())
+    let layers = (0..count).map(layer).collect();
+    (texture, all, layers)
+}
+
+fn create_texture(device: &RenderDevice, size: u32, count: usize) -> Texture {
+    device.create_texture(&TextureDescriptor {
+        label: Some("canopy_sun_shadow"),
+        size: Extent3d { width: size, height: size, depth_or_array_layers: count.max(1) as u32 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: TextureDimension::D2,
+        format: SHADOW_FORMAT,
+        usage: TextureUsages::RENDER_ATTACHMENT
+            | TextureUsages::TEXTURE_BINDING
+            | TextureUsages::COPY_SRC
+            | TextureUsages::COPY_DST,
+        view_formats: &[],
+    })
 }
 
 impl ShadowMaps {
@@ -192,11 +226,23 @@ impl ShadowMaps {
         let size = settings.map_size.max(16).min(limit.min(8192));
         let count = settings.cascades.min(MAX_CASCADES);
         if count > 0 && (size != self.map_size || count != self.layers.len()) {
-            (self.view, self.layers) = create_maps(device, size, count);
+            (self.texture, self.view, self.layers) = create_maps(device, size, count);
             self.map_size = size;
             self.drawn = vec![None; count];
+            self.fresh = None;
         }
         self.drawn.resize(self.layers.len(), None);
+    }
+
+    /// Begins a [`FreshMap`] of `content` for the layer `index`, or goes on with it.
+    pub fn continue_fresh(&mut self, device: &RenderDevice, index: usize, content: &DrawnCascade) {
+        let same = |fresh: &FreshMap| fresh.index == index && fresh.content == *content;
+        if self.fresh.as_ref().is_some_and(same) {
+            return;
+        }
+        let texture = create_texture(device, self.map_size, 1);
+        let view = texture.create_view(&TextureViewDescriptor::default());
+        self.fresh = Some(FreshMap { index, content: content.clone(), parts: 0, texture, view });
     }
 }
 

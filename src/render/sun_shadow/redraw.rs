@@ -7,7 +7,7 @@ use bevy::{
 use glam::{DVec2, DVec3};
 
 use super::{
-    maps::{CascadeForest, CascadeKey, CascadeWork, CasterBuffers, DrawnCascade, ShadowMaps},
+    maps::{CascadeForest, CascadeKey, CascadeWork, CasterBuffers, DrawnCascade, PARTS, ShadowMaps},
     meshes::MeshCasters,
 };
 use crate::{
@@ -75,8 +75,10 @@ pub fn prepare_shadows(
         .collect();
 
     // Where forests arrive over several frames, one map a frame takes up those that are new.
-    let mut takes_new = true;
-    for (index, &place) in maps.cascades.iter().enumerate() {
+    let spread = scene.forest_updates == ForestUpdates::Spread;
+    let (mut takes_new, mut goes_on) = (true, false);
+    for index in 0..maps.cascades.len() {
+        let place = maps.cascades[index];
         // Near the camera, a finer map already contains the trees' shadows.
         let served = index.checked_sub(1).map_or(0.0, |finer| 0.7 * maps.cascades[finer].radius);
         let content = forests.iter().map(|(entity, forest)| {
@@ -87,14 +89,25 @@ pub fn prepare_shadows(
         let name = format!("sun_shadow cascade {index}");
         let this_view = (view.camera, view.clip_from_relative);
         let drawn = maps.drawn[index].as_ref();
-        let spread = scene.forest_updates == ForestUpdates::Spread;
-        if let Some(older) = spread.then(|| key.without_new_forests(drawn.map(|drawn| &drawn.key))).flatten()
-            && !std::mem::take(&mut takes_new)
-        {
-            key = older;
+        let fits = |drawn: &DrawnCascade, key: &CascadeKey| {
+            drawn.key == *key && drawn.seen_by.is_none_or(|seen_by| seen_by == this_view)
+        };
+        let mut fresh = false;
+        if let Some(older) = spread.then(|| key.without_new_forests(drawn.map(|drawn| &drawn.key))).flatten() {
+            let moved = drawn.is_some_and(|drawn| drawn.key.place != place);
+            if drawn.is_some_and(|drawn| fits(drawn, &older)) {
+                if !std::mem::take(&mut takes_new) {
+                    report.skipped(name, "another map takes up a new forest first");
+                    continue;
+                }
+                fresh = true;
+            } else if !moved || !std::mem::take(&mut takes_new) {
+                // What it holds is not what the world was before the new forest. It takes that forest up in another
+                // frame; if it moves, at once, as it may move again in the next frame.
+                key = older;
+            }
         }
-        let fits = |drawn: &DrawnCascade| drawn.key == key && drawn.seen_by.is_none_or(|seen_by| seen_by == this_view);
-        if drawn.is_some_and(fits) {
+        if drawn.is_some_and(|drawn| fits(drawn, &key)) {
             report.skipped(name, "light, box and casters have not changed");
             continue;
         }
@@ -105,16 +118,25 @@ pub fn prepare_shadows(
         let same_light = drawn.is_some_and(|drawn| drawn.key.place.direction == key.place.direction);
         let margin = 6.0 * place.texel + 0.6 * f64::from(widest);
         let lowest = lowest_receiver(&scene, view.camera, place.radius) - margin;
-        let seen = (!same_light).then_some(SeenShadows { camera: view.camera, frustum: &view.frustum, lowest, margin });
+        let seen = (!same_light && !fresh).then_some(SeenShadows {
+            camera: view.camera,
+            frustum: &view.frustum,
+            lowest,
+            margin,
+        });
         let casting = key.forests.clone();
         let content = DrawnCascade { key, seen_by: seen.as_ref().map(|_| this_view) };
+        if fresh {
+            maps.continue_fresh(&gpu.device, index, &content);
+            goes_on = true;
+        }
         let uniform = CascadeViewUniform {
             clip_from_anchor: place.clip_from_anchor().to_cols_array_2d(),
             direction: place.direction.as_vec3().to_array(),
             padding: 0.0,
         };
         gpu.queue.write_buffer(&maps.cascade_uniforms, index as u64 * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));
-        let mut work = CascadeWork { index, content, forests: Vec::new() };
+        let mut work = CascadeWork { index, content, fresh, forests: Vec::new() };
         for (entity, .., casting) in &casting {
             let (entity, Some(forest)) = (*entity, forests.get(*entity)) else { continue };
             let lists = cull_cascade(
@@ -138,8 +160,12 @@ pub fn prepare_shadows(
             work.forests.push(CascadeForest { entity, lists, bind_group });
         }
         let trees: usize = work.forests.iter().map(|forest| forest.lists.visible.len()).sum();
-        report.ran(name, format!("{trees} trees within {:.0} m", place.radius));
+        let part = if fresh { format!(", one of {PARTS} parts") } else { String::new() };
+        report.ran(name, format!("{trees} trees within {:.0} m{part}", place.radius));
         maps.work.push(work);
+    }
+    if !goes_on {
+        maps.fresh = None;
     }
     maps.cascade_bind_group = Some(gpu.bind_group(
         "canopy_cascade",
