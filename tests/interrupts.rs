@@ -84,6 +84,52 @@ fn an_interrupted_sequence_says_what_is_finished_and_goes_on_there() {
     assert!(said.contains(&format!("terminated: {second} of 10000 images are finished")) && second > first, "{said}");
 }
 
+/// A display in memory, which ends with the value.
+struct Display(Child, String);
+
+impl Display {
+    /// `None` where Xvfb is not installed.
+    fn new() -> Option<Self> {
+        let mut xvfb = Command::new("Xvfb");
+        // It chooses a free number and says it when it can be used.
+        xvfb.args(["-displayfd", "1", "-screen", "0", "320x240x24", "-nolisten", "tcp"]);
+        let mut server = xvfb.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().ok()?;
+        let mut number = String::new();
+        let output = server.stdout.as_mut().map(BufReader::new);
+        output.expect("its output").read_line(&mut number).expect("text");
+        assert!(number.trim().parse::<u32>().is_ok(), "Xvfb did not start");
+        Some(Self(server, format!(":{}", number.trim())))
+    }
+}
+
+impl Drop for Display {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+fn an_interrupted_flight_ends_with_the_code_of_the_signal() {
+    let _gpu = gpu();
+    let Some(display) = Display::new() else {
+        println!("not tested: Xvfb is not installed (Debian's package xvfb; ./test installs it)");
+        return;
+    };
+    let (_folder, scene) = plane();
+    let flight = || {
+        let mut command = command(&["fly", "--size", "64x36"]);
+        command.arg(&scene).env("DISPLAY", &display.1).env_remove("WAYLAND_DISPLAY");
+        command
+    };
+    // The scene is built beside a window that is open already.
+    for (signal, expected, word) in [("INT", 130, "interrupted: "), ("TERM", 143, "terminated: ")] {
+        let (code, said) = signalled(flight(), signal, "0 trees");
+        assert_eq!(code, Some(expected), "{said}");
+        assert!(said.contains(&format!("{word}the flight was ended")) && !said.contains("error"), "{said}");
+    }
+}
+
 #[test]
 fn a_killed_sequence_leaves_whole_images() {
     let _gpu = gpu();

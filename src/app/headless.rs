@@ -393,7 +393,8 @@ fn render_target(app: &mut App, (width, height): (u32, u32)) -> Handle<Image> {
         Extent3d { width, height, depth_or_array_layers: 1 },
         TextureDimension::D2,
         TextureFormat::Rgba8UnormSrgb,
-        RenderAssetUsages::RENDER_WORLD,
+        // Without texels it costs nothing to keep it in the main world, from where a device that is made anew gets it.
+        RenderAssetUsages::default(),
     );
     image.texture_descriptor.usage |= TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC;
     app.world_mut().resource_mut::<Assets<Image>>().add(image)

@@ -67,7 +67,7 @@ fn a_forest_without_trees_or_plants_draws_nothing_and_is_no_error_of_the_device(
 }
 
 /// Buffers, textures and bind groups that the program holds. Views and samplers are held by bind groups.
-fn objects(renderer: &mut Renderer) -> [usize; 3] {
+pub(super) fn objects(renderer: &mut Renderer) -> [usize; 3] {
     let instance = renderer.app().sub_app(RenderApp).world().resource::<RenderInstance>();
     let report = instance.generate_report().expect("a report of a native device");
     let hub = report.hub_report();
