@@ -146,6 +146,33 @@ fn a_killed_sequence_leaves_whole_images() {
 }
 
 #[test]
+fn a_sequence_that_is_killed_while_it_writes_leaves_whole_images_and_goes_on() {
+    let _gpu = gpu();
+    let (folder, scene) = plane();
+    let out = folder.path().join("flight");
+    let is_half = |file: &PathBuf| file.extension().is_some_and(|extension| extension == "tmp");
+    let mut program = sequence(&scene, &out).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program");
+    // A temporary file is there until it is renamed.
+    while !listing(&out).iter().any(is_half) {
+        assert!(program.try_wait().expect("its state").is_none(), "it ended by itself");
+        std::thread::yield_now();
+    }
+    send("KILL", &program);
+    assert_eq!(program.wait().expect("its end").code(), None);
+    // It may have been renamed before the signal arrived; then there is one more image, and no half one.
+    let halves: Vec<_> = listing(&out).into_iter().filter(is_half).collect();
+    assert!(halves.len() <= 1, "{halves:?}");
+    let finished = listing(&out).len() - halves.len();
+    let mut resumed = sequence(&scene, &out);
+    resumed.arg("--resume");
+    let (code, said) = signalled(resumed, "INT", "drawn in");
+    assert_eq!(code, Some(130), "{said}");
+    assert!(finished == 0 || said.contains(&format!("{finished} of 10000 images are")) || finished == 1, "{said}");
+    halves.iter().for_each(|half| std::fs::remove_file(half).expect("a file"));
+    assert!(images(&out) > finished);
+}
+
+#[test]
 fn an_interrupted_reference_keeps_its_samples_at_once() {
     let (folder, scene) = plane();
     let reference = |out: &str, samples: &str, more: &[&str]| {

@@ -18,7 +18,12 @@
 #endif
 
 struct Varying {
+#ifdef DEPTH_FIRST
+    // The same bits in the pipelines of both stages.
+    @builtin(position) @invariant clip: vec4<f32>,
+#else
     @builtin(position) clip: vec4<f32>,
+#endif
     @location(0) relative: vec3<f32>,
     @location(1) uv: vec2<f32>,
     @location(2) @interpolate(flat) layer: u32,
@@ -100,23 +105,38 @@ fn decode_octahedral(e: vec2<f32>) -> vec3<f32> {
     return normalize(n);
 }
 
+// Discards what does not cover, and returns the fraction of the samples that the rest covers.
+fn alpha_test(alpha: f32, threshold: f32) -> f32 {
+    var coverage = 1.0;
+#ifdef ALPHA_TO_COVERAGE
+    coverage = clamp((alpha - threshold) / max(fwidth(alpha), 1e-4) + 0.5, 0.0, 1.0);
+    if coverage <= 0.0 {
+        discard;
+    }
+#else
+    if alpha < threshold {
+        discard;
+    }
+#endif
+    return coverage;
+}
+
+#ifdef DEPTH_FIRST
+// Depth alone: the alpha test of the light that follows. Of the colour only the coverage is used.
+@fragment
+fn depth(in: Varying) -> @location(0) vec4<f32> {
+    let texel = textureSampleLevel(color_textures, texture_sampler, in.uv, in.layer, mip_level(in.uv));
+    return vec4(alpha_test(texel.a, unpack_look(in.look).threshold));
+}
+#endif
+
 @fragment
 fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let look = unpack_look(in.look);
     let variant = in.layer / PLANES;
     let level = mip_level(in.uv);
     let texel = textureSampleLevel(color_textures, texture_sampler, in.uv, in.layer, level);
-    var coverage = 1.0;
-#ifdef ALPHA_TO_COVERAGE
-    coverage = clamp((texel.a - look.threshold) / max(fwidth(texel.a), 1e-4) + 0.5, 0.0, 1.0);
-    if coverage <= 0.0 {
-        discard;
-    }
-#else
-    if texel.a < look.threshold {
-        discard;
-    }
-#endif
+    let coverage = alpha_test(texel.a, look.threshold);
     let properties = textureSampleLevel(property_textures, texture_sampler, in.uv, in.layer, level);
     let local = decode_octahedral(properties.xy);
     let normal = normalize(in.right * local.x + in.up * local.y + in.front * local.z);

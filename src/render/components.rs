@@ -203,13 +203,23 @@ impl Default for SunShadowSettings {
     }
 }
 
-/// Debug options of a camera.
-#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, ExtractComponent, Reflect)]
+/// How a camera's trees are drawn.
+#[derive(Component, Clone, Copy, Debug, PartialEq, Eq, ExtractComponent, Reflect)]
 #[reflect(Component, Default)]
 pub struct ViewOptions {
     /// Whether trees are tinted by their level of detail, each level in its own colour.
     #[reflect(@"Each level of detail in its own colour.")]
     pub tint_levels: bool,
+    /// Whether the depth of crosses is drawn before their light, so that each pixel is shaded once: the same image, in less
+    /// time where crosses hide each other.
+    #[reflect(@"Depth of crosses before their light: the same image, in less time where they hide each other.")]
+    pub depth_first: bool,
+}
+
+impl Default for ViewOptions {
+    fn default() -> Self {
+        Self { tint_levels: false, depth_first: true }
+    }
 }
 
 /// An ordinary Bevy mesh that casts its shadow onto Canopy's trees and ground.

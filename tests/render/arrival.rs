@@ -13,7 +13,7 @@ use canopy::{
     scatter::PackedStand,
 };
 
-use super::{NOON, again, despawn, draw, forests::objects, renderer, showing};
+use super::{NOON, again, despawn, draw, forests::objects, showing};
 use crate::support::{
     gpu::gpu,
     stage::{grove, view},

@@ -82,7 +82,7 @@ fn forests_that_come_and_go_leave_nothing_on_the_device() {
     let from = view(stage, (0.0, 10.0, 60.0), 0.0, -5.0);
     let mut renderer = bare(stage);
     let (mut counts, mut most) = (Vec::new(), [0; 3]);
-    for _ in 0..30 {
+    for _ in 0..100 {
         renderer.app().world_mut().spawn(stage.forest().expect("a forest"));
         draw(&mut renderer, stage, &from, NOON);
         most = objects(&mut renderer);

@@ -14,11 +14,11 @@ use canopy::{
 };
 use glam::{DVec2, DVec3};
 
-use super::{NOON, SIZE, draw, renderer};
+use super::{NOON, SIZE, draw, renderer, showing};
 use crate::support::{
     gpu::gpu,
-    image::keep,
-    stage::{project, trees_at, view},
+    image::{difference, keep},
+    stage::{grove, project, trees_at, view},
 };
 
 #[expect(dead_code, reason = "the example's own program opens a window")]
@@ -157,4 +157,30 @@ fn more_crosses_than_a_texture_array_holds_are_refused_with_the_number_that_fits
     let crowded = Stage { plants, ..built.stage };
     let refused = crowded.check_device(renderer.app().world().resource::<RenderDevice>());
     assert!(refused.is_err_and(|error| error.to_string().contains(&format!("at most {}", limit / 3))));
+}
+
+#[test]
+fn crosses_whose_depth_is_drawn_first_look_the_same() {
+    let gpu = gpu();
+    for samples in [1, 4] {
+        let built = grove(samples);
+        let from = view(&built.stage, (0.0, 10.0, 60.0), 0.0, -5.0);
+        let mut renderer = showing(&built.stage);
+        let world = renderer.app().world_mut();
+        for mut forest in world.query::<&mut Forest>().iter_mut(world) {
+            forest.levels = Levels::only(Representation::CROSS);
+        }
+        let mut drawn = |depth_first: bool| {
+            let world = renderer.app().world_mut();
+            let mut views = world.query::<&mut ViewOptions>();
+            views.iter_mut(world).for_each(|mut options| options.depth_first = depth_first);
+            draw(&mut renderer, &built.stage, &from, NOON)
+        };
+        let (first, at_once) = (drawn(true), drawn(false));
+        assert!(first == at_once, "{samples} samples: mean FLIP {}", difference(&first, &at_once));
+        // It is no accident: there are trees.
+        let statistics = statistics(&mut renderer);
+        assert!(statistics.iter().any(|level| level.trees > 50), "{statistics:?}");
+    }
+    assert_eq!(gpu.messages(), Vec::<String>::new());
 }

@@ -1,4 +1,7 @@
 //! Pipelines of all levels, requested when a forest needs them.
+//!
+//! A level that is costly to shade and hides much of itself is drawn in two stages, if its renderer can and the view wants
+//! it: depth alone, with the alpha test, then light where the depth is that of the fragment. Each pixel is shaded once.
 
 use bevy::{
     ecs::{
@@ -6,35 +9,60 @@ use bevy::{
         system::{Res, ResMut},
     },
     platform::collections::HashMap,
-    render::render_resource::{CachedRenderPipelineId, PipelineCache, RenderPipeline},
+    render::render_resource::{
+        CachedRenderPipelineId, CompareFunction, PipelineCache, RenderPipeline, RenderPipelineDescriptor,
+    },
 };
 
 use super::{
     gpu_forest::{ForestLevel, GpuForests},
-    representation::{LevelRenderer, LevelTarget},
+    representation::{DEPTH_FIRST, LevelRenderer, LevelTarget},
 };
 use crate::{
     lod::Representation,
     render::{extract::ExtractedScene, view::PreparedFrame},
 };
 
-/// What a pipeline depends on.
-type PipelineKey = (Representation, u32, LevelTarget);
+/// What a pipeline depends on; the last says whether depth is drawn first.
+type PipelineKey = (Representation, u32, LevelTarget, bool);
+
+/// The pipelines with which a level is drawn.
+#[derive(Clone, Copy)]
+pub struct Stages<T> {
+    /// Depth alone, if it is drawn first.
+    pub depth: Option<T>,
+    /// Light, and depth if that is not drawn first.
+    pub light: T,
+}
 
 /// Pipelines of all levels, by key.
 #[derive(Resource, Default)]
-pub struct LevelPipelines(HashMap<PipelineKey, CachedRenderPipelineId>);
+pub struct LevelPipelines {
+    requested: HashMap<PipelineKey, Stages<CachedRenderPipelineId>>,
+    /// Whether the view wants depth first.
+    depth_first: bool,
+}
 
 impl LevelPipelines {
-    /// A pipeline that was requested, once it is ready.
+    fn key(&self, renderer: &dyn LevelRenderer, features: u32, target: LevelTarget) -> PipelineKey {
+        let depth_first = self.depth_first && matches!(target, LevelTarget::View(_));
+        (renderer.representation(), features, target, depth_first)
+    }
+
+    /// The pipelines that were requested, once they are ready.
     pub fn get<'a>(
         &self,
         renderer: &dyn LevelRenderer,
         features: u32,
         target: LevelTarget,
         cache: &'a PipelineCache,
-    ) -> Option<&'a RenderPipeline> {
-        self.0.get(&(renderer.representation(), features, target)).and_then(|id| cache.get_render_pipeline(*id))
+    ) -> Option<Stages<&'a RenderPipeline>> {
+        let stages = self.requested.get(&self.key(renderer, features, target))?;
+        let depth = match stages.depth {
+            Some(id) => Some(cache.get_render_pipeline(id)?),
+            None => None,
+        };
+        Some(Stages { depth, light: cache.get_render_pipeline(stages.light)? })
     }
 
     /// Whether all pipelines that `levels` need for `target` are ready.
@@ -57,11 +85,33 @@ impl LevelPipelines {
             if *limit == 0 {
                 return;
             }
-            self.0.entry((level.renderer.representation(), features, target)).or_insert_with(|| {
+            let key = self.key(&*level.renderer, features, target);
+            self.requested.entry(key).or_insert_with(|| {
                 *limit -= 1;
-                cache.queue_render_pipeline(level.renderer.pipeline(features, target))
+                let mut light = level.renderer.pipeline(features, target);
+                let depth = match target {
+                    LevelTarget::View(format) if key.3 => level.renderer.depth_pipeline(features, format),
+                    _ => None,
+                };
+                if depth.is_some() {
+                    shade_what_is_seen(&mut light);
+                }
+                let depth = depth.map(|depth| cache.queue_render_pipeline(depth));
+                Stages { depth, light: cache.queue_render_pipeline(light) }
             });
         }
+    }
+}
+
+/// Changes a pipeline that draws depth and light to one that shades only what has its depth already.
+fn shade_what_is_seen(pipeline: &mut RenderPipelineDescriptor) {
+    if let Some(depth) = &mut pipeline.depth_stencil {
+        depth.depth_write_enabled = Some(false);
+        depth.depth_compare = Some(CompareFunction::Equal);
+    }
+    let fragment = pipeline.fragment.as_mut().map(|fragment| &mut fragment.shader_defs);
+    for defs in fragment.into_iter().chain([&mut pipeline.vertex.shader_defs]) {
+        defs.push(DEPTH_FIRST.into());
     }
 }
 
@@ -81,6 +131,9 @@ pub fn prepare_pipelines(
     cache: Res<PipelineCache>,
     mut pipelines: ResMut<LevelPipelines>,
 ) {
+    if let Some(view) = &frame.view {
+        pipelines.depth_first = view.options.depth_first;
+    }
     let mut one = 1;
     for target in targets(&scene, &frame) {
         forests.levels().for_each(|level| pipelines.request(level, target, &cache, &mut { usize::MAX }));

@@ -95,7 +95,18 @@ pub trait LevelRenderer: Send + Sync + 'static {
     /// The pipeline for `features` (bits that only this renderer interprets) and `target`. Both entry points of its
     /// shader use groups 0 and 1 as in [`LevelTarget::layouts`].
     fn pipeline(&self, features: u32, target: LevelTarget) -> RenderPipelineDescriptor;
+
+    /// A pipeline of the same layout that writes the depth alone of what [`pipeline`](Self::pipeline) draws into a view of
+    /// `format`, for a level whose light costs much more than its depth. `None`: depth and light are drawn at once. Where
+    /// there is one, both are compiled with the shader definition [`DEPTH_FIRST`], under which their positions must be
+    /// `@invariant`.
+    fn depth_pipeline(&self, _features: u32, _format: ViewFormat) -> Option<RenderPipelineDescriptor> {
+        None
+    }
 }
+
+/// Shader definition of the pipelines of a level whose depth is drawn before its light.
+pub const DEPTH_FIRST: &str = "DEPTH_FIRST";
 
 /// The plants of one forest in one representation on the device.
 pub trait GpuLevel: Send + Sync + 'static {

@@ -10,8 +10,9 @@ use bevy::{
         render_phase::TrackedRenderPass,
         render_resource::{
             AddressMode, BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer,
-            BufferUsages, FilterMode, FragmentState, MipmapFilterMode, RenderPipelineDescriptor, SamplerBindingType,
-            SamplerDescriptor, ShaderStages, Texture, TextureFormat, TextureSampleType, VertexState,
+            BufferUsages, ColorWrites, FilterMode, FragmentState, MipmapFilterMode, RenderPipelineDescriptor,
+            SamplerBindingType, SamplerDescriptor, ShaderStages, Texture, TextureFormat, TextureSampleType,
+            VertexState,
             binding_types::{sampler, storage_buffer_read_only_sized, texture_2d_array},
         },
     },
@@ -27,11 +28,12 @@ use crate::{
     render::{
         components::Forest,
         forest::{
-            representation::{ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight},
+            representation::{DEPTH_FIRST, ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight},
             uniforms::{CROSS_CASTER_VERTICES, CROSS_VERTICES, PLANES, cross_variants},
         },
         gpu,
         shaders::{CanopyShaders, ShaderFile},
+        view::ViewFormat,
     },
 };
 
@@ -197,6 +199,19 @@ impl LevelRenderer for CrossRenderer {
         pipeline.layout = target.layouts(groups);
         pipeline.multisample.alpha_to_coverage_enabled = to_coverage;
         pipeline
+    }
+
+    fn depth_pipeline(&self, _: u32, format: ViewFormat) -> Option<RenderPipelineDescriptor> {
+        let plain = CrossLight::ALL.iter().position(|light| *light == CrossLight::Plain)?;
+        let mut pipeline = self.pipeline(plain as u32, LevelTarget::View(format));
+        pipeline.label = Some("canopy_crosses_depth".into());
+        pipeline.vertex.shader_defs.push(DEPTH_FIRST.into());
+        let fragment = pipeline.fragment.as_mut()?;
+        fragment.shader_defs.push(DEPTH_FIRST.into());
+        fragment.entry_point = Some("depth".into());
+        // Alpha to coverage needs a target, which stays as it is.
+        fragment.targets.iter_mut().flatten().for_each(|target| target.write_mask = ColorWrites::empty());
+        Some(pipeline)
     }
 }
 
