@@ -105,28 +105,15 @@ fn decode_octahedral(e: vec2<f32>) -> vec3<f32> {
     return normalize(n);
 }
 
-// Discards what does not cover, and returns the fraction of the samples that the rest covers.
-fn alpha_test(alpha: f32, threshold: f32) -> f32 {
-    var coverage = 1.0;
-#ifdef ALPHA_TO_COVERAGE
-    coverage = clamp((alpha - threshold) / max(fwidth(alpha), 1e-4) + 0.5, 0.0, 1.0);
-    if coverage <= 0.0 {
-        discard;
-    }
-#else
-    if alpha < threshold {
-        discard;
-    }
-#endif
-    return coverage;
-}
-
 #ifdef DEPTH_FIRST
-// Depth alone: the alpha test of the light that follows. Of the colour only the coverage is used.
+// Depth alone, with the alpha test of the light that follows.
 @fragment
 fn depth(in: Varying) -> @location(0) vec4<f32> {
     let texel = textureSampleLevel(color_textures, texture_sampler, in.uv, in.layer, mip_level(in.uv));
-    return vec4(alpha_test(texel.a, unpack_look(in.look).threshold));
+    if texel.a < unpack_look(in.look).threshold {
+        discard;
+    }
+    return vec4(0.0);
 }
 #endif
 
@@ -136,7 +123,17 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let variant = in.layer / PLANES;
     let level = mip_level(in.uv);
     let texel = textureSampleLevel(color_textures, texture_sampler, in.uv, in.layer, level);
-    let coverage = alpha_test(texel.a, look.threshold);
+    var coverage = 1.0;
+#ifdef ALPHA_TO_COVERAGE
+    coverage = clamp((texel.a - look.threshold) / max(fwidth(texel.a), 1e-4) + 0.5, 0.0, 1.0);
+    if coverage <= 0.0 {
+        discard;
+    }
+#else
+    if texel.a < look.threshold {
+        discard;
+    }
+#endif
     let properties = textureSampleLevel(property_textures, texture_sampler, in.uv, in.layer, level);
     let local = decode_octahedral(properties.xy);
     let normal = normalize(in.right * local.x + in.up * local.y + in.front * local.z);

@@ -211,8 +211,8 @@ pub struct ViewOptions {
     #[reflect(@"Each level of detail in its own colour.")]
     pub tint_levels: bool,
     /// Whether the depth of crosses is drawn before their light, so that each pixel is shaded once: the same image, in less
-    /// time where crosses hide each other.
-    #[reflect(@"Depth of crosses before their light: the same image, in less time where they hide each other.")]
+    /// time where crosses hide each other. Nothing changes with several samples a pixel, where it would take longer.
+    #[reflect(@"Depth of crosses before their light, without MSAA: the same image, in less time.")]
     pub depth_first: bool,
 }
 

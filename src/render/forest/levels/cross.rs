@@ -202,6 +202,10 @@ impl LevelRenderer for CrossRenderer {
     }
 
     fn depth_pipeline(&self, _: u32, format: ViewFormat) -> Option<RenderPipelineDescriptor> {
+        // With several samples a pixel the depth costs more than it saves: docs/decisions/0020.
+        if format.samples > 1 {
+            return None;
+        }
         let plain = CrossLight::ALL.iter().position(|light| *light == CrossLight::Plain)?;
         let mut pipeline = self.pipeline(plain as u32, LevelTarget::View(format));
         pipeline.label = Some("canopy_crosses_depth".into());
@@ -209,7 +213,7 @@ impl LevelRenderer for CrossRenderer {
         let fragment = pipeline.fragment.as_mut()?;
         fragment.shader_defs.push(DEPTH_FIRST.into());
         fragment.entry_point = Some("depth".into());
-        // Alpha to coverage needs a target, which stays as it is.
+        // The attachment's colours stay as they are.
         fragment.targets.iter_mut().flatten().for_each(|target| target.write_mask = ColorWrites::empty());
         Some(pipeline)
     }
