@@ -59,6 +59,7 @@ pub fn prepare_shadows(
         None
     };
     if let Some(why) = why_none {
+        maps.fresh = None;
         report.skipped("sun_shadow", why);
         return;
     }
