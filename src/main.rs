@@ -45,6 +45,7 @@ fn list_adapters() -> anyhow::Result<()> {
 }
 
 fn fly_through(options: &canopy::app::FlyOptions) -> anyhow::Result<()> {
+    canopy::app::listen_to_interrupts()?;
     Ok(canopy::app::fly(options, Bars::new(options.quiet))?)
 }
 

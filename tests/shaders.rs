@@ -28,16 +28,28 @@ use naga::{
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 
 /// All that the pipelines switch on or off.
-const DEFINES: [&str; 7] =
-    ["FOLIAGE", "ALPHA_TO_COVERAGE", "NORMAL_MAP", "TRANSFER", "TRANSFER_COLOR", "SUN_HARMONICS", "PLAIN_TOO"];
+const DEFINES: [&str; 8] = [
+    "FOLIAGE",
+    "ALPHA_TO_COVERAGE",
+    "NORMAL_MAP",
+    "TRANSFER",
+    "TRANSFER_COLOR",
+    "SUN_HARMONICS",
+    "PLAIN_TOO",
+    "DEPTH_FIRST",
+];
 
-/// All combinations of [`DEFINES`]; the last three mean something with transfer only.
+/// All combinations of [`DEFINES`]; some mean something with transfer only, and crosses have no others with their depth
+/// drawn first.
 fn variants() -> impl Iterator<Item = Vec<&'static str>> {
     let all = (0..1u32 << DEFINES.len()).map(|bits| {
         DEFINES.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, define)| *define).collect::<Vec<_>>()
     });
     let needs = ["TRANSFER_COLOR", "SUN_HARMONICS", "PLAIN_TOO"];
-    all.filter(move |defines| defines.contains(&"TRANSFER") || !needs.iter().any(|define| defines.contains(define)))
+    let never_of_crosses = ["NORMAL_MAP", "TRANSFER_COLOR", "SUN_HARMONICS"];
+    let any_of = |defines: &[&str], some: &[&str]| some.iter().any(|define| defines.contains(define));
+    all.filter(move |defines| defines.contains(&"TRANSFER") || !any_of(defines, &needs))
+        .filter(move |defines| !defines.contains(&"DEPTH_FIRST") || !any_of(defines, &never_of_crosses))
 }
 
 fn is_library(source: &str) -> bool {

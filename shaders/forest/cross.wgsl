@@ -20,7 +20,12 @@
 #endif
 
 struct Varying {
+#ifdef DEPTH_FIRST
+    // The same bits in the pipelines of both stages.
+    @builtin(position) @invariant clip: vec4<f32>,
+#else
     @builtin(position) clip: vec4<f32>,
+#endif
     @location(0) relative: vec3<f32>,
     @location(1) uv: vec2<f32>,
     @location(2) @interpolate(flat) layer: u32,
@@ -117,6 +122,18 @@ fn decode_octahedral(e: vec2<f32>) -> vec3<f32> {
     n.y += select(t, -t, n.y >= 0.0);
     return normalize(n);
 }
+
+#ifdef DEPTH_FIRST
+// Depth alone, with the alpha test of the light that follows.
+@fragment
+fn depth(in: Varying) -> @location(0) vec4<f32> {
+    let texel = textureSampleLevel(color_textures, texture_sampler, in.uv, in.layer, mip_level(in.uv));
+    if texel.a < unpack_look(in.look).threshold {
+        discard;
+    }
+    return vec4(0.0);
+}
+#endif
 
 @fragment
 fn fragment(in: Varying) -> @location(0) vec4<f32> {

@@ -42,7 +42,7 @@ use crate::{
     plugin::CanopyPlugins,
     progress::Progress,
     render::{
-        components::{CanopyCamera, LightUpdates, SunShadowSettings},
+        components::{CanopyCamera, ForestUpdates, LightUpdates, SunShadowSettings},
         readback::read_rgb,
         report::{FrameReport, PassOutcome},
         shaders::CanopyShaders,
@@ -148,6 +148,8 @@ pub struct Renderer {
     target: Handle<Image>,
     size: (u32, u32),
     warm: bool,
+    /// The device whose errors are heard.
+    device: RenderDevice,
     /// First error that the device reported and that was not returned yet.
     fault: Arc<Mutex<Option<String>>>,
 }
@@ -184,14 +186,15 @@ impl Renderer {
             plugins = plugins.disable::<LogPlugin>();
         }
         app.add_plugins(plugins);
-        app.add_plugins(CanopyPlugins).insert_resource(LightUpdates::Blocking);
+        app.add_plugins(CanopyPlugins).insert_resource(LightUpdates::Blocking).insert_resource(ForestUpdates::Blocking);
         while app.plugins_state() == PluginsState::Adding {
             bevy::tasks::tick_global_task_pools_on_main_thread();
         }
         app.finish();
         app.cleanup();
-        let fault = report_faults(app.world().resource::<RenderDevice>());
-        let limit = app.world().resource::<RenderDevice>().limits().max_texture_dimension_2d;
+        let device = app.world().resource::<RenderDevice>().clone();
+        let fault = report_faults(&device);
+        let limit = device.limits().max_texture_dimension_2d;
         if size.0 > limit || size.1 > limit || size.0 == 0 || size.1 == 0 {
             return Err(AppError::TooLarge { width: size.0, height: size.1, limit });
         }
@@ -206,7 +209,17 @@ impl Renderer {
             ))
             .id();
         let sun = app.world_mut().spawn(SunShadowSettings::default()).id();
-        Ok(Self { app, camera, sun, target, size, warm: false, fault })
+        Ok(Self { app, camera, sun, target, size, warm: false, device, fault })
+    }
+
+    /// Listens to another device, if the app has made one for a lost one
+    /// ([`RenderErrorHandler`](bevy::render::error_handler::RenderErrorHandler)). The errors of the lost one are over.
+    fn follow_device(&mut self) {
+        let device = self.app.world().resource::<RenderDevice>();
+        if device.wgpu_device() != self.device.wgpu_device() {
+            self.device = device.clone();
+            self.fault = report_faults(&self.device);
+        }
     }
 
     /// Fails with the first error that the device reported since the last time.
@@ -267,6 +280,7 @@ impl Renderer {
             self.warm = true;
         }
         self.app.update();
+        self.follow_device();
         // A frame in which a pass waited for its pipeline is drawn again.
         let started = Instant::now();
         while !self.pipelines_are_ready()? {
@@ -396,7 +410,8 @@ fn render_target(app: &mut App, (width, height): (u32, u32)) -> Handle<Image> {
         Extent3d { width, height, depth_or_array_layers: 1 },
         TextureDimension::D2,
         TextureFormat::Rgba8UnormSrgb,
-        RenderAssetUsages::RENDER_WORLD,
+        // Without texels it costs nothing to keep it in the main world, from where a device that is made anew gets it.
+        RenderAssetUsages::default(),
     );
     image.texture_descriptor.usage |= TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC;
     app.world_mut().resource_mut::<Assets<Image>>().add(image)

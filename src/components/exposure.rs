@@ -37,7 +37,7 @@ impl StandCache {
         for (entity, forest) in forests {
             let kept = self.totals.iter().find(|(of, stand, _)| *of == entity && Arc::ptr_eq(stand, &forest.stand));
             let own = kept.map_or_else(|| StandTotals::of(&forest.stand, &forest.plants), |(.., totals)| *totals);
-            sum = sum.add(own);
+            sum = sum.combined(own);
             known.push((entity, forest.stand.clone(), own));
         }
         self.totals = known;

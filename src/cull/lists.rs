@@ -38,6 +38,14 @@ impl DrawLists {
         self.levels.get(level).map_or(&[], Vec::as_slice)
     }
 
+    /// The ranges of one of `parts` parts, which together have each tree once; `visible` is not copied.
+    pub fn part(&self, part: usize, parts: usize) -> Self {
+        let cut = |range: &Range<u32>, at: usize| range.start + (range.len() * at / parts.max(1)) as u32;
+        let share = |range: &Range<u32>| cut(range, part.min(parts))..cut(range, (part + 1).min(parts));
+        let levels = self.levels.iter().map(|ranges| ranges.iter().map(share).collect()).collect();
+        Self { visible: Vec::new(), levels }
+    }
+
     /// Number of trees drawn in `level`.
     pub fn count(&self, level: usize) -> usize {
         self.ranges(level).iter().map(|range| range.len()).sum()
@@ -71,5 +79,25 @@ impl<'a, T> ListBuilder<'a, T> {
 
     pub fn into_lists(self) -> Vec<Vec<Vec<T>>> {
         self.lists
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_parts_of_lists_have_each_tree_once() {
+        let levels = vec![vec![(0..10).collect(), vec![], vec![7]], vec![(0..3).collect()]];
+        let whole = DrawLists::assemble(levels);
+        for parts in [1, 4, 20] {
+            for (level, ranges) in whole.levels.iter().enumerate() {
+                for (group, range) in ranges.iter().enumerate() {
+                    let shares = (0..parts).flat_map(|part| whole.part(part, parts).levels[level][group].clone());
+                    assert!(shares.eq(range.clone()), "{parts} parts of {range:?}");
+                }
+            }
+        }
+        assert_eq!(whole.part(4, 4).count(0) + whole.part(0, 0).count(0), 0);
     }
 }

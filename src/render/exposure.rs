@@ -53,7 +53,7 @@ impl StandTotals {
 
     /// The sums of two stands.
     #[must_use]
-    pub fn add(self, other: Self) -> Self {
+    pub fn combined(self, other: Self) -> Self {
         Self {
             leaves: self.leaves.add(other.leaves),
             trees: self.trees + other.trees,

@@ -20,11 +20,11 @@ use canopy::{
 };
 use glam::{DVec2, DVec3};
 
-use super::{NOON, SIZE, draw, renderer};
+use super::{NOON, SIZE, draw, renderer, showing};
 use crate::support::{
     gpu::gpu,
-    image::keep,
-    stage::{project, trees_at, view},
+    image::{difference, keep},
+    stage::{grove, project, trees_at, view},
 };
 
 #[expect(dead_code, reason = "the example's own program opens a window")]
@@ -236,4 +236,30 @@ fn a_scene_names_the_levels_between_model_and_crosses() {
     let counts = ["model", "thinned", "cloud", "cross"].map(trees);
     keep(&picture, "levels-between");
     assert_eq!(counts, [1, 1, 1, 1]);
+}
+
+#[test]
+fn crosses_whose_depth_is_drawn_first_look_the_same() {
+    let gpu = gpu();
+    for samples in [1, 4] {
+        let built = grove(samples);
+        let from = view(&built.stage, (0.0, 10.0, 60.0), 0.0, -5.0);
+        let mut renderer = showing(&built.stage);
+        let world = renderer.app().world_mut();
+        for mut forest in world.query::<&mut Forest>().iter_mut(world) {
+            forest.levels = Levels::only(Representation::CROSS);
+        }
+        let mut drawn = |depth_first: bool| {
+            let world = renderer.app().world_mut();
+            let mut views = world.query::<&mut ViewOptions>();
+            views.iter_mut(world).for_each(|mut options| options.depth_first = depth_first);
+            draw(&mut renderer, &built.stage, &from, NOON)
+        };
+        let (first, at_once) = (drawn(true), drawn(false));
+        assert!(first == at_once, "{samples} samples: mean FLIP {}", difference(&first, &at_once));
+        // It is no accident: there are trees.
+        let statistics = statistics(&mut renderer);
+        assert!(statistics.iter().any(|level| level.trees > 50), "{statistics:?}");
+    }
+    assert_eq!(gpu.messages(), Vec::<String>::new());
 }

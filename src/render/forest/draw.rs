@@ -16,12 +16,16 @@ pub fn draw_levels<'a>(
     cache: &'a PipelineCache,
     mut bind_level: impl FnMut(&mut TrackedRenderPass<'a>, usize),
 ) {
-    for (index, level) in forest.levels().filter(|(index, _)| lists.count(*index) > 0) {
-        bind_level(pass, index);
-        for features in level.gpu.features(target) {
-            let Some(pipeline) = pipelines.get(&*level.renderer, features, target, cache) else { continue };
-            pass.set_render_pipeline(pipeline);
-            level.gpu.draw(pass, features, target, lists.ranges(index));
+    // The depth of those levels that have it first, then all that is left.
+    for depth_alone in [true, false] {
+        for (index, level) in forest.levels().filter(|(index, _)| lists.count(*index) > 0) {
+            for features in level.gpu.features(target) {
+                let Some(stages) = pipelines.get(&*level.renderer, features, target, cache) else { continue };
+                let Some(pipeline) = (if depth_alone { stages.depth } else { Some(stages.light) }) else { continue };
+                bind_level(pass, index);
+                pass.set_render_pipeline(pipeline);
+                level.gpu.draw(pass, features, target, lists.ranges(index));
+            }
         }
     }
 }

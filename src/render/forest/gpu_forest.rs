@@ -18,18 +18,22 @@ use bevy::{
 
 use super::{
     leaves::Leaves,
-    representation::{ForestUpload, GpuLevel, LevelRenderer, Relight, Representations},
+    pipelines::{LevelPipelines, targets},
+    representation::{GpuLevel, LevelRenderer, Relight, Representations},
     transfer::TransferLight,
     uniforms::variants,
+    upload::{BYTES_PER_FRAME, DeviceWrites, ForestUpload},
 };
 use crate::{
     bake::BakedPlant,
     cull::Grouping,
     light::StandTrees,
     render::{
-        components::Forest,
+        components::{Forest, ForestUpdates},
         extract::ExtractedScene,
         gpu::{self, Gpu},
+        report::FrameReport,
+        view::PreparedFrame,
     },
     scatter::{PackedStand, PackedTree, PlantSize},
 };
@@ -105,10 +109,10 @@ impl GpuForest {
     fn new(component: &Forest, generation: u64, known: &Representations, upload: &mut ForestUpload) -> Self {
         let forest = &Forest { stand: drawn_stand(component), ..component.clone() };
         let storage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
-        let device = &upload.gpu.device;
         let sizes: Vec<PlantSize> = forest.plants.iter().map(BakedPlant::size).collect();
-        let trees = gpu::buffer_with::<PackedTree>(device, "canopy_trees", storage, &forest.stand.trees);
-        let variants = gpu::buffer_with(device, "canopy_variants", storage, &variants(&forest.plants, &sizes));
+        let trees = upload.shared_buffer("canopy_trees", storage, &forest.stand, |stand| &stand.trees);
+        let variants =
+            gpu::buffer_with(&upload.gpu.device, "canopy_variants", storage, &variants(&forest.plants, &sizes));
         let level = |representation| {
             let renderer = known.get(representation).cloned();
             if renderer.is_none() {
@@ -155,7 +159,7 @@ impl GpuForest {
     /// Updates the lighting of plants that are already drawn: new bakes overwrite the data on the device. Meshes,
     /// outlines, the stand and therefore the shadow maps stay.
     ///
-    /// Cost: packing and writing 20 bytes per vertex, and 1 MB per plant whose crosses changed (256 texels).
+    /// All of it happens in this frame. Cost: packing and writing 20 bytes per vertex, and 1 MB per plant whose crosses changed (256 texels).
     fn relight(&mut self, forest: &Forest, upload: &mut ForestUpload) {
         let relight = Relight { old: &self.plants, new: &forest.plants, suns: &forest.suns };
         for level in self.levels.iter_mut().flatten() {
@@ -163,6 +167,7 @@ impl GpuForest {
         }
         let variants = variants(&forest.plants, &self.sizes);
         upload.gpu.queue.write_buffer(&self.variants, 0, bytemuck::cast_slice(&variants));
+        upload.writes.run(&upload.gpu.queue, &mut { u64::MAX });
         self.plants = forest.plants.clone();
     }
 }
@@ -182,11 +187,19 @@ fn drawn_stand(forest: &Forest) -> Arc<PackedStand> {
     Arc::new(PackedStand { trees: Vec::new(), indices: Vec::new(), cells: Vec::new(), grid: forest.stand.grid })
 }
 
+/// A forest that is not drawn yet.
+struct Arriving {
+    forest: GpuForest,
+    /// What the device does not have of it.
+    writes: DeviceWrites,
+}
+
 /// All forests of the world by their main-world entity.
 #[derive(Resource, Default)]
 pub struct GpuForests {
     forests: HashMap<Entity, GpuForest>,
-    /// Entities in a fixed order.
+    arriving: HashMap<Entity, Arriving>,
+    /// Entities of the forests that are drawn, in a fixed order.
     pub order: Vec<Entity>,
     generations: u64,
 }
@@ -200,6 +213,11 @@ impl GpuForests {
     /// All levels of all forests.
     pub fn levels(&self) -> impl Iterator<Item = &ForestLevel> {
         self.iter().flat_map(|(_, forest)| forest.levels().map(|(_, level)| level))
+    }
+
+    /// All levels of the forests that are not drawn yet, in no fixed order.
+    pub fn arriving_levels(&self) -> impl Iterator<Item = &ForestLevel> {
+        self.arriving.values().flat_map(|arriving| arriving.forest.levels().map(|(_, level)| level))
     }
 
     /// Whether there is no tree in any forest.
@@ -224,16 +242,18 @@ pub fn most_trees(limits: &WgpuLimits) -> usize {
     usize::try_from(bytes).unwrap_or(usize::MAX) / size_of::<PackedTree>()
 }
 
-/// Uploads new and changed forests, and drops despawned ones.
+/// Uploads new and changed forests, all at once or a share of them, and drops despawned ones.
 pub fn prepare_forests(
     scene: Res<ExtractedScene>,
+    frame: Res<PreparedFrame>,
     representations: Res<Representations>,
+    pipelines: Res<LevelPipelines>,
     gpu: Gpu,
+    report: Res<FrameReport>,
     mut forests: ResMut<GpuForests>,
     mut transfer: ResMut<TransferLight>,
 ) {
     let forests = &mut *forests;
-    let mut upload = ForestUpload { gpu: &gpu, transfer: &mut transfer };
     let limit = most_trees(&gpu.device.limits());
     let fits = |forest: &Forest| {
         let count = forest.stand.trees.len();
@@ -242,14 +262,23 @@ pub fn prepare_forests(
         }
         count <= limit
     };
+    let blocking = scene.forest_updates == ForestUpdates::Blocking;
+    let mut budget = if blocking { u64::MAX } else { BYTES_PER_FRAME };
+    let has_pipelines = |forest: &GpuForest| {
+        let levels = || forest.levels().map(|(_, level)| level);
+        targets(&scene, &frame).all(|target| pipelines.ready(levels(), target, &gpu.pipelines))
+    };
     let drawn: Vec<_> = scene.forests.iter().filter(|(_, forest)| fits(forest)).collect();
-    forests.order = drawn.iter().map(|(entity, _)| *entity).collect();
-    let alive: Vec<Entity> = forests.order.clone();
+    let alive: Vec<Entity> = drawn.iter().map(|(entity, _)| *entity).collect();
     forests.forests.retain(|entity, _| alive.contains(entity));
+    forests.arriving.retain(|entity, _| alive.contains(entity));
+    let mut uploads = Vec::new();
     for (entity, forest) in drawn {
         if let Some(known) = forests.forests.get_mut(entity).filter(|known| known.can_follow(forest)) {
+            forests.arriving.remove(entity);
             if !Arc::ptr_eq(&known.plants, &forest.plants) {
-                known.relight(forest, &mut upload);
+                let mut writes = DeviceWrites::default();
+                known.relight(forest, &mut ForestUpload { gpu: &gpu, transfer: &mut transfer, writes: &mut writes });
             }
             if known.forest.origin != forest.origin {
                 forests.generations += 1;
@@ -258,8 +287,37 @@ pub fn prepare_forests(
             known.forest = Forest { stand: known.forest.stand.clone(), ..forest.clone() };
             continue;
         }
-        forests.generations += 1;
-        let made = GpuForest::new(forest, forests.generations, &representations, &mut upload);
-        forests.forests.insert(*entity, made);
+        let under_way = forests.arriving.remove(entity);
+        let same = |arriving: &Arriving| {
+            arriving.forest.can_follow(forest) && Arc::ptr_eq(&arriving.forest.plants, &forest.plants)
+        };
+        let mut arriving = match under_way.filter(same) {
+            Some(mut arriving) => {
+                arriving.forest.forest = Forest { stand: arriving.forest.forest.stand.clone(), ..forest.clone() };
+                arriving
+            }
+            None => {
+                forests.generations += 1;
+                let mut writes = DeviceWrites::default();
+                let mut upload = ForestUpload { gpu: &gpu, transfer: &mut transfer, writes: &mut writes };
+                let forest = GpuForest::new(forest, forests.generations, &representations, &mut upload);
+                Arriving { forest, writes }
+            }
+        };
+        arriving.writes.run(&gpu.queue, &mut budget);
+        let (done, total) = arriving.writes.progress();
+        uploads.push(format!("{:.1} of {:.1} MB", done as f64 * 1e-6, total as f64 * 1e-6));
+        if blocking || (arriving.writes.are_done() && has_pipelines(&arriving.forest)) {
+            forests.forests.insert(*entity, arriving.forest);
+        } else {
+            forests.arriving.insert(*entity, arriving);
+        }
+    }
+    forests.order = alive;
+    forests.order.retain(|entity| forests.forests.contains_key(entity));
+    if uploads.is_empty() {
+        report.skipped("forest upload", "no forest is new");
+    } else {
+        report.ran("forest upload", uploads.join(", "));
     }
 }

@@ -23,6 +23,7 @@ mod rotated_light;
 mod textures;
 pub(super) mod transfer;
 pub(super) mod uniforms;
+mod upload;
 mod vertex;
 
 use bevy::{

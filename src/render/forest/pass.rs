@@ -35,7 +35,7 @@ pub fn forest_pass(
     let (target, depth, camera) = view.into_inner();
     let (Some(group), Some(prepared_view)) = (group, &frame.view) else { return };
     let level_target = LevelTarget::View(prepared_view.attachment);
-    if !prepared.draw_something() || !pipelines.ready(&forests, level_target, &cache) {
+    if !prepared.draw_something() || !pipelines.ready(forests.levels(), level_target, &cache) {
         return;
     }
     let diagnostics = ctx.diagnostic_recorder();

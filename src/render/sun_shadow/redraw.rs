@@ -7,7 +7,7 @@ use bevy::{
 use glam::{DVec2, DVec3};
 
 use super::{
-    maps::{CascadeForest, CascadeKey, CascadeWork, CasterBuffers, DrawnCascade, ShadowMaps},
+    maps::{CascadeForest, CascadeKey, CascadeWork, CasterBuffers, DrawnCascade, PARTS, ShadowMaps},
     meshes::MeshCasters,
 };
 use crate::{
@@ -21,6 +21,7 @@ use crate::{
             SharedPlacement, SharedTextures, caster_layout,
             uniforms::{CascadeViewUniform, MAX_CASCADES},
         },
+        components::ForestUpdates,
         extract::ExtractedScene,
         forest::{GpuForests, forest_view, instance_bind_group},
         gpu::{self, Gpu, GrowingBuffer, UNIFORM_STRIDE},
@@ -58,6 +59,7 @@ pub fn prepare_shadows(
         None
     };
     if let Some(why) = why_none {
+        maps.fresh = None;
         report.skipped("sun_shadow", why);
         return;
     }
@@ -73,19 +75,40 @@ pub fn prepare_shadows(
         .map(|&radius| CascadeBox::new(view.camera, radius, maps.map_size, direction, f64::from(tallest)))
         .collect();
 
-    for (index, &place) in maps.cascades.iter().enumerate() {
+    // Where forests arrive over several frames, one map a frame takes up those that are new.
+    let spread = scene.forest_updates == ForestUpdates::Spread;
+    let (mut takes_new, mut goes_on) = (true, false);
+    for index in 0..maps.cascades.len() {
+        let place = maps.cascades[index];
         // Near the camera, a finer map already contains the trees' shadows.
         let served = index.checked_sub(1).map_or(0.0, |finer| 0.7 * maps.cascades[finer].radius);
         let content = forests.iter().map(|(entity, forest)| {
             let casting = forest.casting_distances(served..settings.proxy_distance, place.texel);
             (entity, forest.generation, forest.forest.origin, casting)
         });
-        let key = CascadeKey { place, forests: content.collect(), meshes: meshes.state() };
+        let mut key = CascadeKey { place, forests: content.collect(), meshes: meshes.state() };
         let name = format!("sun_shadow cascade {index}");
         let this_view = (view.camera, view.clip_from_relative);
         let drawn = maps.drawn[index].as_ref();
-        let fits = |drawn: &DrawnCascade| drawn.key == key && drawn.seen_by.is_none_or(|seen_by| seen_by == this_view);
-        if drawn.is_some_and(fits) {
+        let fits = |drawn: &DrawnCascade, key: &CascadeKey| {
+            drawn.key == *key && drawn.seen_by.is_none_or(|seen_by| seen_by == this_view)
+        };
+        let mut fresh = false;
+        if let Some(older) = spread.then(|| key.without_new_forests(drawn.map(|drawn| &drawn.key))).flatten() {
+            let moved = drawn.is_some_and(|drawn| drawn.key.place != place);
+            if drawn.is_some_and(|drawn| fits(drawn, &older)) {
+                if !std::mem::take(&mut takes_new) {
+                    report.skipped(name, "another map takes up a new forest first");
+                    continue;
+                }
+                fresh = true;
+            } else if !moved || !std::mem::take(&mut takes_new) {
+                // What it holds is not what the world was before the new forest. It takes that forest up in another
+                // frame; if it moves, at once, as it may move again in the next frame.
+                key = older;
+            }
+        }
+        if drawn.is_some_and(|drawn| fits(drawn, &key)) {
             report.skipped(name, "light, box and casters have not changed");
             continue;
         }
@@ -96,17 +119,27 @@ pub fn prepare_shadows(
         let same_light = drawn.is_some_and(|drawn| drawn.key.place.direction == key.place.direction);
         let margin = 6.0 * place.texel + 0.6 * f64::from(widest);
         let lowest = lowest_receiver(&scene, view.camera, place.radius) - margin;
-        let seen = (!same_light).then_some(SeenShadows { camera: view.camera, frustum: &view.frustum, lowest, margin });
-        let casting: Vec<_> = key.forests.iter().map(|(.., casting)| casting.clone()).collect();
+        let seen = (!same_light && !fresh).then_some(SeenShadows {
+            camera: view.camera,
+            frustum: &view.frustum,
+            lowest,
+            margin,
+        });
+        let casting = key.forests.clone();
         let content = DrawnCascade { key, seen_by: seen.as_ref().map(|_| this_view) };
+        if fresh {
+            maps.continue_fresh(&gpu.device, index, &content);
+            goes_on = true;
+        }
         let uniform = CascadeViewUniform {
             clip_from_anchor: place.clip_from_anchor().to_cols_array_2d(),
             direction: place.direction.as_vec3().to_array(),
             padding: 0.0,
         };
         gpu.queue.write_buffer(&maps.cascade_uniforms, index as u64 * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));
-        let mut work = CascadeWork { index, content, forests: Vec::new() };
-        for ((entity, forest), casting) in forests.iter().zip(&casting) {
+        let mut work = CascadeWork { index, content, fresh, forests: Vec::new() };
+        for (entity, .., casting) in &casting {
+            let (entity, Some(forest)) = (*entity, forests.get(*entity)) else { continue };
             let lists = cull_cascade(
                 &forest.forest.stand,
                 &forest.sizes,
@@ -128,8 +161,12 @@ pub fn prepare_shadows(
             work.forests.push(CascadeForest { entity, lists, bind_group });
         }
         let trees: usize = work.forests.iter().map(|forest| forest.lists.visible.len()).sum();
-        report.ran(name, format!("{trees} trees within {:.0} m", place.radius));
+        let part = if fresh { format!(", one of {PARTS} parts") } else { String::new() };
+        report.ran(name, format!("{trees} trees within {:.0} m{part}", place.radius));
         maps.work.push(work);
+    }
+    if !goes_on {
+        maps.fresh = None;
     }
     maps.cascade_bind_group = Some(gpu.bind_group(
         "canopy_cascade",

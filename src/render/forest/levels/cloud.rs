@@ -34,7 +34,7 @@ use crate::{
             cloud_uniforms::{cloud_planes, cloud_variants},
             representation::{ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight},
         },
-        gpu::{self, Gpu},
+        gpu,
         shaders::{CanopyShaders, ShaderFile},
     },
 };
@@ -154,7 +154,7 @@ impl LevelRenderer for CloudRenderer {
             );
             None
         } else {
-            Some(DrawnPlanes::new(plants, upload.gpu))
+            Some(DrawnPlanes::new(plants, upload))
         };
         let wood = GpuReduced::new(&self.wood, forest, WOOD, upload);
         Box::new(GpuClouds { wood, drawn })
@@ -237,14 +237,18 @@ struct DrawnPlanes {
 }
 
 impl DrawnPlanes {
-    fn new(plants: &[BakedPlant], gpu: &Gpu) -> Self {
-        let colors = layers(plants, |cloud| &cloud.textures.color);
-        let properties = layers(plants, |cloud| &cloud.textures.properties);
-        let upload = |label: &str, format: TextureFormat, layers: &[MipView]| {
-            gpu::texture_array(&gpu.device, &gpu.queue, label, format, layers, gpu::SMALLEST_TESTED_MIP)
+    fn new(plants: &Arc<Vec<BakedPlant>>, upload: &mut ForestUpload) -> Self {
+        let layers = if plants.iter().any(|plant| plant.cloud().is_some()) { plants.len() } else { 0 };
+        let mut texture = |label, format, of: fn(&Arc<Vec<BakedPlant>>, usize) -> Option<MipView<'_>>| {
+            upload.texture_array(label, format, layers, gpu::SMALLEST_TESTED_MIP, plants, of)
         };
-        let (_, colors) = upload("canopy_cloud_color", TextureFormat::Rgba8UnormSrgb, &colors);
-        let (texture, properties) = upload("canopy_cloud_properties", TextureFormat::Rgba8Unorm, &properties);
+        let (_, colors) = texture("canopy_cloud_color", TextureFormat::Rgba8UnormSrgb, |plants, index| {
+            layer(plants, index, |cloud| &cloud.textures.color)
+        });
+        let (texture, properties) = texture("canopy_cloud_properties", TextureFormat::Rgba8Unorm, |plants, index| {
+            layer(plants, index, |cloud| &cloud.textures.properties)
+        });
+        let gpu = upload.gpu;
         let sampler = gpu.device.create_sampler(&SamplerDescriptor {
             label: Some("canopy_cloud"),
             address_mode_u: AddressMode::ClampToEdge,
@@ -269,7 +273,7 @@ impl DrawnPlanes {
                 variants.as_entire_binding(),
             )),
         );
-        let (light, light_textures) = (CloudLight::of(plants), upload_light(plants, gpu));
+        let (light, light_textures) = (CloudLight::of(plants), upload_light(plants, upload));
         Self { ranges, properties: texture, variants, bind_group, light, light_textures }
     }
 }
@@ -320,27 +324,36 @@ impl GpuLevel for GpuClouds {
         }
         upload.gpu.queue.write_buffer(&drawn.variants, 0, bytemuck::cast_slice(&cloud_variants(relight.new)));
         drawn.light = CloudLight::of(relight.new);
-        drawn.light_textures = upload_light(relight.new, upload.gpu);
+        drawn.light_textures = upload_light(&Arc::new(relight.new.to_vec()), upload);
     }
 }
 
-/// A layer per plant of the texture that `of` takes from a cloud. A plant without a cloud gets that of another one, which
-/// none of its planes shows.
-fn layers(plants: &[BakedPlant], of: fn(&Cloud) -> &MipChain) -> Vec<MipView<'_>> {
-    let Some(blank) = plants.iter().find_map(BakedPlant::cloud) else { return Vec::new() };
-    plants.iter().map(|plant| of(plant.cloud().unwrap_or(blank)).view()).collect()
+/// A layer, of one per plant, of the texture that `of` takes from a cloud. A plant without a cloud gets that of another one,
+/// which none of its planes shows.
+fn layer(plants: &[BakedPlant], index: usize, of: fn(&Cloud) -> &MipChain) -> Option<MipView<'_>> {
+    let own = plants.get(index)?.cloud();
+    let cloud = own.or_else(|| plants.iter().find_map(BakedPlant::cloud));
+    cloud.map(|cloud| of(cloud).view())
+}
+
+/// A layer of the lighting textures, of those plants that have them.
+fn light_layer(plants: &[BakedPlant], index: usize) -> Option<MipView<'_>> {
+    let clouds = plants.iter().filter_map(BakedPlant::cloud);
+    clouds.filter_map(|cloud| cloud.textures.light.as_ref()).nth(index).map(MipChain::view)
 }
 
 /// The lighting textures, of those plants that have them.
-fn upload_light(plants: &[BakedPlant], gpu: &Gpu) -> Option<BindGroup> {
-    let clouds = plants.iter().filter_map(BakedPlant::cloud);
-    let layers: Vec<MipView> = clouds.filter_map(|cloud| cloud.textures.light.as_ref()).map(MipChain::view).collect();
-    if layers.is_empty() {
+fn upload_light(plants: &Arc<Vec<BakedPlant>>, upload: &mut ForestUpload) -> Option<BindGroup> {
+    let lit = |plant: &&BakedPlant| plant.cloud().is_some_and(|cloud| cloud.textures.light.is_some());
+    let layers = plants.iter().filter(lit).count();
+    if layers == 0 {
         return None;
     }
     let (label, format) = ("canopy_cloud_light", TextureFormat::Rgba8Snorm);
-    let (_, view) = gpu::texture_array(&gpu.device, &gpu.queue, label, format, &layers, gpu::SMALLEST_TESTED_MIP);
-    Some(gpu.bind_group(label, &light_layout(), &BindGroupEntries::single(&view)))
+    let (_, view) = upload.texture_array(label, format, layers, gpu::SMALLEST_TESTED_MIP, plants, |plants, index| {
+        light_layer(plants, index)
+    });
+    Some(upload.gpu.bind_group(label, &light_layout(), &BindGroupEntries::single(&view)))
 }
 
 /// Whether clouds have the same planes, wood, colours and outlines. A bake with another lighting creates equal ones in
