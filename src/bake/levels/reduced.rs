@@ -117,7 +117,7 @@ mod tests {
 
     #[test]
     fn a_vertex_takes_the_light_of_its_source() -> Result<(), Box<dyn std::error::Error>> {
-        let plant = Arc::new(grow(&GrowParameters::broadleaf(), 1, 4000)?);
+        let plant = Arc::new(grow(&GrowParameters::broadleaf(), 1, 5000)?);
         let transfer = TransferSettings { rays: 64, ..TransferSettings::default() };
         for lighting in [LightingSettings::Local, LightingSettings::Transfer(transfer)] {
             let settings = BakeSettings { lighting, ..BakeSettings::default() };

@@ -444,7 +444,7 @@ mod tests {
     #[test]
     fn the_same_on_any_number_of_threads_and_with_a_lighting_texture_for_transfer()
     -> Result<(), Box<dyn std::error::Error>> {
-        let plant = Arc::new(grow(&GrowParameters::broadleaf(), 2, 4000)?);
+        let plant = Arc::new(grow(&GrowParameters::broadleaf(), 2, 5000)?);
         let transfer = TransferSettings { rays: 64, ..TransferSettings::default() };
         let lighting = BakedLighting::bake(&plant, &LightingSettings::Transfer(transfer));
         let on = |threads| {
@@ -459,7 +459,7 @@ mod tests {
 
     #[test]
     fn an_allowed_deviation_asks_for_more_planes() -> Result<(), Box<dyn std::error::Error>> {
-        let plant = grow(&GrowParameters::broadleaf(), 1, 4000)?;
+        let plant = grow(&GrowParameters::broadleaf(), 1, 5000)?;
         let few = CloudSettings { planes: 5, wood: 0.0, resolution: 128, supersampling: 1, ..CloudSettings::default() };
         let coarse = bake_cloud(&plant, &BakedLighting::Local, &few);
         let allowed = 0.5 * coarse.deviation / plant.height();
@@ -477,7 +477,7 @@ mod tests {
 
     #[test]
     fn plants_of_nothing_one_triangle_no_leaves_and_no_wood_are_survived() -> Result<(), Box<dyn std::error::Error>> {
-        let whole = grow(&GrowParameters::broadleaf(), 1, 4000)?;
+        let whole = grow(&GrowParameters::broadleaf(), 1, 5000)?;
         let only = |kind| {
             let parts = whole.parts.iter().filter(|part| part.kind == kind).cloned().collect();
             Plant { name: String::new(), parts }
