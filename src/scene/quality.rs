@@ -43,9 +43,7 @@ pub struct Quality {
     /// Distance in metres up to which the sun casts shadows, 10 to 20000. Higher: farther, coarser. Default 800.
     pub shadow_distance: f64,
     /// Distance in metres up to which trees are drawn as full models, 0 to 5000. Higher: truer, slower. Default 60.
-    /// Beyond are crosses, which are lit with constants of their own, set by eye (bulge, shadow of the own crown, bias)
-    /// and, with radiance transfer, the hot spot fitted to traced dense stands of oaks and of grown trees: the stands
-    /// that `docs/measurements/near-trees-against-ground-truth.md` judges crosses by.
+    /// Beyond are crosses.
     pub near_distance: f64,
     /// Width in metres of the band behind `near_distance` in which models fade into crosses, 0.1 to 1000.
     /// Wider: softer change, more trees drawn twice. Default 20.
