@@ -137,8 +137,8 @@ impl Stage {
     /// [`StageError::TooManyTrees`].
     pub fn check_device(&self, device: &RenderDevice) -> Result<(), StageError> {
         check_trees(self.stand.trees.len(), device)?;
-        // The crosses of all plants share a texture array.
-        let planes = self.plants.iter().filter_map(BakedPlant::cross).map(|cross| cross.planes.len());
+        // The crosses of all plants share texture arrays; that of the sun's light has the most layers.
+        let planes = self.plants.iter().filter_map(BakedPlant::cross).map(|cross| cross.textures.sun.len());
         let layers = device.limits().max_texture_array_layers as usize;
         let (most, count) = (planes.clone().max().unwrap_or(1).max(1), planes.count());
         let limit = layers / most;

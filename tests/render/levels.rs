@@ -16,7 +16,6 @@ use canopy::{
     plant::grow::{GrowParameters, grow},
     prelude::*,
     render::forest::{ForestStatistics, LevelStatistics},
-    scene::{Quality, QualityLevel},
 };
 use glam::{DVec2, DVec3};
 
@@ -24,7 +23,7 @@ use super::{NOON, SIZE, draw, renderer, showing};
 use crate::support::{
     gpu::gpu,
     image::{difference, keep},
-    stage::{grove, project, trees_at, view},
+    stage::{grove, project, trees_at, trees_of_quality, view},
 };
 
 #[expect(dead_code, reason = "the example's own program opens a window")]
@@ -157,12 +156,12 @@ fn more_crosses_than_a_texture_array_holds_are_refused_with_the_number_that_fits
     }
     draw(&mut renderer, stage, &from, NOON);
     let told = gpu.messages();
-    let remedy = format!("at most {} plants", limit / 3);
+    let remedy = format!("at most {} plants", limit / 6);
     assert!(told.len() == 1 && told[0].contains("texture layers") && told[0].contains(&remedy), "{told:?}");
     // A scene is refused before it is shown.
     let crowded = Stage { plants, ..built.stage };
     let refused = crowded.check_device(renderer.app().world().resource::<RenderDevice>());
-    assert!(refused.is_err_and(|error| error.to_string().contains(&format!("at most {}", limit / 3))));
+    assert!(refused.is_err_and(|error| error.to_string().contains(&format!("at most {}", limit / 6))));
 }
 
 /// Billboard clouds and simplified models against the full model, isolated, in the same light.
@@ -205,27 +204,14 @@ fn clouds_and_simplified_models_cover_and_shine_about_as_the_full_model_does() {
 #[test]
 fn a_scene_names_the_levels_between_model_and_crosses() {
     let _gpu = gpu();
-    let quality = |levels: &[&str]| Quality {
-        levels: levels
-            .iter()
-            .enumerate()
-            .map(|(index, draw)| QualityLevel {
-                draw: (*draw).to_owned(),
-                until: 20.0 * index as f64 + 20.0,
-                fade: 5.0,
-            })
-            .collect(),
-        ..Quality::default()
-    };
-    let levels = quality(&["model", "thinned", "cloud", "cross"]).lod_levels();
-    let names: Vec<&str> = levels.representations().iter().map(|level| level.name()).collect();
-    assert_eq!(names, ["model", "thinned", "cloud", "cross"]);
+    let quality = "quality: (levels: [(draw: \"model\", until: 20, fade: 5), (draw: \"thinned\", until: 40, fade: 5), (draw: \
+                   \"cloud\", until: 60, fade: 5), (draw: \"cross\", until: 80, fade: 5)], msaa: 1)";
     // Distances from the camera: 10, 30, 50 and 80 m.
     let places = [DVec2::new(-3.0, 50.0), DVec2::new(3.0, 30.0), DVec2::new(-6.0, 10.0), DVec2::new(8.0, -20.0)];
-    let built = trees_at(&places, 1);
-    let mut scene = built.stage.scene.clone();
-    scene.quality = Quality { levels: quality(&["model", "thinned", "cloud", "cross"]).levels, ..scene.quality };
-    let stage = canopy::assets::Stage::build(&scene, &mut canopy::progress::Silent).expect("a scene");
+    let stage = trees_of_quality(&places, quality).stage;
+    let levels = stage.scene.quality.lod_levels();
+    let names: Vec<&str> = levels.representations().iter().map(|level| level.name()).collect();
+    assert_eq!(names, ["model", "thinned", "cloud", "cross"]);
     let mut drawn = renderer(1);
     drawn.show(&stage);
     let picture = draw(&mut drawn, &stage, &view(&stage, (0.0, 6.0, 60.0), 0.0, -3.0), NOON);

@@ -103,7 +103,7 @@ fn drawn(plant: BakedPlant, ground: Option<Ground>, fade: f32, above: bool, hour
     if let Some(ground) = ground {
         world.spawn(ground);
     }
-    renderer.set_sun(Sun { instant: instant(hour), ..Sun::default() });
+    renderer.set_sun(Sun { instant: instant(hour), fixed_ev100: Some(14.0), ..Sun::default() });
     renderer.set_shadow(SunShadowSettings { cascades: 0, ..SunShadowSettings::default() });
     again(&mut renderer);
     let picture = again(&mut renderer);

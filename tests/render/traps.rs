@@ -39,7 +39,9 @@ fn few() -> Built {
 fn one_tree_and_many_at_one_point_are_drawn() {
     let one = trees_at(&[DVec2::ZERO], 1);
     sensible(&one.stage, "one", pose((0.0, 4.0, 22.0), 0.0, 2.0), 50.0);
-    let heap = trees_at(&[DVec2::ZERO; 40], 1);
+    // Rows of one place are one tree, so they are two centimetres apart.
+    let places: Vec<DVec2> = (0..40).map(|number| DVec2::new(0.02 * f64::from(number), 0.0)).collect();
+    let heap = trees_at(&places, 1);
     assert_eq!(heap.stage.stand.trees.len(), 40);
     sensible(&heap.stage, "heap", pose((0.0, 4.0, 22.0), 0.0, 2.0), 50.0);
 }

@@ -28,6 +28,7 @@ use bevy::{
         renderer::{RenderDevice, RenderQueue},
     },
 };
+use glam::DVec3;
 
 use super::{extract::ExtractedScene, gpu, view::PreparedFrame};
 use crate::terrain::ground_noise::NOISE_BLOCK;
@@ -196,7 +197,9 @@ fn prepare_bind_group(
 ) {
     group.0 = None;
     let (Some(view), Some(daylight)) = (&frame.view, &scene.daylight) else { return };
-    let [(block_x, x), (block_z, z)] = [view.camera.x, view.camera.z].map(noise_position);
+    // The noise is the ground's, and moves with it.
+    let on_ground = view.camera - scene.ground.as_ref().map_or(DVec3::ZERO, |(.., origin)| *origin);
+    let [(block_x, x), (block_z, z)] = [on_ground.x, on_ground.z].map(noise_position);
     let frame_uniform = FrameUniform {
         clip_from_relative: view.clip_from_relative.to_cols_array_2d(),
         relative_from_clip: view.clip_from_relative.inverse().to_cols_array_2d(),

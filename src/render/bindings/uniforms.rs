@@ -13,7 +13,7 @@ pub struct FrameUniform {
     pub clip_from_relative: [[f32; 4]; 4],
     /// Its inverse.
     pub relative_from_clip: [[f32; 4]; 4],
-    /// Camera position: x and z from the middle of its [block](crate::terrain::ground_noise::NOISE_BLOCK), y above the datum;
+    /// Camera position: x and z on the ground, from the middle of their [block](crate::terrain::ground_noise::NOISE_BLOCK), y above the datum;
     /// metres.
     pub camera: [f32; 3],
     /// Focal length in pixels (vertical).

@@ -19,7 +19,7 @@ use bevy::{
 use super::{
     leaves::Leaves,
     pipelines::{LevelPipelines, targets},
-    representation::{GpuLevel, LevelRenderer, Relight, Representations},
+    representation::{ForestLevel, Relight, Representations},
     transfer::TransferLight,
     uniforms::variants,
     upload::{BYTES_PER_FRAME, DeviceWrites, ForestUpload},
@@ -37,14 +37,6 @@ use crate::{
     },
     scatter::{PackedStand, PackedTree, PlantSize},
 };
-
-/// A level of one forest on the device.
-pub struct ForestLevel {
-    /// The renderer that draws it.
-    pub renderer: Arc<dyn LevelRenderer>,
-    /// Its plants.
-    pub gpu: Box<dyn GpuLevel>,
-}
 
 /// A forest on the device.
 pub struct GpuForest {

@@ -19,6 +19,7 @@ mod lists;
 mod pass;
 mod pipelines;
 pub mod representation;
+mod request_pipelines;
 mod rotated_light;
 mod textures;
 pub(super) mod transfer;
@@ -39,7 +40,7 @@ use super::{
 };
 pub use cloud_uniforms::{CloudPlaneUniform, CloudVariantUniform};
 pub use draw::draw_levels;
-pub use gpu_forest::{ForestLevel, GpuForest, GpuForests, most_trees};
+pub use gpu_forest::{GpuForest, GpuForests, most_trees};
 pub use instance_layout::instance_layout;
 pub use instances::{forest_view, instance_bind_group};
 pub(super) use leaves::Leaves;
@@ -76,7 +77,7 @@ impl Plugin for ForestPassPlugin {
                     gpu_forest::prepare_forests.in_set(CanopyRenderSystems::Upload),
                     lists::prepare_view_lists.in_set(CanopyRenderSystems::Cull),
                     rotated_light::prepare_transfer_light.in_set(CanopyRenderSystems::Light),
-                    pipelines::prepare_pipelines.in_set(CanopyRenderSystems::Pipelines),
+                    request_pipelines::prepare_pipelines.in_set(CanopyRenderSystems::Pipelines),
                 ),
             )
             .add_systems(Core3d, pass::forest_pass.in_set(CanopyPasses::Forest));

@@ -4,20 +4,14 @@
 //! it: depth alone, with the alpha test, then light where the depth is that of the fragment. Each pixel is shaded once.
 
 use bevy::{
-    ecs::{
-        resource::Resource,
-        system::{Res, ResMut},
-    },
+    ecs::resource::Resource,
     platform::collections::HashMap,
     render::render_resource::{
         CachedRenderPipelineId, CompareFunction, PipelineCache, RenderPipeline, RenderPipelineDescriptor,
     },
 };
 
-use super::{
-    gpu_forest::{ForestLevel, GpuForests},
-    representation::{DEPTH_FIRST, LevelRenderer, LevelTarget},
-};
+use super::representation::{DEPTH_FIRST, ForestLevel, LevelRenderer, LevelTarget};
 use crate::{
     lod::Representation,
     render::{extract::ExtractedScene, view::PreparedFrame},
@@ -44,6 +38,11 @@ pub struct LevelPipelines {
 }
 
 impl LevelPipelines {
+    /// Whether the view wants depth first, from the next request on.
+    pub fn want_depth_first(&mut self, wanted: bool) {
+        self.depth_first = wanted;
+    }
+
     fn key(&self, renderer: &dyn LevelRenderer, features: u32, target: LevelTarget) -> PipelineKey {
         let depth_first = self.depth_first && matches!(target, LevelTarget::View(_));
         (renderer.representation(), features, target, depth_first)
@@ -80,7 +79,7 @@ impl LevelPipelines {
 
     /// Requests the pipelines that `level` needs for `target`, of those that were not requested before at most `limit`,
     /// which decreases with each.
-    fn request(&mut self, level: &ForestLevel, target: LevelTarget, cache: &PipelineCache, limit: &mut usize) {
+    pub fn request(&mut self, level: &ForestLevel, target: LevelTarget, cache: &PipelineCache, limit: &mut usize) {
         for features in level.gpu.features(target) {
             if *limit == 0 {
                 return;
@@ -120,23 +119,4 @@ pub fn targets(scene: &ExtractedScene, frame: &PreparedFrame) -> impl Iterator<I
     let view = frame.view.as_ref().map(|view| LevelTarget::View(view.attachment));
     let shadow = view.is_some() && (scene.shadow.cascades > 0 || scene.mesh_shadows);
     view.into_iter().chain(shadow.then_some(LevelTarget::ShadowMap))
-}
-
-/// Requests the pipelines that the view and its shadow maps need: those of forests that are drawn, and one a frame of
-/// those that arrive.
-pub fn prepare_pipelines(
-    scene: Res<ExtractedScene>,
-    frame: Res<PreparedFrame>,
-    forests: Res<GpuForests>,
-    cache: Res<PipelineCache>,
-    mut pipelines: ResMut<LevelPipelines>,
-) {
-    if let Some(view) = &frame.view {
-        pipelines.depth_first = view.options.depth_first;
-    }
-    let mut one = 1;
-    for target in targets(&scene, &frame) {
-        forests.levels().for_each(|level| pipelines.request(level, target, &cache, &mut { usize::MAX }));
-        forests.arriving_levels().for_each(|level| pipelines.request(level, target, &cache, &mut one));
-    }
 }

@@ -184,3 +184,11 @@ impl RegisterRepresentation for App {
         self
     }
 }
+
+/// A level of one forest on the device.
+pub struct ForestLevel {
+    /// The renderer that draws it.
+    pub renderer: Arc<dyn LevelRenderer>,
+    /// Its plants.
+    pub gpu: Box<dyn GpuLevel>,
+}
