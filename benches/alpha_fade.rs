@@ -81,7 +81,7 @@ fn fading() {
     );
     println!("|---|---|--:|---|--:|--:|--:|--:|--:|--:|");
     for species in [GrowParameters::broadleaf(), GrowParameters::conifer()] {
-        let tree = grow(&species, 1, 20_000).expect("a shipped species grows");
+        let tree = Arc::new(grow(&species, 1, 20_000).expect("a shipped species grows"));
         for level in 0..3 {
             for fade in [AlphaFade::PerLeaf, AlphaFade::CenterOut] {
                 let settings = CrossSettings { fade, ..CrossSettings::default() };
@@ -109,7 +109,7 @@ fn at_rest() {
     println!("| crown | mip | pixels | fade | area | RMSE | FLIP |");
     println!("|---|--:|--:|---|--:|--:|--:|");
     for species in [GrowParameters::broadleaf(), GrowParameters::conifer()] {
-        let tree = grow(&species, 1, 20_000).expect("a shipped species grows");
+        let tree = Arc::new(grow(&species, 1, 20_000).expect("a shipped species grows"));
         for level in 1..6 {
             for fade in [AlphaFade::PerLeaf, AlphaFade::CenterOut] {
                 let settings = CrossSettings { fade, ..CrossSettings::default() };
@@ -174,7 +174,7 @@ fn thresholds() -> impl DoubleEndedIterator<Item = f32> {
 fn transition(name: &str, tree: &Plant, fade: AlphaFade, side: usize) {
     let mut both = crown(tree, AlphaFade::PerLeaf, side);
     let foliage = both.parts.len();
-    let own = Plant { name: "crown".into(), parts: foliage_of(tree) };
+    let own = Arc::new(Plant { name: "crown".into(), parts: foliage_of(tree) });
     let cross = bake_cross(&own, &BakedLighting::Local, &CrossSettings { fade, ..CrossSettings::default() });
     let (plane, chain) = (&cross.planes[0], &cross.textures.color[0]);
     let level = (0..chain.levels.len()).find(|&level| chain.level_size(level).0 as usize <= side).unwrap_or(0);

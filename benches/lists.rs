@@ -65,6 +65,8 @@ fn main() -> anyhow::Result<()> {
         shadow_size: 2048,
         ground: true,
         trees: true,
+        samples: 1,
+        depth_first: true,
     };
     let plant = field::plant(arguments.plant.as_deref())?;
     let fields = arguments.trees.iter().map(|trees| Field::new(&plant, *trees, look)).collect::<Result<Vec<_>, _>>()?;

@@ -76,6 +76,12 @@ struct Arguments {
     /// Leaves out what is named, on both sides, to see what it costs.
     #[arg(long, value_delimiter = ',')]
     without: Vec<Piece>,
+    /// Samples per pixel of our side, 1 or 4.
+    #[arg(long, default_value_t = 1)]
+    msaa: u32,
+    /// Shades our crosses with their depth, and not once a pixel after it.
+    #[arg(long)]
+    shade_at_once: bool,
     /// Which series to run.
     #[arg(long, value_delimiter = ',', default_values_t = [Series::SunFixed, Series::SunMoving])]
     series: Vec<Series>,
@@ -147,11 +153,13 @@ fn main() -> anyhow::Result<()> {
         shadow_size: arguments.shadow_size,
         ground: !left_out(Piece::Ground),
         trees: !left_out(Piece::Trees),
+        samples: arguments.msaa,
+        depth_first: !arguments.shade_at_once,
     };
     let plant = field::plant(arguments.plant.as_deref())?;
     let triangles: usize = plant.plant.parts.iter().map(|part| part.mesh.triangles.len()).sum();
     println!(
-        "{} ({triangles} triangles, {:.1} m) to {} m, crosses of {} planes beyond; {}x{} pixels, no MSAA; {} cascades \
+        "{} ({triangles} triangles, {:.1} m) to {} m, crosses of {} planes beyond; {}x{} pixels, {} a pixel of ours; {} cascades \
          of {} texels to {} m; {} frames a side and series.\n",
         plant.plant.name,
         plant.plant.height(),
@@ -159,6 +167,7 @@ fn main() -> anyhow::Result<()> {
         plant.cross().map_or(0, |cross| cross.planes.len()),
         look.size.0,
         look.size.1,
+        if look.samples > 1 { "four samples" } else { "one sample" },
         look.cascades,
         look.shadow_size,
         look.shadow_distance,

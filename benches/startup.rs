@@ -10,12 +10,16 @@
 //!
 //! With `--appear`: how long are the frames around the one in which a forest of these plants appears?
 //!
+//! With `--change`: how long does a program wait for another scene?
+//!
 //! With `--trees`: what do time and memory cost as a forest grows?
 //!
 //! Run `cargo bench --bench startup -- --help` for the arguments; benches/README.md has results.
 
 #[path = "startup/appear.rs"]
 mod appear;
+#[path = "startup/change.rs"]
+mod change;
 #[path = "startup/sizes.rs"]
 mod sizes;
 
@@ -61,6 +65,15 @@ struct Arguments {
     /// Draw that forest without shadow maps. They are drawn for what appears, and for nothing else.
     #[arg(long)]
     no_shadows: bool,
+    /// Bring that forest onto the device in one frame, as for images.
+    #[arg(long)]
+    blocking: bool,
+    /// Instead: times changes between the scene and another one, while frames run.
+    #[arg(long)]
+    change: bool,
+    /// The other scene of `--change`.
+    #[arg(long, default_value = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/scenes/inventory.ron"))]
+    other: PathBuf,
     /// Instead: builds and draws forests of these numbers of trees.
     #[arg(long, num_args = 1..)]
     trees: Vec<u64>,
@@ -87,6 +100,9 @@ fn main() -> anyhow::Result<()> {
     }
     if !arguments.trees.is_empty() {
         return sizes::run(&arguments);
+    }
+    if arguments.change {
+        return change::run(&arguments);
     }
     if !arguments.appear.is_empty() {
         return appear::run(&arguments);

@@ -5,6 +5,7 @@
 #   prepare lint           rustfmt and clippy
 #   prepare vulkan         Vulkan loader and a driver (Mesa's lavapipe where there is no GPU)
 #   prepare window         the X11 libraries that a window loads
+#   prepare display        a display in memory (Xvfb) for tests of a window, where it can be installed: they are skipped else
 
 # As in Cargo.toml.
 rust_needed=1.95
@@ -89,6 +90,16 @@ find_window_libraries() {
     has_library libxkbcommon-x11.so.0 || need_package libxkbcommon-x11-0
 }
 
+find_display_server() {
+    if ! command -v Xvfb >/dev/null && command -v apt-get >/dev/null && may_install; then
+        need_package xvfb
+    fi
+}
+
+may_install() {
+    [[ "$(id -u)" == 0 ]] || { command -v sudo >/dev/null && sudo -n true 2>/dev/null; }
+}
+
 install_packages() {
     ((${#missing[@]})) || return 0
     local line="apt-get update && apt-get install -y --no-install-recommends ${missing[*]}"
@@ -155,6 +166,7 @@ prepare() {
             build) find_build_tools ;;
             vulkan) find_vulkan ;;
             window) find_window_libraries ;;
+            display) find_display_server ;;
             lint) ;;
             *) die "prepare: what is $wanted?" ;;
         esac

@@ -28,6 +28,11 @@
 //! [`CanopyScene`](components::CanopyScene) on the same entity replaces it. A program that prefers to wait calls
 //! [`Stage::build`](assets::Stage::build) and [`Stage::show`](assets::Stage::show) itself.
 //!
+//! Without a window or a display a program draws into an image and drives the frames itself: `examples/headless.rs` in the
+//! repository does so. An image that must be complete waits for its forests
+//! ([`ForestUpdates::Blocking`](render::components::ForestUpdates)) and for its light
+//! ([`SunRefresh::Immediate`](components::SunRefresh)).
+//!
 //! The modules [`math`], [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`bake`], [`light`],
 //! [`lod`], [`trace`] and [`mod@reference`] use neither `App` nor GPU. [`assets`] builds scenes from them, [`render`]
 //! draws them, and [`components`] has what a program spawns. ARCHITECTURE.md in the repository shows the path of a tree
@@ -49,6 +54,7 @@ mod files;
 pub mod light;
 pub mod lod;
 pub mod math;
+pub mod measure;
 pub mod plant;
 mod plugin;
 pub mod progress;
@@ -79,8 +85,8 @@ pub mod prelude {
         lod::{FadeBand, Levels, Representation},
         progress::{Progress, Silent},
         render::components::{
-            CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, LightUpdates, SunShadowSettings,
-            ViewOptions,
+            CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, ForestUpdates, Ground, LightUpdates,
+            SunShadowSettings, ViewOptions,
         },
         render::diagnostics::CanopyDiagnosticsPlugin,
         scene::{Overrides, Scene, SceneSource},

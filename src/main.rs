@@ -31,6 +31,10 @@ fn run(arguments: Arguments) -> Outcome {
             Ok(options) => trace_reference(&options).into(),
             Err(error) => Outcome::Usage(error),
         },
+        Some(Command::Bake(bake)) => match cli::bake_options(bake, &common) {
+            Ok(options) => bake_levels(&options).into(),
+            Err(error) => Outcome::Usage(error),
+        },
         Some(Command::Info(info)) => describe(&info.file).into(),
         None => Outcome::Usage(cli::no_command()),
     }
@@ -41,6 +45,7 @@ fn list_adapters() -> anyhow::Result<()> {
 }
 
 fn fly_through(options: &canopy::app::FlyOptions) -> anyhow::Result<()> {
+    canopy::app::listen_to_interrupts()?;
     Ok(canopy::app::fly(options, Bars::new(options.quiet))?)
 }
 
@@ -65,6 +70,17 @@ fn trace_reference(options: &canopy::app::ReferenceOptions) -> anyhow::Result<()
         return Ok(());
     }
     cli::print_lines([file.display()])
+}
+
+fn bake_levels(options: &canopy::app::BakeOptions) -> anyhow::Result<()> {
+    canopy::app::listen_to_interrupts()?;
+    let mut bars = Bars::new(options.quiet);
+    canopy::app::bake(options, &mut bars)?;
+    drop(bars);
+    if options.quiet {
+        return Ok(());
+    }
+    cli::print_lines([options.out.display()])
 }
 
 fn describe(file: &std::path::Path) -> anyhow::Result<()> {

@@ -154,7 +154,7 @@ fn picture_area(cross: &Cross, index: usize, level: usize) -> f32 {
 
 #[test]
 fn a_cross_covers_what_the_plant_covers_in_every_mip() {
-    let plant = tree(1500, 4);
+    let plant = Arc::new(tree(1500, 4));
     let cross = bake_cross(&plant, &BakedLighting::Local, &CrossSettings::default());
     let bounds = plant.bounds().unwrap();
     for (index, plane) in cross.planes.iter().enumerate() {
@@ -177,7 +177,7 @@ fn a_cross_covers_what_the_plant_covers_in_every_mip() {
 
 #[test]
 fn a_cross_has_no_foreign_colour_anywhere() {
-    let plant = tree(1500, 5);
+    let plant = Arc::new(tree(1500, 5));
     let cross = bake_cross(&plant, &BakedLighting::Local, &CrossSettings { resolution: 128, ..Default::default() });
     for chain in &cross.textures.color {
         // Leaves are green (60, 120, 30), bark is brown: red never exceeds what lies between, blue stays low.
@@ -196,7 +196,7 @@ fn a_cross_keeps_normal_ambient_and_kind() {
     // The vertex normal looks away from all three viewers and has to be turned.
     add_card(&mut mesh, Vec3::new(0.0, 2.0, 0.0), Quat::from_rotation_arc(Vec3::Z, -normal), 1.0);
     let part = PlantPart { kind: PartKind::Foliage, mesh, material: PlantMaterial::default() };
-    let plant = Plant { name: String::new(), parts: vec![part] };
+    let plant = Arc::new(Plant { name: String::new(), parts: vec![part] });
     let lighting = BakedLighting::Expressive(ExpressiveLighting {
         normals: vec![plant.parts[0].mesh.normals.clone()],
         ambient: vec![vec![0.4; 4]],
@@ -220,14 +220,14 @@ fn a_cross_keeps_normal_ambient_and_kind() {
 
 #[test]
 fn nothing_and_flat_plants_give_crosses_too() {
-    let empty = bake_cross(&Plant::default(), &BakedLighting::Local, &CrossSettings::default());
+    let empty = bake_cross(&Arc::new(Plant::default()), &BakedLighting::Local, &CrossSettings::default());
     assert_eq!(empty.planes.len(), 3);
     assert!(empty.textures.color.iter().flat_map(|chain| &chain.levels).flatten().all(|&byte| byte == 0));
 
     let mut mesh = PlantMesh::default();
     add_card(&mut mesh, Vec3::Y, Quat::IDENTITY, 1.0);
     let part = PlantPart { kind: PartKind::Foliage, mesh, material: PlantMaterial::default() };
-    let flat = Plant { name: String::new(), parts: vec![part] };
+    let flat = Arc::new(Plant { name: String::new(), parts: vec![part] });
     let cross = bake_cross(&flat, &BakedLighting::Local, &CrossSettings { resolution: 64, ..Default::default() });
     assert_eq!(cross.planes[1].u, Vec3::ZERO);
     assert!(cross.planes.iter().all(|plane| plane.frame().is_finite()));
@@ -402,7 +402,7 @@ fn what_is_not_listed_is_not_baked() {
     };
     let (all, _) = bake(BakeSettings::default().representations);
     assert!(all.cross().is_some() && all.shadow_proxy().is_some() && all.levels.len() == 2);
-    const MODEL: &[Representation] = &[Representation::MODEL, Representation::named("cloud")];
+    const MODEL: &[Representation] = &[Representation::MODEL, Representation::named("box")];
     for from_cache in [false, true] {
         let (models, source) = bake(MODEL);
         assert_eq!(matches!(source, BakeSource::Cache), from_cache, "{source:?}");

@@ -19,7 +19,9 @@ fn text(bytes: &[u8]) -> String {
 
 #[test]
 fn help_and_version_succeed_and_show_examples() -> Outcome {
-    for arguments in [&["--help"][..], &["fly", "--help"], &["render", "--help"], &["info", "--help"]] {
+    for arguments in
+        [&["--help"][..], &["fly", "--help"], &["render", "--help"], &["bake", "--help"], &["info", "--help"]]
+    {
         let output = canopy(arguments)?;
         assert_eq!(code(&output), Some(0), "{arguments:?}");
         assert!(text(&output.stdout).contains("Examples:"), "{arguments:?}");
@@ -51,6 +53,9 @@ fn wrong_arguments_exit_with_2() -> Outcome {
         &["render", "s.ron", "--out", "a", "--frames", "5", "--from", "2026-06-21T15:30Z"],
         &["fly", "--size", "x"],
         &["info"],
+        &["bake", "oak.glb"],
+        &["bake", "oak.glb", "--out", "a.jpg"],
+        &["bake", "oak.glb", "--out", "a.png", "--planes", "0"],
     ] {
         let output = canopy(arguments)?;
         assert_eq!(code(&output), Some(2), "{arguments:?}: {}", text(&output.stderr));
@@ -101,6 +106,21 @@ fn info_of_the_shipped_scenes_succeeds() -> Outcome {
     let missing = canopy(&["info", "no-such-file.glb"])?;
     assert_eq!(code(&missing), Some(1));
     assert!(text(&missing.stderr).contains("no-such-file.glb"), "{}", text(&missing.stderr));
+    Ok(())
+}
+
+#[test]
+fn a_bake_names_the_file_that_it_cannot_use_and_leaves_nothing_behind() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let out = folder.path().join("sheets/a.png");
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/scenes/demo.ron");
+    for (plant, message) in [("no-such-file.glb", "no-such-file.glb"), (&scene.display().to_string(), "is not a plant")]
+    {
+        let output = canopy(&["bake", plant, "--out", &out.display().to_string()])?;
+        assert_eq!(code(&output), Some(1), "{plant}");
+        assert!(text(&output.stderr).contains(message), "{}", text(&output.stderr));
+    }
+    assert!(!out.exists() && !folder.path().join("sheets").exists());
     Ok(())
 }
 

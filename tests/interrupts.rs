@@ -84,6 +84,52 @@ fn an_interrupted_sequence_says_what_is_finished_and_goes_on_there() {
     assert!(said.contains(&format!("terminated: {second} of 10000 images are finished")) && second > first, "{said}");
 }
 
+/// A display in memory, which ends with the value.
+struct Display(Child, String);
+
+impl Display {
+    /// `None` where Xvfb is not installed.
+    fn new() -> Option<Self> {
+        let mut xvfb = Command::new("Xvfb");
+        // It chooses a free number and says it when it can be used.
+        xvfb.args(["-displayfd", "1", "-screen", "0", "320x240x24", "-nolisten", "tcp"]);
+        let mut server = xvfb.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().ok()?;
+        let mut number = String::new();
+        let output = server.stdout.as_mut().map(BufReader::new);
+        output.expect("its output").read_line(&mut number).expect("text");
+        assert!(number.trim().parse::<u32>().is_ok(), "Xvfb did not start");
+        Some(Self(server, format!(":{}", number.trim())))
+    }
+}
+
+impl Drop for Display {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+fn an_interrupted_flight_ends_with_the_code_of_the_signal() {
+    let _gpu = gpu();
+    let Some(display) = Display::new() else {
+        println!("not tested: Xvfb is not installed (Debian's package xvfb; ./test installs it)");
+        return;
+    };
+    let (_folder, scene) = plane();
+    let flight = || {
+        let mut command = command(&["fly", "--size", "64x36"]);
+        command.arg(&scene).env("DISPLAY", &display.1).env_remove("WAYLAND_DISPLAY");
+        command
+    };
+    // The scene is built beside a window that is open already.
+    for (signal, expected, word) in [("INT", 130, "interrupted: "), ("TERM", 143, "terminated: ")] {
+        let (code, said) = signalled(flight(), signal, "0 trees");
+        assert_eq!(code, Some(expected), "{said}");
+        assert!(said.contains(&format!("{word}the flight was ended")) && !said.contains("error"), "{said}");
+    }
+}
+
 #[test]
 fn a_killed_sequence_leaves_whole_images() {
     let _gpu = gpu();
@@ -97,6 +143,33 @@ fn a_killed_sequence_leaves_whole_images() {
         }
     }
     assert!(images(&out) >= 1);
+}
+
+#[test]
+fn a_sequence_that_is_killed_while_it_writes_leaves_whole_images_and_goes_on() {
+    let _gpu = gpu();
+    let (folder, scene) = plane();
+    let out = folder.path().join("flight");
+    let is_half = |file: &PathBuf| file.extension().is_some_and(|extension| extension == "tmp");
+    let mut program = sequence(&scene, &out).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program");
+    // A temporary file is there until it is renamed.
+    while !listing(&out).iter().any(is_half) {
+        assert!(program.try_wait().expect("its state").is_none(), "it ended by itself");
+        std::thread::yield_now();
+    }
+    send("KILL", &program);
+    assert_eq!(program.wait().expect("its end").code(), None);
+    // It may have been renamed before the signal arrived; then there is one more image, and no half one.
+    let halves: Vec<_> = listing(&out).into_iter().filter(is_half).collect();
+    assert!(halves.len() <= 1, "{halves:?}");
+    let finished = listing(&out).len() - halves.len();
+    let mut resumed = sequence(&scene, &out);
+    resumed.arg("--resume");
+    let (code, said) = signalled(resumed, "INT", "drawn in");
+    assert_eq!(code, Some(130), "{said}");
+    assert!(finished == 0 || said.contains(&format!("{finished} of 10000 images are")) || finished == 1, "{said}");
+    halves.iter().for_each(|half| std::fs::remove_file(half).expect("a file"));
+    assert!(images(&out) > finished);
 }
 
 #[test]

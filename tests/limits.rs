@@ -15,7 +15,7 @@ fn a_forest_is_as_wide_as_its_terrain() {
         let built = build(
             &format!(
                 "(terrain: Flat(size: {kilometres}000), species: [{BROADLEAF}], trees: Scattered(stems_per_hectare: \
-                 0.01), {PLACE}, {})",
+                 0.01, surroundings: 0), {PLACE}, {})",
                 quality(1)
             ),
             &[],
@@ -60,7 +60,8 @@ fn failure(scene: &Scene, most_trees: Option<usize>) -> StageError {
 #[test]
 fn more_trees_than_a_device_holds_are_refused_before_the_bake() {
     let hilly = "Noise(size: 2000, amplitude: 400, wavelength: 300, seed: 3)";
-    let rules = "Scattered(stems_per_hectare: 200, slope_limit: 30, clearings: (wavelength: 300, share: 0.3))";
+    let rules =
+        "Scattered(stems_per_hectare: 200, slope_limit: 30, surroundings: 0, clearings: (wavelength: 300, share: 0.3))";
     let error = failure(&without_plants(hilly, rules), Some(1000));
     let StageError::TooManyTrees { count, limit: 1000 } = error else { panic!("{error}") };
     assert!(error_text(count).contains("--adapter"));

@@ -1,5 +1,8 @@
 //! Images: small scenes drawn without a window, on whatever graphics driver there is (a software one will do).
 
+mod arrival;
+mod device;
+mod exposure;
 mod foliage;
 mod forests;
 mod levels;
@@ -10,6 +13,7 @@ mod pictures;
 mod plate;
 mod plugins;
 mod shadows;
+mod traps;
 mod world;
 
 use bevy::ecs::{entity::Entity, query::QueryFilter};

@@ -317,6 +317,37 @@ proptest! {
     }
 }
 
+/// The wood does not end at the border of the data, and what is inside stays as it was.
+#[test]
+fn surroundings_go_on_with_the_same_density_and_thin_out() {
+    let clearings = Some(ClearingNoise { wavelength_m: 150.0, cover: 0.3, edge: 0.1 });
+    let rules = PlacementRules { min_distance_m: 2.0, clearings, ..rules() };
+    let inside = place_trees(&rules, &FLAT).unwrap().stand;
+    let width = 400.0;
+    let around = place_surroundings(&rules, &inside, width, &FLAT).unwrap();
+    assert_eq!(around, place_surroundings(&rules, &inside, width, &FLAT).unwrap());
+    let point = |tree: &Tree| DVec2::new(tree.position.x, tree.position.z);
+    assert!(around.trees.iter().all(|tree| !rules.area.contains(point(tree)) && tree.index >= FIRST_SURROUNDING_INDEX));
+    assert!(inside.trees.iter().all(|tree| tree.index < FIRST_SURROUNDING_INDEX));
+    // The rings up to half of the width are as dense as the wood, then it thins out.
+    let density = |from: f64, to: f64| {
+        let ring = |by: f64| Area { min: rules.area.min - by, max: rules.area.max + by };
+        let count = around.trees.iter().filter(|tree| {
+            let beyond = distance_beyond(&rules.area, point(tree));
+            from < beyond && beyond <= to
+        });
+        count.count() as f64 / (ring(to).hectares() - ring(from).hectares())
+    };
+    let wood = inside.trees.len() as f64 / rules.area.hectares();
+    let (near, middle, end) = (density(0.0, 200.0), density(250.0, 320.0), density(370.0, 400.0));
+    assert!((0.75..1.25).contains(&(near / wood)), "{near} around {wood}");
+    assert!((0.4..0.95).contains(&(middle / near)) && end < 0.2 * near, "{near}, {middle}, {end}");
+    let whole = Stand { trees: inside.trees.iter().chain(&around.trees).copied().collect() };
+    assert!(least_distance(&whole) >= 2.0, "{}", least_distance(&whole));
+    assert_eq!(place_surroundings(&rules, &inside, 0.0, &FLAT).unwrap(), Stand::default());
+    assert_eq!(place_surroundings(&rules, &inside, f64::NAN, &FLAT).unwrap(), Stand::default());
+}
+
 // ---------------------------------------------------------------- inventories
 
 fn parse(text: &str) -> Result<Inventory, ScatterError> {

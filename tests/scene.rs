@@ -339,7 +339,7 @@ fn impossible_values_are_placed() {
     faulty("position: (1, 2, 3)", "position: (1, -2, 3)", 14, &["`camera.start.position[1]`"]);
     faulty("pitch: -5", "pitch: -95", 7, &["from -90 to 90"]);
     faulty("seconds: 5", "seconds: 0", 9, &["not after the key before it"]);
-    faulty("field_of_view: 60", "field_of_view: 180", 15, &["from 5 to 120"]);
+    faulty("field_of_view: 60", "field_of_view: 180", 15, &["from 1 to 170"]);
     faulty("shadow_map_size: 1024", "shadow_map_size: 1000", 17, &["1024, 2048"]);
     faulty("cascades: 3", "cascades: 5", 10, &["1 to 4"]);
     faulty("msaa: 1", "msaa: 2", 6, &["write 1 (off) or 4"]);
@@ -547,7 +547,7 @@ fn the_levels_of_detail_are_a_list() -> Outcome {
     let wrong = listed(r#"[(draw: "modle", until: 90), (draw: "model", until: 50), (draw: "cross")]"#);
     let message = parse(&wrong).err().ok_or("accepted")?.to_string();
     for word in [
-        "`quality.levels[0].draw` is \"modle\"; write \"model\" or \"cross\"",
+        "`quality.levels[0].draw` is \"modle\"; write \"model\", \"thinned\", \"cloud\" or \"cross\"",
         "`quality.levels[1].until` is 50 m, where the level before it ends at 110 m",
     ] {
         assert!(message.contains(word), "no `{word}` in {message}");

@@ -14,13 +14,11 @@ use canopy::{
         volume::{LevelRange, Ring, VolumePlane},
     },
     render::{
-        bindings::uniforms::{
-            CascadeUniform, CascadeViewUniform, FrameUniform, LightUniform, NOISE_PERIOD, ShadowUniform,
-        },
+        bindings::uniforms::{CascadeUniform, CascadeViewUniform, FrameUniform, LightUniform, ShadowUniform},
         cull::{ListRoom, TreeDrawWords},
         forest::{
-            CrossVariantUniform, ForestViewUniform, PartUniform, PlaneUniform, PlantVertex, TransferUniform,
-            VariantUniform,
+            CloudPlaneUniform, CloudVariantUniform, CrossVariantUniform, ForestViewUniform, PartUniform, PlaneUniform,
+            PlantVertex, TransferUniform, VariantUniform,
         },
         shaders::{ShaderFile, sources},
         terrain::{GpuTile, GpuTileVertex},
@@ -35,16 +33,28 @@ use naga::{
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 
 /// All that the pipelines switch on or off.
-const DEFINES: [&str; 7] =
-    ["FOLIAGE", "ALPHA_TO_COVERAGE", "NORMAL_MAP", "TRANSFER", "TRANSFER_COLOR", "SUN_HARMONICS", "PLAIN_TOO"];
+const DEFINES: [&str; 8] = [
+    "FOLIAGE",
+    "ALPHA_TO_COVERAGE",
+    "NORMAL_MAP",
+    "TRANSFER",
+    "TRANSFER_COLOR",
+    "SUN_HARMONICS",
+    "PLAIN_TOO",
+    "DEPTH_FIRST",
+];
 
-/// All combinations of [`DEFINES`]; the last three mean something with transfer only.
+/// All combinations of [`DEFINES`]; some mean something with transfer only, and crosses have no others with their depth
+/// drawn first.
 fn variants() -> impl Iterator<Item = Vec<&'static str>> {
     let all = (0..1u32 << DEFINES.len()).map(|bits| {
         DEFINES.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, define)| *define).collect::<Vec<_>>()
     });
     let needs = ["TRANSFER_COLOR", "SUN_HARMONICS", "PLAIN_TOO"];
-    all.filter(move |defines| defines.contains(&"TRANSFER") || !needs.iter().any(|define| defines.contains(define)))
+    let never_of_crosses = ["NORMAL_MAP", "TRANSFER_COLOR", "SUN_HARMONICS"];
+    let any_of = |defines: &[&str], some: &[&str]| some.iter().any(|define| defines.contains(define));
+    all.filter(move |defines| defines.contains(&"TRANSFER") || !any_of(defines, &needs))
+        .filter(move |defines| !defines.contains(&"DEPTH_FIRST") || !any_of(defines, &never_of_crosses))
 }
 
 fn is_library(source: &str) -> bool {
@@ -194,7 +204,7 @@ fn gpu_structs_are_what_the_shaders_think() {
     twin!(
         layouts,
         "Frame",
-        FrameUniform { clip_from_relative, relative_from_clip, camera, focal_length_pixels, mean_cover }
+        FrameUniform { clip_from_relative, relative_from_clip, camera, focal_length_pixels, mean_cover, noise_block }
     );
     twin!(
         layouts,
@@ -272,6 +282,12 @@ fn gpu_structs_are_what_the_shaders_think() {
     );
     twin!(
         layouts,
+        "CloudPlane",
+        CloudPlaneUniform { center, texture_left, u, texture_top, v, texture_right, normal, texture_bottom }
+    );
+    twin!(layouts, "CloudVariant", CloudVariantUniform { transmission, light_layer, isotropic_fraction });
+    twin!(
+        layouts,
         "Transfer",
         TransferUniform {
             scale,
@@ -315,7 +331,7 @@ fn gpu_structs_are_what_the_shaders_think() {
     );
     twin!(layouts, "Cluster", Cluster { cell, first, count, low, high, bottom, top });
     twin!(layouts, "TreeSize", TreeSize { radius, height });
-    twin!(layouts, "TreeDraw", TreeDrawWords { group, vertices, indexed });
+    twin!(layouts, "TreeDraw", TreeDrawWords { group, vertices, kind, first_vertex, share, shares });
     twin!(layouts, "ListRoom", ListRoom { capacity, staging, group_count, draw_count });
     twin!(layouts, "Tile", GpuTile { origin, spacing, first, morph_start, morph_end, clearance, camera_height });
     twin!(layouts, "TileVertex", GpuTileVertex { height, parent_height, normal, parent_normal });
@@ -333,6 +349,8 @@ fn every_bound_struct_has_its_twin_tested() {
         "ForestView",
         "Variant",
         "CrossVariant",
+        "CloudPlane",
+        "CloudVariant",
         "Part",
         "Transfer",
         "Tree",
@@ -398,9 +416,4 @@ fn plant_vertices_are_what_the_shaders_read() {
         }
     }
     assert!(inputs > 0);
-}
-
-#[test]
-fn the_grounds_noise_has_no_seam() {
-    assert!(NOISE_PERIOD.log2().fract() == 0.0, "not a power of two");
 }

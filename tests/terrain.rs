@@ -266,6 +266,32 @@ fn tiles_cover_the_square_once_and_meet_without_cracks() {
     assert!(levels_that_meet > 100, "the test met only {levels_that_meet} edges between levels");
 }
 
+/// Far ground once was dropped where there was no room for all tiles.
+#[test]
+fn too_many_tiles_become_coarser_ones_that_cover_the_square_too() {
+    let (_, tree) = tile_scene(3);
+    let (terrain, _) = tile_scene(3);
+    for camera in cameras(&terrain) {
+        let mut all = Vec::new();
+        let unbounded = tree.select(camera, FOCAL, |_, _| true, &mut all);
+        let mut tiles = Vec::new();
+        let (clearance, factor) = tree.select_at_most(all.len(), camera, FOCAL, |_, _| true, &mut tiles);
+        assert_eq!((clearance, factor, &tiles), (unbounded, 1.0, &all));
+        let most = all.len() / 2;
+        let (clearance, factor) = tree.select_at_most(most, camera, FOCAL, |_, _| true, &mut tiles);
+        assert!(factor > 1.0 && tiles.len() <= most, "{} tiles of {}", tiles.len(), all.len());
+        let drawn = Drawn { terrain: &terrain, tree: &tree, camera, clearance, meshes: HashMap::new() };
+        for i in 0..300 {
+            let place = DVec2::new(camera.x, camera.z) + (DVec2::new(spread(i, 0), spread(i, 2)) - 0.5) * 18_000.0;
+            let over = tiles.iter().filter(|tile| drawn.covers(tile, place)).count();
+            assert_eq!(over, 1, "{place} is drawn by {over} tiles");
+        }
+        // No error is large enough for three.
+        tree.select_at_most(3, camera, FOCAL, |_, _| true, &mut tiles);
+        assert_eq!(tiles.len(), 3);
+    }
+}
+
 #[test]
 fn the_drawn_ground_errs_by_half_a_pixel_at_most() {
     let (terrain, tree) = tile_scene(5);

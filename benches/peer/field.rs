@@ -59,6 +59,10 @@ pub struct Look {
     pub ground: bool,
     /// Whether trees are drawn.
     pub trees: bool,
+    /// Samples per pixel of our side.
+    pub samples: u32,
+    /// Whether our crosses are shaded once a pixel, after their depth.
+    pub depth_first: bool,
 }
 
 impl Look {

@@ -8,7 +8,7 @@ use canopy::{
     bake::{BakedLevel, BakedPlant},
     components::Sun,
     lod::{FadeBand, Levels},
-    render::components::{Forest, Ground, SunShadowSettings, TreeLists},
+    render::components::{Forest, Ground, SunShadowSettings, TreeLists, ViewOptions},
     scene::Viewpoint,
 };
 use glam::DVec3;
@@ -26,12 +26,15 @@ impl Ours {
     /// Canopy's side of `field`.
     pub fn new(field: &Field) -> anyhow::Result<Self> {
         let look = &field.look;
-        let mut renderer = Renderer::new(look.size, None, 1)?;
+        let mut renderer = Renderer::new(look.size, None, look.samples)?;
         let world = renderer.app().world_mut();
+        let mut cameras = world.query::<&mut ViewOptions>();
+        cameras.iter_mut(world).for_each(|mut options| options.depth_first = look.depth_first);
         if look.ground {
             world.spawn(Ground {
                 terrain: field.terrain.clone(),
                 cover: Some(field.cover.clone()),
+                surroundings: 0.0,
                 error_pixels: 1.0,
                 view_distance: GROUND_REACH,
             });

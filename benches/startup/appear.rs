@@ -11,14 +11,19 @@ use canopy::{
     app::Renderer,
     assets::Stage,
     progress::Silent,
-    render::components::{Forest, SunShadowSettings},
+    render::{
+        components::{Forest, ForestUpdates, SunShadowSettings},
+        report::{FrameReport, PassOutcome},
+    },
     scene::{GltfPlants, GroundNoise, Pose, ScatteredTrees, Scene, Species},
 };
 
 use super::Arguments;
 
-/// Frames before the forest appears, and after.
+/// Frames before the forest is spawned.
 const NEIGHBOURS: usize = 4;
+/// Frames after the one that draws it first. In the last ones it has all its shadows.
+const AFTER: usize = 24;
 
 /// Times the frames around the appearance of a forest.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
@@ -45,21 +50,55 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     renderer.set_view(
         &Pose { position: (0.0, 20.0, 60.0), yaw: 0.0, pitch: -10.0 }.viewpoint(stage.terrain.height(0.0, 60.0), 50.0),
     );
-    frames(&mut renderer)?;
-    println!("| time | ground alone | the forest appears | and stays |\n|---|---|--:|---|");
+    let updates = if arguments.blocking { ForestUpdates::Blocking } else { ForestUpdates::Spread };
+    renderer.app().insert_resource(updates);
+    frames(&mut renderer, NEIGHBOURS)?;
+    println!(
+        "| time | ground alone, s | while it arrives | first drawn | next frames | stays: median | longest / stays | longest \
+         / its longer neighbour |\n|---|---|---|--:|---|--:|--:|--:|"
+    );
     for turn in 1..=arguments.turns {
-        let before = frames(&mut renderer)?;
+        let mut times = frames(&mut renderer, NEIGHBOURS)?;
         let forest = stage.forest().context("the scene has no trees")?;
         renderer.app().world_mut().spawn(forest);
-        let appearing = frame(&mut renderer)?;
-        let after = frames(&mut renderer)?;
-        println!("| {turn} | {} | {appearing:.3} | {} |", list(&before), list(&after));
+        while !is_drawn(&mut renderer) {
+            times.extend(frames(&mut renderer, 1)?);
+        }
+        let first = times.len() - 1;
+        times.extend(frames(&mut renderer, AFTER)?);
+        let stays = median(&times[times.len() - NEIGHBOURS..]);
+        let (longest, worst) = (times[NEIGHBOURS..].iter().copied().fold(0.0, f64::max), worst(&times));
+        println!(
+            "| {turn} | {} | {} | {:.3} | {} | {stays:.3} | {:.2} | {worst:.2} |",
+            list(&times[..NEIGHBOURS]),
+            list(&times[NEIGHBOURS..first]),
+            times[first],
+            list(&times[first + 1..]),
+            longest / stays,
+        );
         let world = renderer.app().world_mut();
         let shown: Vec<Entity> = world.query_filtered::<Entity, With<Forest>>().iter(world).collect();
         shown.into_iter().for_each(|entity| _ = world.despawn(entity));
-        frames(&mut renderer)?;
+        frames(&mut renderer, NEIGHBOURS)?;
     }
     Ok(())
+}
+
+/// Whether the last frame drew trees.
+fn is_drawn(renderer: &mut Renderer) -> bool {
+    let outcomes = renderer.app().world().resource::<FrameReport>().outcomes();
+    outcomes.iter().any(|(pass, outcome)| pass == "forest" && matches!(outcome, PassOutcome::Ran(_)))
+}
+
+/// The largest ratio of a frame to the longer one of its neighbours.
+fn worst(times: &[f64]) -> f64 {
+    times.windows(3).map(|three| three[1] / three[0].max(three[2])).fold(0.0, f64::max)
+}
+
+fn median(times: &[f64]) -> f64 {
+    let mut sorted = times.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 /// Seconds of a frame.
@@ -69,8 +108,8 @@ fn frame(renderer: &mut Renderer) -> anyhow::Result<f64> {
     Ok(started.elapsed().as_secs_f64())
 }
 
-fn frames(renderer: &mut Renderer) -> anyhow::Result<Vec<f64>> {
-    (0..NEIGHBOURS).map(|_| frame(renderer)).collect()
+fn frames(renderer: &mut Renderer, count: usize) -> anyhow::Result<Vec<f64>> {
+    (0..count).map(|_| frame(renderer)).collect()
 }
 
 fn list(seconds: &[f64]) -> String {

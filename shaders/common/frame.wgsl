@@ -7,11 +7,13 @@ struct Frame {
     // Camera-relative metres (world axes, camera at the origin) to clip space, reversed depth.
     clip_from_relative: mat4x4<f32>,
     relative_from_clip: mat4x4<f32>,
-    // Camera position: x and z modulo the period of the ground's noise, y above the datum; metres.
+    // Camera position: x and z from the middle of its block of the ground's noise, y above the datum; metres.
     camera: vec3<f32>,
     focal_length_pixels: f32,
     // Mean canopy cover where the terrain is known, 0..1.
     mean_cover: f32,
+    // The camera's block of the ground's noise: column and row, modulo 2^32.
+    noise_block: vec2<i32>,
 }
 
 // The current light, premultiplied by the exposure.

@@ -111,13 +111,19 @@ struct KeySides {
     far: vec3<f32>,
 }
 
-fn key_sides(surface: Surface) -> KeySides {
+// Cosines of the key light to the viewer's side and to the other, in the mean over the leaves.
+fn key_cosines(surface: Surface) -> vec2<f32> {
     let cosine = dot(surface.normal, light.key_direction);
     let between = dot(surface.viewer, light.key_direction);
     let front = mix(max(cosine, 0.0), sphere_cosine(between), surface.isotropic_fraction);
     let back = mix(max(-cosine, 0.0), sphere_cosine(-between), surface.isotropic_fraction);
+    return vec2(front, back);
+}
+
+fn key_sides(surface: Surface) -> KeySides {
+    let cosines = key_cosines(surface);
     let full = light.key_illuminance * INVERSE_PI;
-    return KeySides(front * full, back * full);
+    return KeySides(cosines.x * full, cosines.y * full);
 }
 
 // Exitant radiance of a leaf that the key light hits at the angle to its normal. There is no branch for leaves without
@@ -132,4 +138,20 @@ fn shade(surface: Surface, visibility: f32, sky: vec3<f32>) -> vec3<f32> {
 fn shade_matt(surface: Surface, visibility: f32, sky: vec3<f32>) -> vec3<f32> {
     let key = key_sides(surface);
     return exitant_matt(surface, key.near, key.far, visibility, sky);
+}
+
+// Exitant radiance of leaves whose light by the key light is known as a sum over both of their sides and over all of them:
+// `lit`, as a fraction of what a surface that faces the light gets, weighted as src/bake/levels/cross/sun.rs says.
+// `visibility` is that behind other plants.
+fn shade_leaves(surface: Surface, lit: f32, visibility: f32, sky: vec3<f32>) -> vec3<f32> {
+    let subsurface = subsurface_share(surface.albedo, surface.specular_reflectance);
+    let room = 1.0 - surface.albedo * (subsurface + surface.transmission);
+    let full = light.key_illuminance * INVERSE_PI;
+    let gloss = leaf_gloss(surface, surface.albedo * (1.0 - subsurface), room);
+    // The leaves' own shade, for the gloss: what they show over what they would show without it.
+    let sides = key_cosines(surface);
+    let through = dot(surface.transmission, vec3(0.2126, 0.7152, 0.0722));
+    let own = saturate(lit * (1.0 + through) / max(sides.x + through * sides.y, 0.05));
+    let diffuse = surface.albedo * (subsurface + surface.transmission) * lit;
+    return full * visibility * (diffuse + gloss * own) + surface.albedo * sky;
 }

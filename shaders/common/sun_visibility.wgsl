@@ -13,12 +13,14 @@ struct GroundSample {
     cover: f32,
     // Mean canopy cover of the surroundings.
     surrounding_cover: f32,
+    // Canopy cover of trees that are not drawn, because they are beyond those of the scene.
+    undrawn_cover: f32,
 }
 
 fn sample_ground(relative: vec3<f32>) -> GroundSample {
     let uv = (relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;
-    let texel = textureSampleLevel(ground_texture, sky_sampler, uv, 0.0).xyz;
-    return GroundSample(texel.x, texel.y, texel.z);
+    let texel = textureSampleLevel(ground_texture, sky_sampler, uv, 0.0);
+    return GroundSample(texel.x, texel.y, texel.z, texel.w);
 }
 
 // Light that clears the terrain: a penumbra that widens with the distance to the ridge is approximated by one of

@@ -9,8 +9,13 @@
 struct TreeDraw {
     group: u32,
     vertices: u32,
-    // 1 if these are indices, and trees are instances.
-    indexed: u32,
+    // 1: indices, and trees are instances; 2: vertices, and trees are instances; 0: neither.
+    kind: u32,
+    // The first vertex of kind 2.
+    first_vertex: u32,
+    // Which share of the group, and how many shares there are.
+    share: u32,
+    shares: u32,
 }
 
 // Sizes of the buffers, in words.
@@ -355,16 +360,20 @@ fn group_trees(@builtin(local_invocation_id) id: vec3<u32>) {
     let arguments = LIST_HEADER + 2u * room.group_count;
     for (var index = thread; index < room.draw_count; index += SORT_THREADS) {
         let call = draws[index];
-        let first = results[LIST_HEADER + 2u * call.group];
-        let count = results[LIST_HEADER + 2u * call.group + 1u] - first;
+        let group_first = results[LIST_HEADER + 2u * call.group];
+        let group_count = results[LIST_HEADER + 2u * call.group + 1u] - group_first;
+        // As `Share::cut` of src/cull/lists.rs.
+        let first = group_first + group_count * call.share / call.shares;
+        let count = group_first + group_count * (call.share + 1u) / call.shares - first;
         let slot = arguments + 5u * index;
-        let indexed = call.indexed == 1u;
+        let indexed = call.kind == 1u;
+        let instanced = call.kind != 0u;
         // Indices, instances, first index, base vertex, first instance; or vertices, instances, first vertex, first
-        // instance: each thread of a pulled vertex finds its tree by its index.
-        results[slot] = select(count * call.vertices, call.vertices, indexed);
-        results[slot + 1u] = select(1u, count, indexed);
-        results[slot + 2u] = select(first * call.vertices, 0u, indexed);
-        results[slot + 3u] = 0u;
+        // instance. Without instances each pulled vertex finds its tree by its index.
+        results[slot] = select(count * call.vertices, call.vertices, instanced);
+        results[slot + 1u] = select(1u, count, instanced);
+        results[slot + 2u] = select(first * call.vertices, call.first_vertex, instanced);
+        results[slot + 3u] = select(0u, first, call.kind == 2u);
         results[slot + 4u] = select(0u, first, indexed);
     }
 }

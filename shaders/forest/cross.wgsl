@@ -1,9 +1,9 @@
 // Crossed billboards [Franzke 2005, 4.3]: two upright planes and a level one, eighteen pulled vertices a tree.
-#import canopy::constants::{CROSS_VERTICES, PLANES, ISOTROPIC_LEVELS, LIGHT_SCALE, WHOLE, FADE_SPAN, GONE, AMBIENT_FITTED}
+#import canopy::constants::{CROSS_VERTICES, PLANES, ISOTROPIC_LEVELS, LIGHT_SCALE, SUN_SCALE, WHOLE, FADE_SPAN, GONE}
 #import canopy::cross_variant::cross_variants
 #import canopy::frame::{frame, light}
-#import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, leaf_visibility}
-#import canopy::lighting::{Surface, shade, even_sky, leaf_transmission}
+#import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, Crown, crown_of, depth_in_crown}
+#import canopy::lighting::{Surface, shade_leaves, even_sky, leaf_transmission}
 #import canopy::output::finish
 #import canopy::sky::sky_transfer
 #import canopy::stand::{stand_light, in_stand_by_transfer, evaluate_two_bands}
@@ -12,13 +12,20 @@
 @group(2) @binding(0) var color_textures: texture_2d_array<f32>;
 @group(2) @binding(1) var property_textures: texture_2d_array<f32>;
 @group(2) @binding(2) var texture_sampler: sampler;
+// How much of the sun's light the leaves show, two layers a plane: src/bake/levels/cross/sun.rs.
+@group(2) @binding(4) var sun_textures: texture_2d_array<f32>;
 #ifdef TRANSFER
 // How the light of the sky reaches the leaves: src/bake/levels/cross/light.rs.
 @group(3) @binding(0) var light_textures: texture_2d_array<f32>;
 #endif
 
 struct Varying {
+#ifdef DEPTH_FIRST
+    // The same bits in the pipelines of both stages.
+    @builtin(position) @invariant clip: vec4<f32>,
+#else
     @builtin(position) clip: vec4<f32>,
+#endif
     @location(0) relative: vec3<f32>,
     @location(1) uv: vec2<f32>,
     @location(2) @interpolate(flat) layer: u32,
@@ -28,8 +35,12 @@ struct Varying {
     @location(7) @interpolate(flat) front: vec3<f32>,
     // A packed `Look`.
     @location(5) look: vec4<f32>,
-    // Metres.
-    @location(6) @interpolate(flat) crown_radius: f32,
+    // A `Crown`.
+    @location(6) @interpolate(flat) crown_center: vec3<f32>,
+    @location(8) @interpolate(flat) crown_inverse_extents: vec2<f32>,
+    // The functions of the sun textures at the key light's direction, times their scale.
+    @location(9) @interpolate(flat) sun_basis: vec4<f32>,
+    @location(10) @interpolate(flat) more_sun_basis: vec4<f32>,
 }
 
 struct Look {
@@ -87,8 +98,20 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     // From behind, the other half of the crown faces the viewer: it is mirrored across the plane.
     out.front = normal * select(1.0, -1.0, toward > 0.0);
     out.look = pack_look(Look(threshold, position.from_foot.y, position.from_foot.y / height, tree.tint));
-    out.crown_radius = variants[tree.variant].crown_radius * tree.scale;
+    let crown = crown_of(tree);
+    out.crown_center = crown.center;
+    out.crown_inverse_extents = crown.inverse_extents;
+    let to_light = light.key_direction;
+    let sun = vec3(dot(to_light, out.right), dot(to_light, out.up), dot(to_light, out.front));
+    set_sun_basis(select(sun, sun.xzy, level), &out);
     return out;
+}
+
+// The twin of `basis` in src/bake/levels/cross/sun.rs. `sun`: right, zenith, front; there are no suns below the horizon.
+fn set_sun_basis(sun: vec3<f32>, out: ptr<function, Varying>) {
+    let high = 2.0 * abs(sun.y) - 1.0;
+    (*out).sun_basis = SUN_SCALE * vec4(1.0, high, sun.x, sun.z);
+    (*out).more_sun_basis = SUN_SCALE * vec4(sun.x * high, sun.z * high, sun.x * sun.z, sun.x * sun.x - sun.z * sun.z);
 }
 
 fn decode_octahedral(e: vec2<f32>) -> vec3<f32> {
@@ -99,6 +122,18 @@ fn decode_octahedral(e: vec2<f32>) -> vec3<f32> {
     n.y += select(t, -t, n.y >= 0.0);
     return normalize(n);
 }
+
+#ifdef DEPTH_FIRST
+// Depth alone, with the alpha test of the light that follows.
+@fragment
+fn depth(in: Varying) -> @location(0) vec4<f32> {
+    let texel = textureSampleLevel(color_textures, texture_sampler, in.uv, in.layer, mip_level(in.uv));
+    if texel.a < unpack_look(in.look).threshold {
+        discard;
+    }
+    return vec4(0.0);
+}
+#endif
 
 @fragment
 fn fragment(in: Varying) -> @location(0) vec4<f32> {
@@ -161,35 +196,21 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let sky = even_sky(surface, stand);
 #endif
     if visibility > 0.0 {
-        // The texture represents a round crown: parts that face the light lie in front of the plane that casts the
-        // shadow, parts that face away lie behind it.
-        let bulge = normal * (0.55 * in.crown_radius * foliage);
-        let cascades = cascaded_visibility(in.relative + bulge, normal, 0.25, in.clip.xy);
-        // The crown's own shadow: its far side lies behind all of its leaves, of which the maps hold only one
-        // billboard.
-        let side = dot(normal, light.key_direction);
-        let own = mix(1.0, smoothstep(-0.6, 0.3, side), foliage);
-        visibility *= mix(
-            own * mix(1.0, stand.key_transmittance, foliage),
-            cascades.visibility * mix(0.75, 1.0, own),
-            cascades.weight,
-        );
+        // The plant's own shade is in the sun textures. What the maps and the stand add is that of other plants, which the
+        // light meets before it enters the crown.
+        let entry = in.relative + light.key_direction * depth_in_crown(in.relative, Crown(in.crown_center, in.crown_inverse_extents), light.key_direction);
+        let cascades = cascaded_visibility(entry, light.key_direction, 0.25, in.clip.xy);
+        visibility *= mix(mix(1.0, stand.key_transmittance, foliage), cascades.visibility, cascades.weight);
     }
-    let sunlit = mix(1.0, hot_spot(surface.viewer), smoothstep(0.25, 0.85, ground.surrounding_cover));
-    let dimmed = select(1.0, leaf_visibility(properties.b), ambient_term == AMBIENT_FITTED);
-    let among = select(dimmed, sunlit, by_transfer);
-    visibility *= mix(1.0, among, foliage);
-    var color = shade(surface, visibility, sky);
+    let sun_layer = 2u * in.layer;
+    let sun = textureSampleLevel(sun_textures, texture_sampler, in.uv, sun_layer, level);
+    let more_sun = textureSampleLevel(sun_textures, texture_sampler, in.uv, sun_layer + 1u, level);
+    var lit = max(dot(sun, in.sun_basis) + dot(more_sun, in.more_sun_basis), 0.0);
+    // The level plane's texture has its lit side. From below one sees what comes through.
+    lit *= select(1.0, dot(surface.transmission, vec3(0.2126, 0.7152, 0.0722)), in.front.y < -0.5);
+    var color = shade_leaves(surface, lit, visibility, sky);
     color = tint_level(color);
     return finish(in.relative, color, coverage);
-}
-
-// Sunlit fraction of the visible leaf area, the hot-spot effect [Kuusk 1991]: leaves seen from the direction of the
-// light are lit; the larger the angle between view and light, the more of them lie in shade. Fitted to path-traced
-// dense stands of oaks and of grown trees, seen with the light and against it (benches/README.md, dense stands). A lone
-// tree needs no correction, so it is weighted by the cover.
-fn hot_spot(viewer: vec3<f32>) -> f32 {
-    return 0.725 + 0.275 * dot(viewer, light.key_direction);
 }
 
 // Fraction of a texel's leaf area with isotropic normals.

@@ -120,6 +120,30 @@ fn rotated_vertex_position(tree: Instance, rotated: vec3<f32>) -> VertexPosition
     return position;
 }
 
+// The ellipsoid in a tree's extents.
+struct Crown {
+    // Metres from the anchor.
+    center: vec3<f32>,
+    // One over its half extents across and upwards, 1/m.
+    inverse_extents: vec2<f32>,
+}
+
+fn crown_of(tree: Instance) -> Crown {
+    let size = vec2(variants[tree.variant].crown_radius, 0.5 * variants[tree.variant].height) * tree.scale;
+    return Crown(tree.position + vec3(0.0, size.y, 0.0), 1.0 / max(size, vec2(1e-3)));
+}
+
+// Distance from a position to where light from the unit vector `to_light` enters the crown, metres; 0 outside of it.
+fn depth_in_crown(relative: vec3<f32>, crown: Crown, to_light: vec3<f32>) -> f32 {
+    let scale = crown.inverse_extents.xyx;
+    let position = (relative - crown.center) * scale;
+    let along = to_light * scale;
+    let square = dot(along, along);
+    let middle = dot(position, along);
+    let inside = middle * middle + square * (1.0 - dot(position, position));
+    return max(sqrt(max(inside, 0.0)) - middle, 0.0) / square;
+}
+
 // Threshold of the alpha test of this level at a distance: the CPU twin is src/lod.
 fn level_threshold(distance: f32) -> f32 {
     let coming = 0.5 * (view.fade_in.x + view.fade_in.y);

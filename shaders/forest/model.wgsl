@@ -1,7 +1,7 @@
 // The full model of a tree, near the camera.
 #import canopy::constants::{NORMAL_STEPS, NORMAL_LEAST_LENGTH, WHOLE, AMBIENT_FITTED}
 #import canopy::frame::{frame, light}
-#import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, leaf_visibility}
+#import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, leaf_visibility, crown_of, depth_in_crown}
 #import canopy::lighting::{Surface, shade, shade_matt, exitant, exitant_matt, even_sky, leaf_transmission}
 #import canopy::output::finish
 #import canopy::stand::stand_light
@@ -86,6 +86,8 @@ struct Varying {
     // The same of the sun.
     @location(7) @interpolate(perspective, centroid) front_sun: vec3<f32>,
     @location(8) @interpolate(perspective, centroid) back_sun: vec3<f32>,
+    // Distance to where the key light enters the crown, metres.
+    @location(9) @interpolate(perspective, centroid) entry_distance: f32,
 #endif
 }
 
@@ -122,6 +124,7 @@ fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index
     let sun = light_sides(vertex, YAWS + tree.yaw_code);
     out.front_sun = sun.front;
     out.back_sun = sun.back;
+    out.entry_distance = depth_in_crown(position.relative, crown_of(tree), light.key_direction);
 #endif
     return out;
 }
@@ -223,7 +226,14 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
 #endif
     var visibility = terrain_visibility(ground, look.height);
     if visibility > 0.0 {
+#ifdef SUN_HARMONICS
+        // The plant's own shade is in the harmonics. What the maps add is that of other plants, which the light meets before it
+        // enters the crown.
+        let entry = in.relative + light.key_direction * in.entry_distance;
+        let cascades = cascaded_visibility(entry, light.key_direction, 0.25, in.clip.xy);
+#else
         let cascades = cascaded_visibility(in.relative, normal, SHADOW_BIAS, in.clip.xy);
+#endif
         visibility *= mix(1.0, cascades.visibility, cascades.weight);
     }
 #ifdef FOLIAGE

@@ -1,9 +1,10 @@
-// The ground: tiles that morph into each other (src/terrain/tiles), coloured by slope, height, canopy cover and noise.
+// The ground: tiles that morph into each other (src/terrain/tiles), coloured by slope, canopy cover and noise.
 #import canopy::constants::TILE_SIDE
 #import canopy::frame::{frame, light, shadow}
+#import canopy::ground_color::ground_color
 #import canopy::lighting::{Surface, shade_matt, even_sky}
 #import canopy::output::finish
-#import canopy::stand::ground_light
+#import canopy::stand::{ground_light, stand_light}
 #import canopy::sun_visibility::{sample_ground, terrain_visibility, cascaded_visibility}
 
 struct TileVertex {
@@ -31,8 +32,6 @@ struct Tile {
 
 @group(1) @binding(0) var<storage, read> vertices: array<TileVertex>;
 @group(1) @binding(1) var<storage, read> tiles: array<Tile>;
-@group(1) @binding(2) var noise_texture: texture_2d<f32>;
-@group(1) @binding(3) var noise_sampler: sampler;
 
 struct Varying {
     @builtin(position) clip: vec4<f32>,
@@ -65,80 +64,44 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     return out;
 }
 
-// Noise of a period that divides the 1024 metres of `frame.camera`: r smooth, g fine, b patchy, a ridged; each 0..1
-// around 0.5.
-fn noise(xz: vec2<f32>, period: f32) -> vec4<f32> {
-    return textureSample(noise_texture, noise_sampler, xz / period);
-}
-
-// The same, rotated by the angle of a 3-4-5 triangle: periods of 1024 * 3 / (5 k) and 1024 * 4 / (5 k) metres keep it
-// seamless. Mixed with the other, it hides the repetition of both.
-fn rotated_noise(xz: vec2<f32>, period: f32) -> vec4<f32> {
-    return noise(vec2(0.6 * xz.x - 0.8 * xz.y, 0.8 * xz.x + 0.6 * xz.y), period);
-}
+// Mean depth in the canopy of what is seen of it from above, 0..1.
+const CROWN_DEPTH: f32 = 0.1;
 
 @fragment
 fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let smooth_normal = normalize(in.normal);
     let xz = frame.camera.xz + in.relative.xz;
-    let distance = length(in.relative);
-    let wide = noise(xz, 512.0);
-    let middle = 0.5 + 0.72 * (noise(xz, 64.0) + rotated_noise(xz, 51.2) - 1.0);
-    let fine = 0.5 + 0.72 * (noise(xz, 8.0) + rotated_noise(xz, 12.8) - 1.0);
-    let grain = 0.5 + 0.72 * (noise(xz, 2.0) + rotated_noise(xz, 3.2) - 1.0);
+    let distance = max(length(in.relative), 1e-3);
+    // Width of a pixel on the slope, where it is widest.
+    let facing = abs(dot(smooth_normal, in.relative)) / distance;
+    let footprint = distance / (frame.focal_length_pixels * max(facing, 0.05));
 
     let ground = sample_ground(in.relative);
     let uv = (in.relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;
     let outside = max(max(-uv.x, uv.x - 1.0), max(-uv.y, uv.y - 1.0)) > 0.0;
-    var cover = ground.cover;
-    if outside {
-        cover = frame.mean_cover;
-    }
-
-    // Detail in the normal, faded out where it is too small to see.
-    let detail = 1.0 - smoothstep(20.0, 120.0, distance);
-    let tilt = vec2(fine.r - fine.a, fine.g - fine.b) * 0.25 + vec2(grain.r - grain.g, grain.b - grain.a) * 0.35;
-    let normal = normalize(smooth_normal + vec3(tilt.x, 0.0, tilt.y) * detail);
-
-    let steepness = 1.0 - smooth_normal.y;
-    let litter = mix(vec3(0.050, 0.040, 0.022), vec3(0.100, 0.078, 0.042), clamp(fine.g * 1.4 - 0.2 + grain.g - 0.5, 0.0, 1.0));
-    let moss = mix(vec3(0.030, 0.048, 0.014), vec3(0.055, 0.080, 0.022), grain.b);
-    let floor_mix = smoothstep(0.45, 0.62, middle.b * 0.6 + fine.b * 0.4);
-    let forest_floor = mix(litter, moss, floor_mix * 0.75);
-    let lush = mix(vec3(0.050, 0.085, 0.020), vec3(0.095, 0.135, 0.035), fine.g);
-    let dry = mix(vec3(0.120, 0.115, 0.045), vec3(0.175, 0.155, 0.070), grain.g);
-    let meadow = mix(lush, dry, smoothstep(0.42, 0.68, wide.r * 0.5 + middle.r * 0.5)) * (0.8 + 0.4 * grain.r);
-    let rock = mix(vec3(0.13, 0.12, 0.105), vec3(0.26, 0.245, 0.22), fine.a * 0.6 + grain.a * 0.4);
-
-    let wooded = smoothstep(0.10, 0.45, cover + (middle.g - 0.5) * 0.25);
-    var albedo = mix(meadow, forest_floor, wooded);
     // Forest too far away for its trees to be drawn is coloured as crowns.
-    if outside {
-        let crowns = mix(vec3(0.028, 0.045, 0.013), vec3(0.050, 0.072, 0.022), middle.g);
-        albedo = mix(albedo, crowns, wooded);
-    }
-    let stony = smoothstep(0.30, 0.42, steepness + (middle.a - 0.5) * 0.15 + (fine.a - 0.5) * 0.08);
-    albedo = mix(albedo, rock, stony);
-    albedo *= 0.85 + 0.3 * middle.r;
+    let undrawn = select(ground.undrawn_cover, frame.mean_cover, outside);
+    let cover = undrawn + select(ground.cover, 0.0, outside);
+    let far = undrawn / max(cover, 1e-3);
+    let color = ground_color(xz, 1.0 - smooth_normal.y, cover, far, footprint);
 
     var surface: Surface;
-    surface.albedo = albedo;
-    surface.normal = normal;
+    surface.albedo = color.albedo;
+    surface.normal = normalize(smooth_normal + vec3(color.tilt.x, 0.0, color.tilt.y));
     surface.transmission = vec3(0.0);
-    surface.ambient_visibility = 0.8 + 0.2 * grain.r;
-    var shade_cover = ground.surrounding_cover;
-    if outside {
-        surface.ambient_visibility = 0.85;
-        shade_cover = 0.0;
-    }
+    surface.ambient_visibility = color.ambient_visibility;
+    // What is seen as crowns is lit as their tops are.
+    surface.ambient_visibility = mix(surface.ambient_visibility, 0.85, far);
+    let shade_cover = select(ground.surrounding_cover, 0.0, outside);
 
     let stand = ground_light(shade_cover);
     var visibility = select(terrain_visibility(ground, 0.0), 1.0, outside);
     if visibility > 0.0 {
         let cascades = cascaded_visibility(in.relative, smooth_normal, 1.0, in.clip.xy);
         // Beyond the maps: the fraction of light that passes between the crowns.
-        visibility *= mix(stand.key_transmittance, cascades.visibility, cascades.weight);
+        let passed = mix(stand.key_transmittance, cascades.visibility, cascades.weight);
+        // A canopy is rough: in low light its crowns shade each other near their tops, as those of drawn trees do.
+        visibility *= mix(passed, stand_light(cover, CROWN_DEPTH).key_transmittance, far);
     }
-    let color = shade_matt(surface, visibility, even_sky(surface, stand));
-    return finish(in.relative, color, 1.0);
+    return finish(in.relative, shade_matt(surface, visibility, even_sky(surface, stand)), 1.0);
 }

@@ -96,6 +96,12 @@ pub enum AppError {
     /// Rendering failed.
     #[error("rendering failed: {0}")]
     Render(String),
+    /// A file that is no plant.
+    #[error("{}: this is not a plant; levels of detail are made of glTF files (.glb, .gltf)", path.display())]
+    NoPlant {
+        /// The file.
+        path: PathBuf,
+    },
     /// A file of unknown kind.
     #[error(
         "{}: this is not a plant (.glb, .gltf), terrain (.tif, .asc, .hgt, .png), inventory (.csv) or scene (.ron) file",

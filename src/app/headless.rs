@@ -42,7 +42,7 @@ use crate::{
     plugin::CanopyPlugins,
     progress::Progress,
     render::{
-        components::{CanopyCamera, LightUpdates, SunShadowSettings},
+        components::{CanopyCamera, ForestUpdates, LightUpdates, SunShadowSettings},
         forest::collect_view_counts,
         readback::read_rgb,
         report::{FrameReport, PassOutcome},
@@ -154,6 +154,8 @@ pub struct Renderer {
     target: Handle<Image>,
     size: (u32, u32),
     warm: bool,
+    /// The device whose errors are heard.
+    device: RenderDevice,
     /// First error that the device reported and that was not returned yet.
     fault: Arc<Mutex<Option<String>>>,
 }
@@ -169,32 +171,36 @@ impl Renderer {
 
     fn with_settings(settings: WgpuSettings, size: (u32, u32), msaa: u32) -> Result<Self, AppError> {
         let mut app = App::new();
-        app.add_plugins(
-            DefaultPlugins
-                .set(WindowPlugin {
-                    primary_window: None,
-                    exit_condition: ExitCondition::DontExit,
-                    ..WindowPlugin::default()
-                })
-                .set(RenderPlugin {
-                    render_creation: RenderCreation::Automatic(Box::new(settings)),
-                    synchronous_pipeline_compilation: true,
-                    ..RenderPlugin::default()
-                })
-                .set(LogPlugin { level: Level::WARN, filter: adapter::LOG_FILTER.to_owned(), ..LogPlugin::default() })
-                .disable::<WinitPlugin>()
-                // The program has its own handler; others keep theirs.
-                .disable::<TerminalCtrlCHandlerPlugin>()
-                .disable::<PipelinedRenderingPlugin>(),
-        );
-        app.add_plugins(CanopyPlugins).insert_resource(LightUpdates::Blocking);
+        let mut plugins = DefaultPlugins
+            .set(WindowPlugin {
+                primary_window: None,
+                exit_condition: ExitCondition::DontExit,
+                ..WindowPlugin::default()
+            })
+            .set(RenderPlugin {
+                render_creation: RenderCreation::Automatic(Box::new(settings)),
+                synchronous_pipeline_compilation: true,
+                ..RenderPlugin::default()
+            })
+            .set(LogPlugin { level: Level::WARN, filter: adapter::LOG_FILTER.to_owned(), ..LogPlugin::default() })
+            .disable::<WinitPlugin>()
+            // The program has its own handler; others keep theirs.
+            .disable::<TerminalCtrlCHandlerPlugin>()
+            .disable::<PipelinedRenderingPlugin>();
+        // A second renderer of the process writes into the first one's log.
+        if tracing::dispatcher::has_been_set() {
+            plugins = plugins.disable::<LogPlugin>();
+        }
+        app.add_plugins(plugins);
+        app.add_plugins(CanopyPlugins).insert_resource(LightUpdates::Blocking).insert_resource(ForestUpdates::Blocking);
         while app.plugins_state() == PluginsState::Adding {
             bevy::tasks::tick_global_task_pools_on_main_thread();
         }
         app.finish();
         app.cleanup();
-        let fault = report_faults(app.world().resource::<RenderDevice>());
-        let limit = app.world().resource::<RenderDevice>().limits().max_texture_dimension_2d;
+        let device = app.world().resource::<RenderDevice>().clone();
+        let fault = report_faults(&device);
+        let limit = device.limits().max_texture_dimension_2d;
         if size.0 > limit || size.1 > limit || size.0 == 0 || size.1 == 0 {
             return Err(AppError::TooLarge { width: size.0, height: size.1, limit });
         }
@@ -209,7 +215,17 @@ impl Renderer {
             ))
             .id();
         let sun = app.world_mut().spawn(SunShadowSettings::default()).id();
-        Ok(Self { app, camera, sun, target, size, warm: false, fault })
+        Ok(Self { app, camera, sun, target, size, warm: false, device, fault })
+    }
+
+    /// Listens to another device, if the app has made one for a lost one
+    /// ([`RenderErrorHandler`](bevy::render::error_handler::RenderErrorHandler)). The errors of the lost one are over.
+    fn follow_device(&mut self) {
+        let device = self.app.world().resource::<RenderDevice>();
+        if device.wgpu_device() != self.device.wgpu_device() {
+            self.device = device.clone();
+            self.fault = report_faults(&self.device);
+        }
     }
 
     /// Fails with the first error that the device reported since the last time.
@@ -288,6 +304,7 @@ impl Renderer {
     /// Draws one frame with the lists of trees as long as they are.
     fn draw_once(&mut self) -> Result<(), AppError> {
         self.app.update();
+        self.follow_device();
         // A frame in which a pass waited for its pipeline is drawn again.
         let started = Instant::now();
         while !self.pipelines_are_ready()? {
@@ -420,7 +437,8 @@ fn render_target(app: &mut App, (width, height): (u32, u32)) -> Handle<Image> {
         Extent3d { width, height, depth_or_array_layers: 1 },
         TextureDimension::D2,
         TextureFormat::Rgba8UnormSrgb,
-        RenderAssetUsages::RENDER_WORLD,
+        // Without texels it costs nothing to keep it in the main world, from where a device that is made anew gets it.
+        RenderAssetUsages::default(),
     );
     image.texture_descriptor.usage |= TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC;
     app.world_mut().resource_mut::<Assets<Image>>().add(image)

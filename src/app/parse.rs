@@ -14,6 +14,9 @@ pub enum ArgumentError {
     /// Not a kind of light.
     #[error("`{0}` is not a light (expected local, expressive, transfer or harmonics)")]
     Lighting(String),
+    /// Not an exposure value.
+    #[error("`{0}` is not an exposure value (expected EV at ISO 100 from -10 to 25, as in 12.5)")]
+    Exposure(String),
     /// Not a number of samples.
     #[error("`{0}` is not a number of samples per pixel (expected 1, which is off, or 4)")]
     Samples(String),
@@ -107,6 +110,15 @@ pub fn parse_seconds(text: &str) -> Result<f64, ArgumentError> {
     number.filter(|seconds: &f64| seconds.is_finite() && *seconds >= 0.0).ok_or(ArgumentError::Seconds(text.to_owned()))
 }
 
+/// Reads an exposure value at ISO 100, -10 to 25.
+///
+/// # Errors
+/// [`ArgumentError::Exposure`].
+pub fn parse_exposure(text: &str) -> Result<f64, ArgumentError> {
+    let number = text.trim().parse().ok();
+    number.filter(|ev: &f64| (-10.0..=25.0).contains(ev)).ok_or(ArgumentError::Exposure(text.to_owned()))
+}
+
 /// Reads a finite number above 0.
 ///
 /// # Errors
@@ -146,5 +158,7 @@ mod tests {
         assert!(parse_seconds("-1s").is_err() && parse_seconds("inf").is_err() && parse_seconds("s").is_err());
         assert_eq!(parse_positive("25"), Ok(25.0));
         assert!(parse_positive("0").is_err() && parse_positive("NaN").is_err());
+        assert_eq!(parse_exposure("-3.5"), Ok(-3.5));
+        assert!(parse_exposure("26").is_err() && parse_exposure("NaN").is_err() && parse_exposure("").is_err());
     }
 }

@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use glam::DVec3;
@@ -13,12 +14,13 @@ use super::{
 use crate::{
     assets::Stage,
     files,
-    light::{Atmosphere, AtmosphereParams, LightState},
+    light::{Atmosphere, AtmosphereParams, LightState, exposure_from_ev100},
     progress::Progress,
     reference::{
         Camera, DisplayTransform, Film, Fog, Ground, GroundColor, GroundShape, Instance, Light, PathTracer,
         ReferenceScene, Shot, Soil, TraceSettings,
     },
+    render::exposure::{CameraExposure, StandTotals},
 };
 
 /// Interval at which the film is saved during the trace.
@@ -42,7 +44,7 @@ pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Res
     let frame = frame(options, &stage)?;
     let sun = stage.sun(frame.instant);
     let atmosphere = Atmosphere::new(AtmosphereParams::with_visibility_km(sun.visibility_km))?;
-    let light = sun.light(&atmosphere)?;
+    let light = Arc::new(sun.light(&atmosphere)?);
 
     progress.begin("Building ray tracing structures", 0);
     let scene = scene(&stage)?;
@@ -144,7 +146,7 @@ fn scene(stage: &Stage) -> Result<ReferenceScene, AppError> {
     let plants: Vec<_> = stage.plants.iter().map(|baked| baked.plant.clone()).collect();
     let ground = Ground {
         shape: GroundShape::Terrain(stage.terrain.clone()),
-        color: GroundColor::Soil(Soil::new(&stage.terrain, stage.cover.clone()).into()),
+        color: GroundColor::Soil(Soil::new(&stage.terrain, stage.cover.clone(), stage.surroundings).into()),
         max_distance: stage.scene.quality.view_distance,
     };
     Ok(ReferenceScene::new(&plants, &Instance::of_stand(&stage.stand, DVec3::ZERO), Some(ground))?)
@@ -155,14 +157,19 @@ fn save(
     options: &ReferenceOptions,
     stage: &Stage,
     frame: &Frame,
-    light: &LightState,
+    light: &Arc<LightState>,
 ) -> Result<(), AppError> {
     if is_exr(&options.out) {
         return Ok(film.save_exr(&options.out)?);
     }
     let table = tone_table()?;
     let (width, height) = film.size();
-    let pixels = film.display(&DisplayTransform::of(light, Some(&table)));
+    // The renderer's exposure at the camera.
+    let totals = StandTotals::of(&stage.stand, &stage.plants);
+    let exposure = CameraExposure::new(light.clone(), totals).at(&stage.ground(), frame.view.position);
+    let transform =
+        DisplayTransform { exposure: exposure_from_ev100(exposure.ev100), ..DisplayTransform::of(light, Some(&table)) };
+    let pixels = film.display(&transform);
     let mut notes = notes(stage, &frame.view, frame.instant);
     notes.push(("Samples", film.samples().to_string()));
     RenderedImage { width, height, pixels }.save(&options.out, &notes)

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::scene::{LocalTime, Overrides, Pose, SceneSource};
+use crate::scene::{Lighting, LocalTime, Overrides, Pose, SceneSource};
 
 /// Everything about an interactive flight.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,6 +91,25 @@ pub struct ReferenceOptions {
     pub resume: bool,
     /// Values that replace those of the scene.
     pub overrides: Overrides,
+    /// No progress and no notes, only warnings and errors.
+    pub quiet: bool,
+}
+
+/// Everything about the levels of detail of a plant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BakeOptions {
+    /// The plant: a glTF file.
+    pub plant: PathBuf,
+    /// The PNG to write.
+    pub out: PathBuf,
+    /// Planes of the billboard cloud.
+    pub planes: u32,
+    /// Samples per pixel of the levels, 1 or 4; `None` is 4.
+    pub msaa: Option<u32>,
+    /// How its foliage is lit; `None` is the default.
+    pub lighting: Option<Lighting>,
+    /// Part of the name of the graphics adapter to use; `None` lets the driver choose.
+    pub adapter: Option<String>,
     /// No progress and no notes, only warnings and errors.
     pub quiet: bool,
 }

@@ -4,7 +4,12 @@ use std::{ops::Range, path::PathBuf};
 
 use super::StageError;
 use crate::{
-    bake::{BakeSettings, levels::cross::CrossSettings, lighting::LightingSettings},
+    bake::{
+        BakeSettings,
+        levels::{self, cross::CrossSettings},
+        lighting::LightingSettings,
+    },
+    lod::Representation,
     plant::{
         Gloss, Plant,
         gltf::{GltfOptions, load_plant},
@@ -154,9 +159,23 @@ fn sources(species: &Species, gloss: Gloss) -> Result<Vec<IndividualSource>, Sta
     })
 }
 
-/// Bake settings for a scene's quality and a species' lighting.
+/// Bake settings for a scene's quality and a species' lighting. What is drawn by default is always baked; other
+/// representations only for a scene that draws them.
 pub fn bake_settings(quality: &Quality, lighting: LightingSettings) -> BakeSettings {
+    const MODEL: Representation = Representation::MODEL;
+    const THINNED: Representation = Representation::THINNED;
+    const CLOUD: Representation = Representation::CLOUD;
+    const CROSS: Representation = Representation::CROSS;
+    let drawn = quality.lod_levels();
+    let draws = |representation| drawn.representations().contains(&representation);
+    let representations: &'static [Representation] = match (draws(THINNED), draws(CLOUD)) {
+        (false, false) => levels::DEFAULT,
+        (true, false) => &[MODEL, CROSS, THINNED],
+        (false, true) => &[MODEL, CROSS, CLOUD],
+        (true, true) => &[MODEL, CROSS, THINNED, CLOUD],
+    };
     BakeSettings {
+        representations,
         lighting,
         cross: CrossSettings { resolution: quality.cross_resolution, ..CrossSettings::default() },
         ..BakeSettings::default()

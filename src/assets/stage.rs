@@ -6,7 +6,10 @@ use bevy::render::renderer::RenderDevice;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{StageError, ground, plants, together, trees::StandPlan};
+use super::{
+    StageError, ground, plants, together,
+    trees::{StandPlan, WoodBeyond},
+};
 use crate::{
     bake::{BakeSource, BakedPlant, bake_plant, cache::Cache, lighting::SunLight, textures::filter_together},
     light::sun::Observer,
@@ -43,6 +46,8 @@ pub struct Stage {
     pub suns: Arc<[SunLight]>,
     /// Canopy cover; `None` without trees.
     pub cover: Option<Arc<CoverMap>>,
+    /// Metres beyond the terrain's data that are wooded too.
+    pub surroundings: f64,
     /// Location on earth.
     pub observer: Observer,
     /// The scene as written.
@@ -78,8 +83,15 @@ impl Stage {
         let observer = observer(scene, &terrain)?;
         check_wanted(progress)?;
 
-        let planned = StandPlan::new(scene, &terrain)?;
+        let mut planned = StandPlan::new(scene, &terrain, WoodBeyond::Grows)?;
         planned.check(most_trees)?;
+        if let Some(asked) = planned.fit_surroundings(most_trees) {
+            progress.warn(&format!(
+                "the wood goes on for {:.0} m beyond the terrain's data instead of {asked:.0} m: there is no room for more trees",
+                planned.surroundings()
+            ));
+        }
+        let surroundings = planned.surroundings();
         check_wanted(progress)?;
 
         let has_trees = !matches!(scene.trees, scene::Trees::None);
@@ -116,7 +128,7 @@ impl Stage {
         };
         let suns = scene.species.iter().zip(&species.variants).flat_map(sun).collect();
         let (stand, plants, variants) = (Arc::new(packed), Arc::new(plants), species.variants);
-        Ok(Self { terrain, stand, plants, variants, suns, cover, observer, scene: scene.clone() })
+        Ok(Self { terrain, stand, plants, variants, suns, cover, surroundings, observer, scene: scene.clone() })
     }
 
     /// Whether `device` can hold the trees, all of which lie in one storage buffer.
@@ -125,8 +137,8 @@ impl Stage {
     /// [`StageError::TooManyTrees`].
     pub fn check_device(&self, device: &RenderDevice) -> Result<(), StageError> {
         check_trees(self.stand.trees.len(), device)?;
-        // The crosses of all plants share a texture array.
-        let planes = self.plants.iter().filter_map(BakedPlant::cross).map(|cross| cross.planes.len());
+        // The crosses of all plants share texture arrays; that of the sun's light has the most layers.
+        let planes = self.plants.iter().filter_map(BakedPlant::cross).map(|cross| cross.textures.sun.len());
         let layers = device.limits().max_texture_array_layers as usize;
         let (most, count) = (planes.clone().max().unwrap_or(1).max(1), planes.count());
         let limit = layers / most;
@@ -151,6 +163,7 @@ impl Stage {
         Ground {
             terrain: self.terrain.clone(),
             cover: self.cover.clone(),
+            surroundings: self.surroundings,
             error_pixels: self.scene.quality.terrain_error,
             view_distance: self.scene.quality.view_distance,
         }

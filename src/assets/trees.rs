@@ -12,7 +12,8 @@ use crate::{
     progress::Progress,
     scatter::{
         Allometry, Area, Coordinates, Ground, Inventory, InventoryOptions, InventorySpecies, PlacementRules, PlantSize,
-        SizeRule, SpeciesRule, Stand, place_trees, read_inventory, stand_from_inventory,
+        SizeRule, SpeciesRule, Stand, place_surroundings, place_trees, read_inventory, rules::MAX_TREES,
+        stand_from_inventory,
     },
     scene::{Anchor, InventoryTrees, ScatteredTrees, Scene, Species, Trees},
     terrain::{CoordinateSystem, GeoReference, Terrain},
@@ -43,6 +44,22 @@ pub struct StandPlan<'a> {
     source: Source<'a>,
     /// Trees that the scene asks for: of an inventory those on the terrain, of rules an estimate.
     count: f64,
+    /// Metres around the terrain's data that are wooded too.
+    surroundings: f64,
+}
+
+/// Width in metres of the wooded surroundings of a scene that states none.
+const SURROUNDINGS: f64 = 1000.0;
+/// The most trees that such surroundings have for each tree of the data.
+const MOST_SURROUNDING: f64 = 2.0;
+
+/// Whether the wood goes on beyond the terrain's data where its rules do not say so.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WoodBeyond {
+    /// It does, over a width that follows from the number of trees and the view distance: a scene.
+    Grows,
+    /// It ends with the data: a forest of a program.
+    Ends,
 }
 
 enum Source<'a> {
@@ -57,7 +74,7 @@ impl<'a> StandPlan<'a> {
     /// # Errors
     /// [`StageError`] for rules that cannot be fulfilled, inventories that cannot be read, and
     /// [`StageError::InventoryOutside`].
-    pub fn new(scene: &'a Scene, terrain: &'a Terrain) -> Result<Self, StageError> {
+    pub fn new(scene: &'a Scene, terrain: &'a Terrain, beyond: WoodBeyond) -> Result<Self, StageError> {
         let (source, count) = match &scene.trees {
             Trees::None => (Source::None, 0.0),
             Trees::Scattered(rules) => (Source::Rules(rules), estimate(scene, rules, terrain)?),
@@ -68,7 +85,11 @@ impl<'a> StandPlan<'a> {
                 (Source::Inventory(trees, inventory), count)
             }
         };
-        Ok(Self { scene, terrain, source, count })
+        let surroundings = match &source {
+            Source::Rules(rules) => surroundings(scene, rules, terrain, count, beyond),
+            Source::None | Source::Inventory(..) => 0.0,
+        };
+        Ok(Self { scene, terrain, source, count, surroundings })
     }
 
     /// Refuses a scene that asks for more than `most` trees; `None` is no limit.
@@ -84,6 +105,26 @@ impl<'a> StandPlan<'a> {
         }
     }
 
+    /// Metres around the terrain's data that are wooded too; 0: none.
+    pub fn surroundings(&self) -> f64 {
+        self.surroundings
+    }
+
+    /// Makes the surroundings narrower until they fit beside the trees of the data into `most` trees; `None` is no limit.
+    /// Returns what was asked for if it was too much, in metres.
+    pub fn fit_surroundings(&mut self, most: Option<usize>) -> Option<f64> {
+        let Source::Rules(rules) = &self.source else { return None };
+        let extent = self.terrain.extent();
+        let room = (most.unwrap_or(usize::MAX) as f64).min(f64::from(MAX_TREES)) * 0.98 - self.count;
+        let fits = widest(extent, self.count, room);
+        // Placing tries the whole rectangle.
+        let hectares = f64::from(MAX_TREES) / rules.stems_per_hectare;
+        let tries = 0.75 * widest(extent, 1.0, hectares * 1e4 / (extent.x * extent.y) - 1.0);
+        let asked = self.surroundings;
+        self.surroundings = asked.min(fits).min(tries * 0.999);
+        (self.surroundings < 0.999 * asked).then_some(asked)
+    }
+
     /// Builds the stand from plants of these sizes, by variant.
     ///
     /// # Errors
@@ -96,7 +137,7 @@ impl<'a> StandPlan<'a> {
     ) -> Result<Stand, StageError> {
         match &self.source {
             Source::None => Ok(Stand::default()),
-            Source::Rules(rules) => scatter(self.scene, rules, plan, sizes, self.terrain, progress),
+            Source::Rules(rules) => scatter(self.scene, rules, plan, sizes, self.terrain, self.surroundings, progress),
             Source::Inventory(trees, inventory) => {
                 from_inventory(self.scene, (trees, inventory), plan, sizes, self.terrain, progress)
             }
@@ -160,6 +201,7 @@ fn scatter(
     plan: &PlantPlan,
     sizes: &[PlantSize],
     terrain: &Terrain,
+    surroundings: f64,
     progress: &mut dyn Progress,
 ) -> Result<Stand, StageError> {
     let plants = plan.variants.iter().map(|variants| (variants.clone(), plant_heights(variants, sizes)));
@@ -178,7 +220,35 @@ fn scatter(
         "{:.0} stems per hectare on {:.0} wooded hectares",
         report.stems_per_hectare, report.allowed_hectares
     ));
-    Ok(placement.stand)
+    let mut stand = placement.stand;
+    let around = place_surroundings(&rules, &stand, surroundings, terrain)?;
+    stand.trees.extend(around.trees);
+    Ok(stand)
+}
+
+/// Metres around the data of `terrain` on which `trees` shall stand too; the data has `count` of them.
+fn surroundings(scene: &Scene, trees: &ScatteredTrees, terrain: &Terrain, count: f64, beyond: WoodBeyond) -> f64 {
+    if trees.area.is_some() || count < 1.0 {
+        return 0.0;
+    }
+    match (trees.surroundings, beyond) {
+        (Some(stated), _) => stated.min(scene.quality.view_distance),
+        (None, WoodBeyond::Ends) => 0.0,
+        (None, WoodBeyond::Grows) => {
+            SURROUNDINGS.min(scene.quality.view_distance).min(widest(terrain.extent(), count, MOST_SURROUNDING * count))
+        }
+    }
+}
+
+/// The widest surroundings in metres of an area of `extent` metres with `count` trees (1 or more) that have at most `most`:
+/// those of half the width are full.
+fn widest(extent: DVec2, count: f64, most: f64) -> f64 {
+    // The outer half, which thins out, counts about half: together as much as three quarters of the width, full.
+    let wanted = (most / count.max(1.0)).max(0.0) * extent.x * extent.y;
+    let sum = extent.x + extent.y;
+    // (extent.x + 2 w) (extent.y + 2 w) = extent.x extent.y + wanted
+    let full = ((sum * sum + 4.0 * wanted).sqrt() - sum) / 4.0;
+    full / 0.75
 }
 
 /// The rules of `trees` for plants with these variants and heights in metres, by species.

@@ -6,7 +6,10 @@ use serde::{Deserialize, Serialize};
 
 use super::levels::{
     self, BakedLevel,
+    cloud::{Cloud, CloudSettings},
     cross::{Cross, CrossSettings},
+    reduced::ReducedPlant,
+    thinned::ThinnedSettings,
 };
 use super::lighting::{BakedLighting, LightingSettings};
 use super::textures::PlantTextures;
@@ -24,7 +27,8 @@ pub struct BakedPlant {
     pub lighting: Arc<BakedLighting>,
     /// The baked representations, at most one of each kind.
     pub levels: Vec<BakedLevel>,
-    /// The textures of the full model, filtered; empty if [`Representation::MODEL`] was not listed.
+    /// The textures of the full model, filtered; empty if no representation was listed that needs
+    /// them ([`levels::needs_textures`]).
     pub textures: Arc<PlantTextures>,
 }
 
@@ -41,6 +45,22 @@ impl BakedPlant {
     pub fn cross(&self) -> Option<&Arc<Cross>> {
         self.levels.iter().find_map(|level| match level {
             BakedLevel::Cross(cross) => Some(cross),
+            _ => None,
+        })
+    }
+
+    /// The billboard cloud, if it was baked.
+    pub fn cloud(&self) -> Option<&Arc<Cloud>> {
+        self.levels.iter().find_map(|level| match level {
+            BakedLevel::Cloud(cloud) => Some(cloud),
+            _ => None,
+        })
+    }
+
+    /// The simplified model, if it was baked.
+    pub fn thinned(&self) -> Option<&Arc<ReducedPlant>> {
+        self.levels.iter().find_map(|level| match level {
+            BakedLevel::Thinned(reduced) => Some(reduced),
             _ => None,
         })
     }
@@ -74,28 +94,33 @@ pub fn plant_size(plant: &Plant) -> PlantSize {
 /// Settings of a plant's bake. Values out of range are clamped.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BakeSettings {
-    /// The representations to bake. Default: all that need a bake; a program that draws fewer can leave some out. Set
-    /// in code.
-    #[serde(skip_deserializing, default = "all_baked")]
+    /// The representations to bake. Default: [`levels::DEFAULT`]; a program that draws others lists them. Set in code.
+    #[serde(skip_deserializing, default = "baked_by_default")]
     pub representations: &'static [Representation],
     /// Lighting model of the foliage.
     pub lighting: LightingSettings,
     /// Settings of the crossed billboards.
     pub cross: CrossSettings,
+    /// Settings of the billboard cloud.
+    pub cloud: CloudSettings,
+    /// Settings of the simplified model.
+    pub thinned: ThinnedSettings,
     /// Triangles of the shadow proxy as a fraction of the plant's, 0..=1. Smaller: faster and coarser shadows.
     pub shadow_share: f32,
 }
 
-fn all_baked() -> &'static [Representation] {
-    levels::BAKED
+fn baked_by_default() -> &'static [Representation] {
+    levels::DEFAULT
 }
 
 impl Default for BakeSettings {
     fn default() -> Self {
         Self {
-            representations: levels::BAKED,
+            representations: levels::DEFAULT,
             lighting: LightingSettings::default(),
             cross: CrossSettings::default(),
+            cloud: CloudSettings::default(),
+            thinned: ThinnedSettings::default(),
             shadow_share: 0.2,
         }
     }
@@ -109,6 +134,8 @@ impl BakeSettings {
             representations: self.representations,
             lighting: self.lighting.sanitized(),
             cross: self.cross.sanitized(),
+            cloud: self.cloud.sanitized(),
+            thinned: self.thinned.sanitized(),
             shadow_share: share.clamp(0.0, 1.0),
         }
     }

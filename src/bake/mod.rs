@@ -8,6 +8,8 @@
 //! | [`lighting::transfer`] | radiance transfer of the sky, per vertex and side | [Franzke 2005, 4.2.3] |
 //! | [`levels`] | the representations that are baked: | |
 //! | [`levels::cross`] | crossed billboards with colour, normal, ambient term | [Franzke 2005, 4.3] |
+//! | [`levels::cloud`] | billboard cloud: a hundred planes, and a trunk of few sides | [Franzke 2005, 4.3.1] |
+//! | [`levels::thinned`] | a model with fewer and larger leaves | [Cook et al. 2007] |
 //! | [`levels::shadow_proxy`] | a lighter model with the same projected area | [Cook et al. 2007] |
 //! | [`textures`] | mip levels of the full model's textures | [Castaño 2010] |
 //! | [`cache`] | files on disk, keyed by the content that they were made from | |
@@ -24,10 +26,9 @@ pub mod textures;
 
 use std::sync::Arc;
 
-use crate::lod::Representation;
 use crate::plant::Plant;
 use cache::{Cache, CacheKey};
-use levels::bake_levels;
+use levels::{bake_levels, needs_textures};
 use lighting::BakedLighting;
 use textures::PlantTextures;
 
@@ -65,7 +66,7 @@ pub fn bake_plant(plant: Arc<Plant>, settings: &BakeSettings, cache: Option<&Cac
 fn bake_fresh(plant: Arc<Plant>, settings: &BakeSettings, cache: Option<&Cache>) -> (BakedPlant, Option<BakeError>) {
     let lighting = Arc::new(BakedLighting::bake(&plant, &settings.lighting));
     let levels = bake_levels(&plant, &lighting, settings);
-    let (textures, not_stored) = if settings.representations.contains(&Representation::MODEL) {
+    let (textures, not_stored) = if settings.representations.iter().any(|listed| needs_textures(*listed)) {
         PlantTextures::new(&plant, cache)
     } else {
         Default::default()

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use canopy::{
-    app::{parse_lighting, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size},
+    app::{parse_exposure, parse_lighting, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size},
     scene::{Lighting, LocalTime, Pose},
 };
 use clap::{Args, Parser, Subcommand};
@@ -22,6 +22,7 @@ const DEFAULT_SIZE: &str = "1280x720";
   canopy fly my-valley.ron --at 2026-10-03T18:05+02:00
   canopy render my-valley.ron --out noon.png
   canopy reference my-valley.ron --out truth.exr --spp 256
+  canopy bake oak.glb --out oak-levels.png
   canopy info stand.csv
 
 `canopy help render` shows how to render images, sequences and time-lapses."
@@ -57,6 +58,10 @@ pub struct Common {
     /// species' own].
     #[arg(long, global = true, value_name = "LIGHT", value_parser = parse_lighting)]
     pub lighting: Option<Lighting>,
+    /// Keep this exposure value at ISO 100, -10 to 25 (14: a sunny day, 10: the inside of a wood) [default: the scene's, or
+    /// else it follows the light at the camera].
+    #[arg(long, global = true, value_name = "EV", value_parser = parse_exposure, allow_hyphen_values = true)]
+    pub exposure: Option<f64>,
     /// Print which passes ran, which were skipped, and why.
     #[arg(long, global = true)]
     pub explain: bool,
@@ -71,6 +76,8 @@ pub enum Command {
     Render(Render),
     /// Path-trace the ground truth of a scene on the CPU: slow, but accurate.
     Reference(Reference),
+    /// Make the levels of detail of a plant, and show them on a contact sheet.
+    Bake(Bake),
     /// Describe a plant, terrain, inventory or scene file.
     Info(Info),
 }
@@ -220,6 +227,23 @@ pub enum LightChoice {
     Sun,
     /// The sky alone, with its bounces off ground and plants.
     Sky,
+}
+
+/// Arguments of `canopy bake`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  canopy bake oak.glb --out oak-levels.png
+  canopy bake oak.glb --out oak-200.png --planes 200 --lighting local
+The sheet shows each level from four sides and from above, and its triangles, memory, deviation and error.")]
+pub struct Bake {
+    /// The plant (.glb, .gltf).
+    pub plant: PathBuf,
+    /// PNG file to write.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Planes of the billboard cloud, 1 to 1000. More are nearer to the plant, and slower.
+    #[arg(long, value_name = "NUMBER", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub planes: u32,
 }
 
 /// Arguments of `canopy info`.

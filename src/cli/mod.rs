@@ -8,4 +8,4 @@ mod request;
 pub use arguments::{Arguments, Command};
 pub use exit::{Outcome, finish, print_lines};
 pub use progress::Bars;
-pub use request::{fly_options, no_command, reference_options, render_options};
+pub use request::{bake_options, fly_options, no_command, reference_options, render_options};

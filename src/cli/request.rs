@@ -3,19 +3,19 @@
 use std::path::{Path, PathBuf};
 
 use canopy::{
-    app::{Clock, FlyOptions, LightGroup, Output, ReferenceOptions, RenderOptions, Still, View},
+    app::{BakeOptions, Clock, FlyOptions, LightGroup, Output, ReferenceOptions, RenderOptions, Still, View},
     scene::{LocalTime, Overrides},
 };
 use clap::CommandFactory;
 use clap::error::ErrorKind;
 
-use super::arguments::{Arguments, CameraArguments, Common, Fly, LightChoice, Reference, Render};
+use super::arguments::{Arguments, Bake, CameraArguments, Common, Fly, LightChoice, Reference, Render};
 
 /// The scene of `canopy fly` without an argument.
 const DEMO: &str = "scenes/demo.ron";
 
 fn overrides(common: &Common) -> Overrides {
-    Overrides { seed: common.seed, msaa: common.msaa, lighting: common.lighting.clone() }
+    Overrides { seed: common.seed, msaa: common.msaa, exposure: common.exposure, lighting: common.lighting.clone() }
 }
 
 /// The options of a flight.
@@ -83,6 +83,26 @@ pub fn reference_options(reference: Reference, common: &Common) -> Result<Refere
     })
 }
 
+/// The options of a bake.
+///
+/// # Errors
+/// A usage error for a file that does not end in `.png`.
+pub fn bake_options(bake: Bake, common: &Common) -> Result<BakeOptions, clap::Error> {
+    if !ends_in(&bake.out, "png") {
+        let file = bake.out.display();
+        return Err(usage(format!("--out {file}: a contact sheet is a PNG file; the name must end in .png")));
+    }
+    Ok(BakeOptions {
+        plant: bake.plant,
+        out: bake.out,
+        planes: bake.planes,
+        msaa: common.msaa,
+        lighting: common.lighting.clone(),
+        adapter: common.adapter.clone(),
+        quiet: common.quiet,
+    })
+}
+
 fn output(
     mut out: Vec<PathBuf>,
     at: &[LocalTime],
@@ -132,7 +152,7 @@ fn usage(message: String) -> clap::Error {
 /// The usage error of a command line without a command.
 pub fn no_command() -> clap::Error {
     Arguments::command()
-        .error(ErrorKind::MissingSubcommand, "no command given (expected fly, render, reference or info)")
+        .error(ErrorKind::MissingSubcommand, "no command given (expected fly, render, reference, bake or info)")
 }
 
 fn view(camera: &CameraArguments) -> View {

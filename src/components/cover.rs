@@ -28,6 +28,8 @@ const LARGEST_TEXEL: f64 = 16.0 * COVER_TEXEL;
 pub struct ForestCover {
     pub ground: Entity,
     pub map: Arc<CoverMap>,
+    /// Metres beyond the terrain's data on which it stands too.
+    pub surroundings: f64,
 }
 
 /// Sets the canopy cover of each ground.
@@ -57,6 +59,11 @@ pub fn cover_grounds(
         };
         if !same {
             ground.cover = cover;
+        }
+        let of_ground = covers.iter().filter(|(_, cover)| cover.ground == entity);
+        let surroundings = of_ground.map(|(_, cover)| cover.surroundings).fold(0.0, f64::max);
+        if ground.surroundings != surroundings {
+            ground.surroundings = surroundings;
         }
     }
 }

@@ -1,15 +1,13 @@
-//! What follows the current light: the exposure of cameras and the lights of ordinary meshes.
+//! What follows the current light: the lights of ordinary meshes.
 
 use bevy::{
-    camera::Exposure,
     color::LinearRgba,
     ecs::{
         change_detection::DetectChanges,
         component::Component,
-        entity::Entity,
         query::{Added, With},
         reflect::ReflectComponent,
-        system::{Commands, Query, Res, ResMut},
+        system::{Query, Res, ResMut},
     },
     light::{DirectionalLight, GlobalAmbientLight},
     prelude::ReflectDefault,
@@ -18,10 +16,7 @@ use bevy::{
 };
 use glam::Vec3;
 
-use crate::{
-    math::luminance,
-    render::components::{CanopyCamera, Daylight},
-};
+use crate::{math::luminance, render::components::Daylight};
 
 /// A Bevy directional light that follows the sun or the moon, so that ordinary meshes are lit like the forest. A
 /// [`Sun`](super::Sun) requires it.
@@ -29,20 +24,6 @@ use crate::{
 #[reflect(Component, Default)]
 #[require(DirectionalLight)]
 pub struct FollowsDaylight;
-
-/// Sets the current exposure on all Canopy cameras.
-pub(super) fn expose_cameras(
-    mut commands: Commands,
-    daylight: Option<Res<Daylight>>,
-    cameras: Query<(Entity, Option<&Exposure>), With<CanopyCamera>>,
-) {
-    let Some(daylight) = daylight else { return };
-    for (camera, exposure) in &cameras {
-        if exposure.is_none_or(|exposure| exposure.ev100 != daylight.0.ev100) {
-            commands.entity(camera).insert(Exposure { ev100: daylight.0.ev100 });
-        }
-    }
-}
 
 /// Points the lights that follow at the key light, with its illuminance and colour.
 pub(super) fn light_meshes(

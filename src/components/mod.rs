@@ -14,6 +14,7 @@
 
 mod cover;
 mod daylight;
+mod exposure;
 mod forest;
 mod origin;
 mod scene;

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use bevy::{
     app::{App, Plugin, PostUpdate, PreUpdate},
+    camera::visibility::VisibilitySystems,
     ecs::{
         change_detection::DetectChangesMut,
         component::Component,
@@ -23,7 +24,8 @@ use bevy::{
 use chrono::{DateTime, TimeDelta, Utc};
 
 use super::{
-    daylight::{FollowsDaylight, expose_cameras, light_meshes},
+    daylight::{FollowsDaylight, light_meshes},
+    exposure::{StandCache, expose_cameras},
     sets::CanopySystems,
 };
 use crate::{
@@ -100,6 +102,9 @@ pub struct Sun {
     /// the exposure curve is made for; the default is 0.9.
     #[reflect(@Range::steps(-10.0..=10.0, 0.5, 0.1).unit("EV"), @"Exposure compensation in stops; positive is brighter.")]
     pub compensation_ev: f32,
+    /// EV at ISO 100 that is kept whatever the light, -10 to 25; `None`: the exposure follows the light at the camera.
+    #[reflect(ignore)]
+    pub fixed_ev100: Option<f32>,
 }
 
 impl Default for Sun {
@@ -118,6 +123,7 @@ impl Default for Sun {
             moon: MoonSetting::Full,
             visibility_km: 40.0,
             compensation_ev: 0.9,
+            fixed_ev100: None,
         }
     }
 }
@@ -165,7 +171,11 @@ impl Sun {
         let settings = LightSettings {
             observer_height_m: self.observer.height_m.clamp(-500.0, 9000.0),
             star_rotation: celestial_rotation(self.instant, &self.observer),
-            exposure: ExposureSettings { compensation: self.compensation_ev, ..ExposureSettings::default() },
+            exposure: ExposureSettings {
+                compensation: self.compensation_ev,
+                fixed_ev100: self.fixed_ev100,
+                ..ExposureSettings::default()
+            },
             ..LightSettings::default()
         };
         LightState::new(atmosphere, sun, moon, &settings)
@@ -254,15 +264,24 @@ pub struct SunPlugin;
 impl Plugin for SunPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<LightWork>()
+            .init_resource::<StandCache>()
             .init_resource::<LightUpdates>()
             .register_type::<(Sun, SunRefresh, FollowsDaylight)>()
             .add_systems(PreUpdate, run_clocks.in_set(CanopySystems::Clock).run_if(any_with_component::<Sun>))
             .add_systems(
                 PostUpdate,
-                (update_light, expose_cameras, light_meshes)
-                    .chain()
-                    .in_set(CanopySystems::Light)
-                    .before(TransformSystems::Propagate),
+                (
+                    (update_light, light_meshes)
+                        .chain()
+                        .in_set(CanopySystems::Light)
+                        .before(TransformSystems::Propagate),
+                    expose_cameras
+                        .after(CanopySystems::Light)
+                        .after(CanopySystems::Origin)
+                        .after(CanopySystems::Forests)
+                        .after(TransformSystems::Propagate)
+                        .after(VisibilitySystems::VisibilityPropagate),
+                ),
             );
     }
 }

@@ -108,6 +108,7 @@ pub fn show_terrains(
         commands.entity(entity).try_insert(Ground {
             terrain: map.terrain.clone(),
             cover: ground.and_then(|ground| ground.cover.clone()),
+            surroundings: ground.map_or(0.0, |ground| ground.surroundings),
             error_pixels: settings.error_pixels,
             view_distance: settings.view_distance,
         });

@@ -54,6 +54,34 @@ impl DrawLists {
     }
 }
 
+/// One of several shares of a list. Together they have each tree once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Share {
+    /// Which one, from 0 on.
+    pub index: u32,
+    /// How many there are.
+    pub of: u32,
+}
+
+impl Share {
+    /// The whole list.
+    pub const ALL: Self = Self { index: 0, of: 1 };
+
+    /// All of so many shares.
+    pub fn each(of: u32) -> impl Iterator<Item = Self> {
+        (0..of).map(move |index| Self { index, of })
+    }
+
+    /// The trees of `range` in this share, as `group_trees` of `shaders/cull/lists.wgsl` has them.
+    pub fn cut(self, range: &Range<u32>) -> Range<u32> {
+        let at = |index: u32| {
+            let before = range.len() as u64 * u64::from(index.min(self.of)) / u64::from(self.of.max(1));
+            range.start + before as u32
+        };
+        at(self.index)..at(self.index.saturating_add(1))
+    }
+}
+
 /// Lists under construction: entries by level and group.
 pub(super) struct ListBuilder<'a> {
     groupings: &'a [Grouping],
@@ -77,5 +105,25 @@ impl<'a> ListBuilder<'a> {
 
     pub fn finish(self) -> DrawLists {
         DrawLists::assemble(self.lists)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shares_of_lists_have_each_tree_once() {
+        let levels = vec![vec![(0..10).collect(), vec![], vec![7]], vec![(0..3).collect()]];
+        let whole = DrawLists::assemble(levels);
+        for of in [1, 4, 20] {
+            for range in whole.levels.iter().flatten() {
+                let shares = Share::each(of).flat_map(|share| share.cut(range));
+                assert!(shares.eq(range.clone()), "{of} shares of {range:?}");
+                assert_eq!(Share::ALL.cut(range), *range);
+            }
+        }
+        let none = [Share { index: 4, of: 4 }, Share { index: 0, of: 0 }, Share { index: u32::MAX, of: u32::MAX }];
+        assert!(none.iter().all(|share| share.cut(&(3..13)).is_empty()));
     }
 }

@@ -20,6 +20,6 @@ pub mod volume;
 
 pub use clusters::{Cluster, Page, TreeSize, pages};
 pub use frustum::Frustum;
-pub use lists::{DrawLists, Grouping};
+pub use lists::{DrawLists, Grouping, Share};
 pub use select::select;
 pub use volume::{Drawn, SeenShadows, Volume};

@@ -399,7 +399,7 @@ impl Volume {
     /// The box of a tree of `size` whose foot is at `position`.
     fn tree_bounds(&self, tree: &PackedTree, size: TreeSize, position: [i32; 2]) -> Bounds {
         let scale = scale_bound(tree.look);
-        let units = |steps: u32, factor: u32| ((((steps * scale) >> 8) + 1) * factor >> 10) as i32 + 1;
+        let units = |steps: u32, factor: u32| (((((steps * scale) >> 8) + 1) * factor) >> 10) as i32 + 1;
         let (radius, height) = (units(size.radius, self.size_factor[0]), units(size.height, self.size_factor[1]));
         let [x, z] = position.map(|value| value >> self.shift);
         let y = self.height(tree.y);

@@ -38,6 +38,11 @@ pub struct ExposureSettings {
     pub compensation: f32,
     /// Maximum desaturation by night vision, 0 (colours at night as by day) to 1 (rods alone).
     pub scotopic_strength: f32,
+    /// Fraction of adaptation in EV to the shade of a stand that the camera is in, 0 (as on open ground) to 1 (the floor of a
+    /// wood as bright as a meadow). A camera in a wood sees bright gaps too, so that its eye does not adapt in full.
+    pub stand_adaptation: f32,
+    /// EV100 that is kept whatever the light, -10 to 25; `None`: the exposure follows the light.
+    pub fixed_ev100: Option<f32>,
 }
 
 impl Default for ExposureSettings {
@@ -50,6 +55,8 @@ impl Default for ExposureSettings {
             rod_adaptation: 0.87,
             compensation: 0.0,
             scotopic_strength: 0.85,
+            stand_adaptation: 0.9,
+            fixed_ev100: None,
         }
     }
 }
@@ -69,11 +76,17 @@ impl ExposureSettings {
         check("adaptation of rods", self.rod_adaptation, "", 0.0, 1.0)?;
         check("strength of night sight", self.scotopic_strength, "", 0.0, 1.0)?;
         check("exposure compensation", self.compensation, "EV", -20.0, 20.0)?;
+        check("adaptation in a stand", self.stand_adaptation, "", 0.0, 1.0)?;
+        check("fixed exposure", self.fixed_ev100.unwrap_or_default(), "EV", -10.0, 25.0)?;
         Ok(())
     }
 
-    /// EV100 for a horizontal illuminance in lux. Below 1e-6 lux, far less than any sky has, it no longer falls.
+    /// EV100 for a horizontal illuminance in lux on open ground. Below 1e-6 lux, far less than any sky has, it no longer
+    /// falls. The fixed one if there is one.
     pub fn ev100(&self, illuminance: f32) -> f32 {
+        if let Some(fixed) = self.fixed_ev100 {
+            return fixed;
+        }
         let e = if illuminance.is_finite() { illuminance.clamp(1e-6, 1e7) } else { self.day_illuminance };
         let knee = self.knee_illuminance;
         self.day_ev100
@@ -81,7 +94,20 @@ impl ExposureSettings {
             + self.rod_adaptation * (e.min(knee) / knee).log2()
             - self.compensation
     }
+
+    /// EV100 in a stand that lets the fraction `share` of the illuminance on open ground, `illuminance` in lux, through.
+    /// Shares below [`DARKEST_SHARE`] count as that, those of 1 and more, or that are no number, as open ground.
+    pub fn ev100_in_stand(&self, illuminance: f32, share: f32) -> f32 {
+        let share = if share < 1.0 { share.max(DARKEST_SHARE) } else { 1.0 };
+        match self.fixed_ev100 {
+            Some(fixed) => fixed,
+            None => self.ev100(illuminance) + self.stand_adaptation * share.log2(),
+        }
+    }
 }
+
+/// The smallest fraction of the light on open ground that exposure adapts to: the floor of a dense spruce stand.
+pub const DARKEST_SHARE: f32 = 0.005;
 
 /// The factor from nits to display values at an EV100, as Bevy has it: `1 / (1.2 * 2^EV)` (ISO 12232 saturation).
 pub fn exposure_from_ev100(ev100: f32) -> f32 {
@@ -163,6 +189,25 @@ mod tests {
         }
         assert!(s.ev100(f32::NAN).is_finite());
         assert!(ExposureSettings { rod_adaptation: 1.5, ..s }.validate().is_err());
+        assert!(ExposureSettings { stand_adaptation: -0.1, ..s }.validate().is_err());
+        assert!(ExposureSettings { fixed_ev100: Some(f32::NAN), ..s }.validate().is_err());
+    }
+
+    #[test]
+    fn a_stand_opens_the_exposure_and_a_fixed_one_stays() {
+        let s = ExposureSettings::default();
+        assert_eq!(s.ev100_in_stand(1e5, 1.0), s.ev100(1e5));
+        let mut last = s.ev100(1e5);
+        for share in [0.5, 0.1, 0.02, DARKEST_SHARE] {
+            let ev = s.ev100_in_stand(1e5, share);
+            assert!(ev < last && ev > s.ev100(1e5) + share.log2(), "{share}: {ev}");
+            last = ev;
+        }
+        assert_eq!(s.ev100_in_stand(1e5, 0.0), last);
+        assert_eq!(s.ev100_in_stand(1e5, f32::NAN), s.ev100(1e5));
+        assert_eq!(ExposureSettings { stand_adaptation: 0.0, ..s }.ev100_in_stand(1e5, 0.1), s.ev100(1e5));
+        let fixed = ExposureSettings { fixed_ev100: Some(9.0), ..s };
+        assert_eq!((fixed.ev100(1.0), fixed.ev100_in_stand(1e5, 0.1)), (9.0, 9.0));
     }
 
     #[test]

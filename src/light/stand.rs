@@ -28,6 +28,7 @@ use std::f32::consts::PI;
 use glam::Vec3;
 
 use super::state::LightState;
+use crate::math::luminance;
 
 /// Number of covers in the table, evenly from 0 to 1.
 pub const COVERS: usize = 16;
@@ -38,6 +39,8 @@ pub const DEPTHS: usize = 16;
 const FILLED: f32 = 0.92;
 /// Albedo of the ground under trees: litter and moss, as `shaders/terrain/terrain.wgsl` draws them.
 const FLOOR: Vec3 = Vec3::new(0.062, 0.058, 0.026);
+/// The smallest share of light between crowns.
+const LEAST_SHARE: f32 = 1e-4;
 /// Layers of the two streams, and number of sweeps through them. Few are enough: leaves scatter less than half of the
 /// light.
 const LAYERS: usize = 48;
@@ -83,6 +86,9 @@ pub struct StandSample {
 pub struct StandLight {
     /// Row by row: depths from 0 to 1, then the ground; in each row covers from 0 to 1.
     samples: Vec<StandSample>,
+    /// Mean logarithm of the horizontal illuminance between the crowns, in sun flecks and beside them, less that on open
+    /// ground: rows of depths from 0 to 1, in each row covers from 0 to 1.
+    shares: Vec<f32>,
 }
 
 /// Sine of a ring's elevation, and its mean radiance.
@@ -96,6 +102,7 @@ impl StandLight {
         let rings = rings(light);
         let sun = Sun { sine: light.key_direction.y, illuminance: light.key_illuminance };
         let mut samples = vec![StandSample::default(); COVERS * (DEPTHS + 1)];
+        let mut shares = vec![0.0; COVERS * DEPTHS];
         for column in 0..COVERS {
             let cover = column as f32 / (COVERS - 1) as f32;
             let layer = Layer::new(cover, trees);
@@ -119,9 +126,12 @@ impl StandLight {
                     }
                 };
                 samples[row * COVERS + column] = sample;
+                if row < DEPTHS {
+                    shares[row * COVERS + column] = streams.share_ln((depth / layer.length).min(1.0));
+                }
             }
         }
-        Self { samples }
+        Self { samples, shares }
     }
 
     /// The samples of the table: rows of depths from 0 to 1, then the ground, with [`COVERS`] covers in each row.
@@ -129,19 +139,39 @@ impl StandLight {
         &self.samples
     }
 
+    /// The fraction of the horizontal illuminance on open ground that there is between crowns of the cover `cover` at the
+    /// depth `depth`, with no crown of its own around it: 1 without cover and at depth 0, never 0. It is the geometric mean of
+    /// sun flecks and shade, which is what an eye adapts to. Both arguments are clamped to 0..=1; the logarithm is
+    /// interpolated.
+    pub fn share(&self, cover: f32, depth: f32) -> f32 {
+        self.share_ln(cover, depth).exp()
+    }
+
+    /// Natural logarithm of [`share`](Self::share).
+    pub fn share_ln(&self, cover: f32, depth: f32) -> f32 {
+        let ((column, u), (row, v)) = (position(cover, COVERS), position(depth, DEPTHS));
+        let share = |row: usize, column: usize| self.shares[row * COVERS + column];
+        let line = |row: usize| share(row, column) + (share(row, column + 1) - share(row, column)) * u;
+        line(row) + (line(row + 1) - line(row)) * v
+    }
+
     /// Interpolates the table as the shader does. `cover` and `depth` are clamped to 0..=1.
     pub fn at(&self, cover: f32, depth: f32) -> StandSample {
-        let clamp = |value: f32, count: usize| (if value > 0.0 { value.min(1.0) } else { 0.0 }) * (count - 1) as f32;
-        let (x, y) = (clamp(cover, COVERS), clamp(depth, DEPTHS));
-        let (column, row) = ((x as usize).min(COVERS - 2), (y as usize).min(DEPTHS - 2));
+        let ((column, u), (row, v)) = (position(cover, COVERS), position(depth, DEPTHS));
         let sample = |row: usize, column: usize| self.samples[row * COVERS + column];
-        let (u, v) = (x - column as f32, y - row as f32);
         mix(
             &mix(&sample(row, column), &sample(row, column + 1), u),
             &mix(&sample(row + 1, column), &sample(row + 1, column + 1), u),
             v,
         )
     }
+}
+
+/// The entry of a table of `count` before a value that is clamped to 0..=1, and the way from it to the next.
+fn position(value: f32, count: usize) -> (usize, f32) {
+    let at = (if value > 0.0 { value.min(1.0) } else { 0.0 }) * (count - 1) as f32;
+    let before = (at as usize).min(count - 2);
+    (before, at - before as f32)
 }
 
 fn mix(a: &StandSample, b: &StandSample, t: f32) -> StandSample {
@@ -243,6 +273,9 @@ struct Sun {
 struct Streams {
     /// Downwelling and upwelling radiance at each boundary between layers.
     bounds: Vec<(Vec3, Vec3)>,
+    /// Mean logarithm of the luminance of the irradiance on level surfaces at each of them, scattered light included: some
+    /// are in the sun, the others in the shade.
+    level_ln: Vec<f32>,
 }
 
 impl Streams {
@@ -279,7 +312,24 @@ impl Streams {
         }
         let finite =
             |flux: Vec3| Vec3::from((flux / PI).to_array().map(|v| if v.is_finite() { v.max(0.0) } else { 0.0 }));
-        Self { bounds: down.into_iter().zip(up).map(|(down, up)| (finite(down), finite(up))).collect() }
+        let sunlight = sun.illuminance * sun.sine.max(0.0);
+        let level_ln = (0..=LAYERS)
+            .map(|bound| {
+                let lit = layer.transmittance(layer.length * bound as f32 / LAYERS as f32, sun.sine);
+                let shade = firsts[bound] - sunlight * lit + down[bound];
+                lit * luminance(shade + sunlight).ln() + (1.0 - lit) * luminance(shade).ln()
+            })
+            .collect();
+        Self { bounds: down.into_iter().zip(up).map(|(down, up)| (finite(down), finite(up))).collect(), level_ln }
+    }
+
+    /// Mean logarithm of the irradiance of level surfaces at a fraction of the crowns' length, 0..=1, less that above the
+    /// crowns; at least that of [`LEAST_SHARE`], and 0 where there is no light at all.
+    fn share_ln(&self, depth: f32) -> f32 {
+        let (bound, t) = position(depth, LAYERS + 1);
+        let here = self.level_ln[bound] + (self.level_ln[bound + 1] - self.level_ln[bound]) * t;
+        let share = here - self.level_ln[0];
+        if share.is_nan() { 0.0 } else { share.clamp(LEAST_SHARE.ln(), 0.0) }
     }
 
     /// Downwelling and upwelling radiance at a fraction of the crowns' length, 0..=1.
@@ -320,6 +370,25 @@ mod tests {
             let up = (sample.upwelling / light.ground_radiance - 1.0).abs().max_element();
             // Sums over rings against a finer quadrature.
             assert!(up < 0.01, "{up}");
+        }
+    }
+
+    #[test]
+    fn the_share_of_light_falls_with_cover_and_depth_and_starts_at_one() {
+        for elevation in [70.0, 30.0, 4.0, -5.0] {
+            let stand = StandLight::new(&light(elevation), &leaves(0.1, 0.1));
+            for i in 0..=20 {
+                let value = i as f32 / 20.0;
+                assert!((stand.share(0.0, value) - 1.0).abs() < 1e-3, "{}", stand.share(0.0, value));
+                assert!((stand.share(value, 0.0) - 1.0).abs() < 1e-3, "{}", stand.share(value, 0.0));
+            }
+            for i in 0..20 {
+                let (here, next) = (i as f32 / 20.0, (i + 1) as f32 / 20.0);
+                assert!(
+                    stand.share(next, 1.0) < stand.share(here, 1.0) && stand.share(0.8, next) <= stand.share(0.8, here)
+                );
+            }
+            assert!((1e-4..0.3).contains(&stand.share(0.95, 1.0)), "{}", stand.share(0.95, 1.0));
         }
     }
 
@@ -407,6 +476,8 @@ mod tests {
                     assert!(sample.upwelling.min_element() >= 0.0 && (0.0..=1.0).contains(&sample.sun_transmittance));
                 }
                 assert!(stand.at(f32::NAN, f32::INFINITY).upwelling.is_finite());
+                let share = stand.share(f32::INFINITY, 1.0);
+                assert!((0.0..=1.0).contains(&share) && share > 0.0, "{share}");
             }
         }
     }

@@ -128,6 +128,8 @@ pub struct LightState {
     pub ev100: f32,
     /// Factor from nits to display values that corresponds to `ev100`.
     pub exposure: f32,
+    /// The exposure curve that `ev100` is of.
+    pub exposure_settings: ExposureSettings,
     /// Blue shift of night vision.
     pub scotopic: ScotopicTint,
     /// Air between camera and scene.
@@ -209,6 +211,7 @@ impl LightState {
             adaptation_illuminance,
             ev100,
             exposure: exposure_from_ev100(ev100),
+            exposure_settings: settings.exposure,
             scotopic: ScotopicTint::for_illuminance(adaptation_illuminance, settings.exposure.scotopic_strength),
             fog: fog(atmosphere),
             night: NightTerms {
@@ -223,6 +226,12 @@ impl LightState {
             },
             sky_view,
         })
+    }
+
+    /// EV100 for a camera in a stand that lets the fraction `share` of the light on open ground through
+    /// ([`StandLight::share`](super::StandLight::share)).
+    pub fn ev100_in_stand(&self, share: f32) -> f32 {
+        self.exposure_settings.ev100_in_stand(self.adaptation_illuminance, share)
     }
 
     /// What lights a plant beside the key light's disc, in full: to be looked up, or projected at any band.

@@ -15,6 +15,10 @@ pub struct Representation(&'static str);
 impl Representation {
     /// The full model.
     pub const MODEL: Self = Self("model");
+    /// The full model with fewer and larger leaves [Cook et al. 2007].
+    pub const THINNED: Self = Self("thinned");
+    /// A billboard cloud [Franzke 2005, 4.3.1].
+    pub const CLOUD: Self = Self("cloud");
     /// Crossed billboards [Franzke 2005, 4.3].
     pub const CROSS: Self = Self("cross");
 
@@ -129,7 +133,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const CLOUD: Representation = Representation::named("cloud");
+    const CLOUD: Representation = Representation::CLOUD;
 
     fn three_levels() -> impl Strategy<Value = Levels> {
         (0.0f32..1e4, 0.0f32..1e3, 0.0f32..1e4, 0.0f32..1e3).prop_map(|(first, width, second, other)| {

@@ -8,6 +8,7 @@
 //! | [`hash`] | random numbers that depend only on a seed, an index and a stream |
 //! | [`quadrature`] | Gauss-Legendre nodes, directions and solid angles that integrate over the sphere |
 //! | [`octahedral`] | unit vectors in two coordinates |
+//! | [`cholesky`](mod@cholesky) | small systems of linear equations |
 //! | [`color`] | sRGB, luminance, 8-bit codes |
 //! | [`interpolation`] | the smooth step |
 //! | [`mip`] | a texture with its mip levels |
@@ -16,6 +17,7 @@
 //! | [`digits`] | numbers formatted for people |
 //! | [`range`] | the range, steps and unit of a number that people set |
 
+pub mod cholesky;
 pub mod color;
 pub mod compute_once;
 pub mod digits;

@@ -1,18 +1,15 @@
-//! The colour of the renderer's ground: the twin of the albedo in `shaders/terrain/terrain.wgsl`.
+//! The colour of the renderer's ground: the twin of `shaders/terrain/ground_color.wgsl`.
 //!
-//! The renderer samples its noise through mips. A reference samples it at full resolution, because its samples average
-//! it. Where a pixel covers several texels, terms that depend on the noise by a smooth step therefore differ slightly.
-//! The detail of the normal, which the renderer adds near the camera, is left out.
+//! The renderer leaves out noise that is finer than a pixel. A reference has all of it, because its samples average it.
+//! The detail of the normal and the shade between clods, which the renderer adds near the camera, are left out.
 
 use std::sync::Arc;
 
-use glam::{DVec2, DVec3, Vec2, Vec3, Vec4};
-use image::RgbaImage;
+use glam::{DVec2, DVec3, Vec3};
 
-use crate::math::smoothstep;
-use crate::scatter::CoverMap;
+use crate::scatter::{Area, CoverMap, distance_beyond, surroundings_density};
 use crate::terrain::Terrain;
-use crate::terrain::ground_noise::{NOISE_SIDE, noise_image};
+use crate::terrain::ground_noise::{LEAF_OCTAVE, noise_band, noise_step, scattered_leaves, visible_part};
 
 /// Points along an axis of the terrain from which its mean cover is taken.
 const MEAN_POINTS: u32 = 64;
@@ -20,17 +17,19 @@ const MEAN_POINTS: u32 = 64;
 /// Everything that the colour of the ground depends on.
 #[derive(Clone, Debug)]
 pub struct Soil {
-    noise: RgbaImage,
     cover: Option<Arc<CoverMap>>,
     extent: DVec2,
     mean_cover: f32,
+    /// Metres beyond the terrain's data on which trees stand too.
+    surroundings: f64,
 }
 
 impl Soil {
-    /// The soil of `terrain`, with the canopy cover `cover`.
-    pub fn new(terrain: &Terrain, cover: Option<Arc<CoverMap>>) -> Self {
+    /// The soil of `terrain`, with the canopy cover `cover`. Trees stand up to `surroundings` metres beyond the data, and
+    /// thin out there; farther out the ground has the colour of crowns.
+    pub fn new(terrain: &Terrain, cover: Option<Arc<CoverMap>>, surroundings: f64) -> Self {
         let extent = terrain.extent();
-        let mut soil = Self { noise: noise_image(), cover, extent, mean_cover: 0.0 };
+        let mut soil = Self { cover, extent, mean_cover: 0.0, surroundings };
         let step = |i: u32| (f64::from(i) + 0.5) / f64::from(MEAN_POINTS) - 0.5;
         let points = (0..MEAN_POINTS).flat_map(|z| (0..MEAN_POINTS).map(move |x| DVec2::new(step(x), step(z))));
         soil.mean_cover = points.map(|p| soil.cover_at(p * extent)).sum::<f32>() / (MEAN_POINTS * MEAN_POINTS) as f32;
@@ -39,29 +38,7 @@ impl Soil {
 
     /// Canopy cover around a position, bilinear.
     fn cover_at(&self, position: DVec2) -> f32 {
-        let Some(cover) = &self.cover else { return 0.0 };
-        let at = (position - cover.origin) / cover.texel - 0.5;
-        let low = at.floor();
-        let f = (at - low).as_vec2();
-        let texel = |x: f64, z: f64| cover.at(cover.origin + (low + DVec2::new(x + 0.5, z + 0.5)) * cover.texel);
-        let row = |z: f64| texel(0.0, z) * (1.0 - f.x) + texel(1.0, z) * f.x;
-        row(0.0) * (1.0 - f.y) + row(1.0) * f.y
-    }
-
-    /// Noise of a period in metres: smooth, fine, patchy, ridged, each 0..1; bilinear, repeating.
-    fn noise(&self, xz: DVec2, period: f64) -> Vec4 {
-        let side = f64::from(NOISE_SIDE);
-        let at = (xz / period).map(|c| c.rem_euclid(1.0)) * side - 0.5;
-        let low = at.floor();
-        let f: Vec2 = (at - low).as_vec2();
-        let texel = |x: f64, y: f64| {
-            let position = (low + DVec2::new(x, y)).map(|c| c.rem_euclid(side));
-            let pixel =
-                self.noise.get_pixel((position.x as u32).min(NOISE_SIDE - 1), (position.y as u32).min(NOISE_SIDE - 1));
-            Vec4::from(pixel.0.map(f32::from)) / 255.0
-        };
-        let row = |y: f64| texel(0.0, y).lerp(texel(1.0, y), f.x);
-        row(0.0).lerp(row(1.0), f.y)
+        self.cover.as_ref().map_or(0.0, |cover| cover.smooth_at(position))
     }
 
     /// Albedo at a position (scene metres) where the smooth ground has this unit normal.
@@ -70,43 +47,19 @@ impl Soil {
         if !xz.is_finite() {
             return Vec3::ZERO;
         }
-        let both = |period: f64, rotated: f64| {
-            let rotated = self.noise(rotate(xz), rotated);
-            Vec4::splat(0.5) + 0.72 * (self.noise(xz, period) + rotated - Vec4::ONE)
-        };
-        let wide = self.noise(xz, 512.0);
-        let middle = both(64.0, 51.2);
-        let fine = both(8.0, 12.8);
-        let grain = both(2.0, 3.2);
-        let outside = xz.abs().cmpgt(0.5 * self.extent).any();
-        let cover = if outside { self.mean_cover } else { self.cover_at(xz) };
-
-        let litter = Vec3::new(0.050, 0.040, 0.022)
-            .lerp(Vec3::new(0.100, 0.078, 0.042), (fine.y * 1.4 - 0.2 + grain.y - 0.5).clamp(0.0, 1.0));
-        let moss = Vec3::new(0.030, 0.048, 0.014).lerp(Vec3::new(0.055, 0.080, 0.022), grain.z);
-        let floor_mix = smoothstep(0.45, 0.62, middle.z * 0.6 + fine.z * 0.4);
-        let forest_floor = litter.lerp(moss, floor_mix * 0.75);
-        let lush = Vec3::new(0.050, 0.085, 0.020).lerp(Vec3::new(0.095, 0.135, 0.035), fine.y);
-        let dry = Vec3::new(0.120, 0.115, 0.045).lerp(Vec3::new(0.175, 0.155, 0.070), grain.y);
-        let meadow = lush.lerp(dry, smoothstep(0.42, 0.68, wide.x * 0.5 + middle.x * 0.5)) * (0.8 + 0.4 * grain.x);
-        let rock = Vec3::new(0.13, 0.12, 0.105).lerp(Vec3::new(0.26, 0.245, 0.22), fine.w * 0.6 + grain.w * 0.4);
-
-        let wooded = smoothstep(0.10, 0.45, cover + (middle.y - 0.5) * 0.25);
-        let mut albedo = meadow.lerp(forest_floor, wooded);
-        // Wooded ground too far for its trees to be drawn is seen as crowns.
-        if outside {
-            let crowns = Vec3::new(0.028, 0.045, 0.013).lerp(Vec3::new(0.050, 0.072, 0.022), middle.y);
-            albedo = albedo.lerp(crowns, wooded);
-        }
-        let steepness = 1.0 - normal.y;
-        let stony = smoothstep(0.30, 0.42, steepness + (middle.w - 0.5) * 0.15 + (fine.w - 0.5) * 0.08);
-        albedo.lerp(rock, stony) * (0.85 + 0.3 * middle.x)
+        let half = 0.5 * self.extent;
+        let distance = distance_beyond(&Area { min: -half, max: half }, xz);
+        let drawn = surroundings_density(distance, self.surroundings) as f32;
+        let undrawn = self.mean_cover * (1.0 - drawn);
+        let planted = if distance > self.surroundings { 0.0 } else { self.cover_at(xz) };
+        let cover = undrawn + planted;
+        ground_color(xz, 1.0 - normal.y, cover, undrawn / cover.max(1e-3), 0.0)
     }
 
     /// Everything that the colour depends on, as bytes for a fingerprint.
     pub(crate) fn feed(&self, hasher: &mut blake3::Hasher) {
-        hasher.update(self.noise.as_raw());
         hasher.update(bytemuck::bytes_of(&self.extent));
+        hasher.update(&self.surroundings.to_le_bytes());
         if let Some(cover) = &self.cover {
             hasher.update(&cover.cover);
             hasher.update(format!("{:?} {} {} {}", cover.origin, cover.texel, cover.columns, cover.rows).as_bytes());
@@ -114,9 +67,53 @@ impl Soil {
     }
 }
 
-/// The position at which the second noise of a pair is read: rotated by the angle of a 3-4-5 triangle.
-fn rotate(xz: DVec2) -> DVec2 {
-    DVec2::new(0.6 * xz.x - 0.8 * xz.y, 0.8 * xz.x + 0.6 * xz.y)
+/// Albedo of the ground at a position in metres (x east, y south), as the shader has it: `steepness` is 1 less the normal's
+/// height, `cover` the canopy cover, of which the part `far` is seen as crowns, and `footprint` the width of a pixel on the
+/// ground, metres; 0 shows everything.
+pub(crate) fn ground_color(xz: DVec2, steepness: f32, cover: f32, far: f32, footprint: f32) -> Vec3 {
+    let wide = noise_band(xz, 0, 4, footprint);
+    let middle = noise_band(xz, 4, 4, footprint);
+    let fine = noise_band(xz, 8, 3, footprint);
+    let grain = noise_band(xz, 11, 4, footprint);
+    let mix = |from: [f32; 3], to: [f32; 3], share: f32| Vec3::from(from).lerp(to.into(), share);
+
+    let at_margin = cover + 0.05 * middle.value.y + 0.03 * fine.value.x;
+    let wooded = noise_step(0.275, 0.175, at_margin, 0.0025 * middle.lost + 0.0009 * fine.lost);
+    // Leaves are broad, blades of grass narrow.
+    let leaf = scattered_leaves(xz, 0.10 + 0.24 * wooded, footprint);
+    let leaf_lost = 1.0 - visible_part(512.0 * (-LEAF_OCTAVE as f32).exp2(), footprint);
+
+    let moisture = 0.4 * fine.value.x + 0.55 * grain.value.x + 0.95 * leaf;
+    let dryness = noise_step(0.0, 1.1, moisture, 0.16 * fine.lost + 0.30 * grain.lost + 0.25 * leaf_lost);
+    let bleached = noise_step(1.0, 0.25, leaf + 0.25 * grain.value.y, 0.06 * grain.lost + 0.25 * leaf_lost);
+    let leaves = mix([0.033, 0.028, 0.015], [0.098, 0.078, 0.040], dryness);
+    let litter = leaves.lerp(Vec3::new(0.128, 0.110, 0.068), 0.75 * bleached);
+    let herb_tone = noise_step(0.0, 1.2, 0.8 * grain.value.y + 0.6 * leaf, 0.64 * grain.lost + 0.1 * leaf_lost);
+    let herbs = mix([0.026, 0.044, 0.012], [0.058, 0.088, 0.023], herb_tone);
+    let growth = 0.6 * middle.value.y + 0.65 * fine.value.y + 0.3 * grain.value.y;
+    let green = noise_step(0.6, 0.5, growth, 0.36 * middle.lost + 0.42 * fine.lost + 0.09 * grain.lost);
+    let forest_floor = litter.lerp(herbs, 0.85 * green);
+
+    let blade_lost = 0.16 * fine.lost + 0.49 * grain.lost + 0.1 * leaf_lost;
+    let blade = |fine: f32, grain: f32| noise_step(0.0, 1.4, 0.4 * fine + 0.7 * grain + 0.9 * leaf, blade_lost);
+    let lush = mix([0.042, 0.076, 0.016], [0.090, 0.134, 0.033], blade(fine.value.x, grain.value.x));
+    let dry = mix([0.100, 0.098, 0.040], [0.185, 0.164, 0.078], blade(fine.value.y, grain.value.y));
+    let drought = 0.7 * wide.value.x + 0.6 * middle.value.x + 0.35 * fine.value.y + 0.25 * grain.value.x;
+    let drought_lost = 0.49 * wide.lost + 0.36 * middle.lost + 0.12 * fine.lost + 0.06 * grain.lost;
+    let meadow = lush.lerp(dry, noise_step(0.35, 1.3, drought, drought_lost));
+
+    let rock_lost = 0.36 * fine.lost + 0.36 * grain.lost;
+    let rock_tone = noise_step(0.0, 1.3, 0.6 * fine.value.y + 0.6 * grain.value.y, rock_lost);
+    let rock = mix([0.13, 0.12, 0.105], [0.25, 0.235, 0.21], rock_tone);
+
+    let crown_lost = 0.06 * middle.lost + 0.81 * fine.lost;
+    let crown_tone = noise_step(0.0, 1.4, 0.25 * middle.value.x + 0.9 * fine.value.y, crown_lost);
+    let crowns = mix([0.006, 0.016, 0.0035], [0.014, 0.034, 0.007], crown_tone);
+    let at_cliff = steepness + 0.025 * middle.value.x + 0.015 * fine.value.x;
+    let stony = noise_step(0.36, 0.06, at_cliff, 0.0006 * middle.lost + 0.0002 * fine.lost);
+
+    let soil = meadow.lerp(forest_floor, wooded).lerp(crowns, wooded * far).lerp(rock, stony);
+    soil * (1.0 + 0.07 * (wide.value.y + middle.value.x) + 0.05 * fine.value.x).clamp(0.5, 1.6)
 }
 
 #[cfg(test)]
@@ -130,7 +127,7 @@ mod tests {
         let terrain = Terrain::new(field, None, Surroundings::Mirror);
         let cover =
             CoverMap { origin: DVec2::new(-100.0, -100.0), texel: 100.0, columns: 2, rows: 2, cover: vec![255; 4] };
-        let (bare, wooded) = (Soil::new(&terrain, None), Soil::new(&terrain, Some(Arc::new(cover))));
+        let (bare, wooded) = (Soil::new(&terrain, None, 0.0), Soil::new(&terrain, Some(Arc::new(cover)), 0.0));
         let mean = |soil: &Soil, normal: Vec3| {
             let albedo = |i: u32| {
                 let position = DVec3::new(f64::from(i % 32) * 1.7 - 27.0, 0.0, f64::from(i / 32) * 1.9 - 30.0);

@@ -117,6 +117,9 @@ pub struct Ground {
     /// Canopy cover, if a forest stands on it.
     #[reflect(ignore, clone)]
     pub cover: Option<Arc<CoverMap>>,
+    /// Metres beyond the terrain's data on which trees stand too, thinning out in the outer half; 0: none. Farther out the
+    /// ground has the colour of crowns, as many as the data has.
+    pub surroundings: f64,
     /// Maximum distance in pixels between the drawn and the true surface, 0.25 to 32. Lower: more triangles.
     pub error_pixels: f64,
     /// Distance in metres to which the ground is drawn, its mirrored surroundings included.
@@ -157,6 +160,20 @@ impl LightUpdates {
         // The chord is as long as the angle to a millionth, and exact where the cosine is not.
         old.distance_squared(new) <= 0.5f32.to_radians().powi(2)
     }
+}
+
+/// When a [`Forest`] that is new, or has other trees or shapes than before, is brought onto the device.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Resource, Default)]
+pub enum ForestUpdates {
+    /// In the frame that first draws it, which waits. For images and tests.
+    Blocking,
+    /// Over several frames, none of which does much more than its neighbours. Each writes some 8 MB of plants and trees.
+    /// Then the pipelines are made, one a frame where Bevy makes them in the frame. The forest is drawn once all of it is
+    /// there; until then one that it replaces stays. Its shadow comes last: one cascade after the other
+    /// from the finest, each drawn over four frames.
+    #[default]
+    Spread,
 }
 
 /// Settings of the shadow maps of sun and moon, on the entity of the [`Sun`](crate::components::Sun), which requires
@@ -220,13 +237,23 @@ impl Default for TreeLists {
     }
 }
 
-/// Debug options of a camera.
-#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, ExtractComponent, Reflect)]
+/// How a camera's trees are drawn.
+#[derive(Component, Clone, Copy, Debug, PartialEq, Eq, ExtractComponent, Reflect)]
 #[reflect(Component, Default)]
 pub struct ViewOptions {
     /// Whether trees are tinted by their level of detail, each level in its own colour.
     #[reflect(@"Each level of detail in its own colour.")]
     pub tint_levels: bool,
+    /// Whether the depth of crosses is drawn before their light, so that each pixel is shaded once: the same image, in less
+    /// time where crosses hide each other. Nothing changes with several samples a pixel, where it would take longer.
+    #[reflect(@"Depth of crosses before their light, without MSAA: the same image, in less time.")]
+    pub depth_first: bool,
+}
+
+impl Default for ViewOptions {
+    fn default() -> Self {
+        Self { tint_levels: false, depth_first: true }
+    }
 }
 
 /// An ordinary Bevy mesh that casts its shadow onto Canopy's trees and ground.
@@ -245,9 +272,10 @@ impl Plugin for ComponentsPlugin {
         ))
         .register_type::<(CanopyCamera, CanopyOrigin, SunShadowSettings, ViewOptions, CastsCanopyShadow)>()
         .register_type::<(Forest, Ground, TreeLists)>()
-        .register_type::<LightUpdates>()
+        .register_type::<(LightUpdates, ForestUpdates)>()
         .init_resource::<CanopyOrigin>()
         .init_resource::<LightUpdates>()
+        .init_resource::<ForestUpdates>()
         .init_resource::<TreeLists>();
     }
 }

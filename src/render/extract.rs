@@ -24,7 +24,8 @@ use bevy::{
 use glam::{DVec3, Quat, Vec3};
 
 use super::components::{
-    CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, Ground, LightUpdates, SunShadowSettings, TreeLists,
+    CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, ForestUpdates, Ground, LightUpdates,
+    SunShadowSettings, TreeLists,
 };
 
 /// The data of the main world for a frame.
@@ -40,6 +41,8 @@ pub struct ExtractedScene {
     pub daylight: Option<Daylight>,
     /// When what follows from the light is computed.
     pub light_updates: LightUpdates,
+    /// When forests are brought onto the device.
+    pub forest_updates: ForestUpdates,
     /// Meshes that cast onto Canopy's passes, with their transform in the Bevy world.
     pub casters: Vec<(AssetId<Mesh>, Affine3A)>,
     /// How often each mesh was changed.
@@ -64,9 +67,10 @@ pub fn extract_scene(
     grounds: Extract<Query<(Entity, &Ground, Placed)>>,
     casters: Extract<Query<(Entity, &Mesh3d, &GlobalTransform), With<CastsCanopyShadow>>>,
     mut changes: Extract<MessageReader<AssetEvent<Mesh>>>,
-    (daylight, light_updates, tree_lists): (
+    (daylight, light_updates, forest_updates, tree_lists): (
         Extract<Option<Res<Daylight>>>,
         Extract<Option<Res<LightUpdates>>>,
+        Extract<Option<Res<ForestUpdates>>>,
         Extract<Option<Res<TreeLists>>>,
     ),
     shadows: Extract<Query<(Entity, &SunShadowSettings)>>,
@@ -98,6 +102,7 @@ pub fn extract_scene(
     scene.daylight = daylight.as_deref().cloned();
     scene.tree_lists = tree_lists.as_deref().copied().unwrap_or_default();
     scene.light_updates = light_updates.as_deref().copied().unwrap_or_default();
+    scene.forest_updates = forest_updates.as_deref().copied().unwrap_or_default();
     let mut meshes: Vec<_> = casters.iter().collect();
     meshes.sort_by_key(|(entity, ..)| *entity);
     for event in changes.read() {

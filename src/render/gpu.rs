@@ -152,46 +152,59 @@ pub fn levels_down_to(mips: &MipView, smallest: u32) -> usize {
     wanted.min(mips.levels.len().max(1))
 }
 
-/// A texture array of RGBA8 layers with their mip chains down to `smallest` texels; all chains have the size of the
-/// first.
-pub fn texture_array(
+/// An array of `layers` RGBA8 layers with room for mip chains of the size of `first`, down to `smallest` texels.
+pub fn empty_texture_array(
     device: &RenderDevice,
-    queue: &RenderQueue,
     label: &str,
     format: TextureFormat,
-    layers: &[MipView],
+    layers: usize,
+    first: Option<&MipView>,
     smallest: u32,
-) -> (Texture, TextureView) {
-    let (width, height, levels) = layers
-        .first()
-        .map_or((1, 1, 1), |mips| (mips.width.max(1), mips.height.max(1), levels_down_to(mips, smallest)));
-    let texture = device.create_texture(&TextureDescriptor {
+) -> Texture {
+    let (width, height, levels) =
+        first.map_or((1, 1, 1), |mips| (mips.width.max(1), mips.height.max(1), levels_down_to(mips, smallest)));
+    device.create_texture(&TextureDescriptor {
         label: Some(label),
-        size: Extent3d { width, height, depth_or_array_layers: layers.len().max(1) as u32 },
+        size: Extent3d { width, height, depth_or_array_layers: layers.max(1) as u32 },
         mip_level_count: levels as u32,
         sample_count: 1,
         dimension: TextureDimension::D2,
         format,
         usage: TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST,
         view_formats: &[],
-    });
-    for (layer, mips) in layers.iter().enumerate() {
-        write_layer(queue, &texture, layer as u32, mips);
-    }
-    let view = texture
-        .create_view(&TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..Default::default() });
-    (texture, view)
+    })
+}
+
+/// Width and height of a texture's `level` in texels.
+pub fn level_size(texture: &Texture, level: u32) -> (u32, u32) {
+    ((texture.width() >> level).max(1), (texture.height() >> level).max(1))
 }
 
 /// Writes all levels that an RGBA8 `texture` has of `mips` into one of its layers; levels of another size are skipped.
 pub fn write_layer(queue: &RenderQueue, texture: &Texture, layer: u32, mips: &MipView) {
-    let (width, height) = (texture.width(), texture.height());
     for (level, texels) in (0..texture.mip_level_count()).zip(&mips.levels) {
-        let (level_width, level_height) = ((width >> level).max(1), (height >> level).max(1));
-        if texels.len() == (level_width * level_height * 4) as usize {
-            write_level(queue, texture, layer, level, level_width, level_height, 4, texels);
+        let (width, height) = level_size(texture, level);
+        if texels.len() == (width * height * 4) as usize {
+            write_rows(queue, texture, layer, level, 0, texels);
         }
     }
+}
+
+/// Writes whole rows of a level of an RGBA8 `texture`, from the row `top` downwards.
+pub fn write_rows(queue: &RenderQueue, texture: &Texture, layer: u32, level: u32, top: u32, texels: &[u8]) {
+    let (width, _) = level_size(texture, level);
+    let height = (texels.len() / (width as usize * 4)) as u32;
+    queue.write_texture(
+        TexelCopyTextureInfo {
+            texture,
+            mip_level: level,
+            origin: Origin3d { x: 0, y: top, z: layer },
+            aspect: TextureAspect::All,
+        },
+        texels,
+        TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(width * 4), rows_per_image: Some(height) },
+        Extent3d { width, height, depth_or_array_layers: 1 },
+    );
 }
 
 /// A plain texture with one mip chain down to `smallest` texels.
@@ -203,7 +216,8 @@ pub fn texture(
     mips: MipView,
     smallest: u32,
 ) -> TextureView {
-    let (texture, _) = texture_array(device, queue, label, format, &[mips], smallest);
+    let texture = empty_texture_array(device, label, format, 1, Some(&mips), smallest);
+    write_layer(queue, &texture, 0, &mips);
     texture.create_view(&TextureViewDescriptor { dimension: Some(TextureViewDimension::D2), ..Default::default() })
 }
 

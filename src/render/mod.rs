@@ -21,6 +21,7 @@ pub mod bindings;
 pub mod components;
 pub mod cull;
 pub mod diagnostics;
+pub mod exposure;
 pub mod extract;
 mod follow;
 pub mod forest;

@@ -18,7 +18,7 @@ use crate::{
     light::{atmosphere::SkyView, night, stand},
     lod,
     scatter::packed,
-    terrain::tiles,
+    terrain::{ground_noise, tiles},
 };
 
 /// A scalar of WGSL.
@@ -57,6 +57,14 @@ pub fn constants() -> Vec<(&'static str, &'static str, Value)> {
         ("STAND_COVERS", "Canopy covers of the table of light in a stand.", float(stand::COVERS)),
         ("STAND_DEPTHS", "Its depths in the crowns; one more row is the ground's.", float(stand::DEPTHS)),
         ("TILE_SIDE", "Vertices along a side of a terrain tile.", uint(tiles::TILE_QUADS + 1)),
+        (
+            "NOISE_OCTAVE_DEVIATION",
+            "Standard deviation of an octave of the ground's noise.",
+            ground_noise::OCTAVE_DEVIATION.into(),
+        ),
+        ("NOISE_WEIGHT_RATIO", "Weight of an octave relative to the one before.", ground_noise::WEIGHT_RATIO.into()),
+        ("LEAF_OCTAVE", "Octave in whose cells fallen leaves lie.", Value::Int(ground_noise::LEAF_OCTAVE)),
+        ("LEAF_SEED", "Their seed.", ground_noise::LEAF_SEED.into()),
         ("POSITION_STEPS", "Steps of a tree's position along a cell's side.", packed::POSITION_STEPS.into()),
         ("YAW_BITS", "Bits of a tree's yaw, the lowest of `look`.", packed::YAW_BITS.into()),
         ("YAWS", "Yaws that a tree can have.", uint(transfer::YAWS)),
@@ -100,6 +108,7 @@ pub fn constants() -> Vec<(&'static str, &'static str, Value)> {
         ("CASTER_VERTICES", "Vertices of a tree's cross as a caster.", forest::CROSS_CASTER_VERTICES.into()),
         ("ISOTROPIC_LEVELS", "Mips for which the isotropic fraction is known.", uint(cross::ISOTROPIC_LEVELS)),
         ("ISOTROPIC_VECTORS", "Vectors of four of them.", uint(cross::ISOTROPIC_LEVELS / 4)),
+        ("SUN_SCALE", "Scale of the crosses' sun textures: the value of 1.", cross::SUN_SCALE.into()),
         ("LIGHT_SCALE", "Scale of lighting textures: the value of 1.", cross::LIGHT_SCALE.into()),
         ("NORMAL_STEPS", "Steps of a packed normal on either side of 0.", packing::STEPS.into()),
         ("NORMAL_LEAST_LENGTH", "Its length where the ambient visibility is 0.", packing::LEAST_LENGTH.into()),

@@ -56,6 +56,18 @@ impl CoverMap {
 }
 
 impl CoverMap {
+    /// Fraction of the ground under crowns around a point (X, Z), 0 to 1, interpolated between the texels' middles; 0
+    /// outside the map.
+    pub fn smooth_at(&self, point: DVec2) -> f32 {
+        let at = (point - self.origin) / self.texel - 0.5;
+        let low = at.floor();
+        let f = (at - low).as_vec2();
+        let texel = |x: f64, z: f64| self.at(self.origin + (low + DVec2::new(x + 0.5, z + 0.5)) * self.texel);
+        let row = |z: f64| texel(0.0, z) * (1.0 - f.x) + texel(1.0, z) * f.x;
+        let value = row(0.0) * (1.0 - f.y) + row(1.0) * f.y;
+        if value.is_finite() { value } else { 0.0 }
+    }
+
     /// The map, blurred with the weights 1, 2, 1 along both axes and enlarged by a border of one texel, because the
     /// light of a point does not end at the edge of a texel.
     pub fn smoothed(&self) -> Self {

@@ -37,7 +37,10 @@ pub use inventory::{
 };
 pub use inventory_stand::{InventorySpecies, InventoryStand, InventoryWarnings, stand_from_inventory};
 pub use packed::{Cell, CellGrid, PackedStand, PackedTree, PlantSize};
-pub use placement::{Placement, PlacementReport, place_trees};
+pub use placement::{
+    FIRST_SURROUNDING_INDEX, Placement, PlacementReport, distance_beyond, place_surroundings, place_trees,
+    surroundings_density,
+};
 pub use rules::{ClearingNoise, PlacementRules, Sequence, SizeRule, SpeciesRule};
 pub use stand::{Area, Ground, MAX_COORDINATE_M, MAX_SCALE, MIN_SCALE, Stand, Tree};
 pub use stream::{Stream, random};

@@ -22,7 +22,7 @@ use super::ScatterError;
 use super::clearings::ClearingMask;
 use super::rules::{PlacementRules, Sequence, SpeciesRule};
 use super::spacing::SpacingGrid;
-use super::stand::{Ground, Stand, Tree, XzPlane, sink};
+use super::stand::{Area, Ground, Stand, Tree, XzPlane, sink};
 use super::stream::{Stream, random};
 use crate::math::{
     HaltonSequence, hammersley,
@@ -94,6 +94,103 @@ pub fn place_trees<G: Ground + ?Sized>(rules: &PlacementRules, ground: &G) -> Re
         stems_per_hectare: if allowed_hectares > 0.0 { trees.len() as f64 / allowed_hectares } else { 0.0 },
     };
     Ok(Placement { stand: Stand { trees }, report })
+}
+
+/// The first [`Tree::index`] of trees of the surroundings: below are those of the rules' own area.
+pub const FIRST_SURROUNDING_INDEX: u32 = 1 << 31;
+
+/// Fraction of the full density `distance` metres beyond a stand whose surroundings are `width` metres wide: 1 in the inner
+/// half, then smoothly falling to 0.
+pub fn surroundings_density(distance: f64, width: f64) -> f64 {
+    if distance <= 0.0 {
+        return 1.0;
+    }
+    let t = ((distance / width - 0.5) / 0.5).clamp(0.0, 1.0);
+    if t.is_nan() { 0.0 } else { 1.0 - t * t * (3.0 - 2.0 * t) }
+}
+
+/// Metres from `area` to a point (X, Z), along the axis on which it is farther; 0 inside.
+pub fn distance_beyond(area: &Area, point: DVec2) -> f64 {
+    (area.min - point).max(point - area.max).max(DVec2::ZERO).max_element()
+}
+
+/// The ground around an area.
+struct Around<'a, G: ?Sized> {
+    ground: &'a G,
+    inner: Area,
+    width: f64,
+    seed: u64,
+    clearings: Option<ClearingMask>,
+}
+
+impl<G: Ground + ?Sized> Ground for Around<'_, G> {
+    fn height(&self, x: f64, z: f64) -> f64 {
+        self.ground.height(x, z)
+    }
+
+    fn slope(&self, x: f64, z: f64) -> f32 {
+        self.ground.slope(x, z)
+    }
+
+    fn contains(&self, x: f64, z: f64) -> bool {
+        let point = DVec2::new(x, z);
+        let distance = distance_beyond(&self.inner, point);
+        if distance <= 0.0 {
+            return false;
+        }
+        let clearing = self.clearings.as_ref().map_or(1.0, |mask| mask.density(point));
+        let density = surroundings_density(distance, self.width) * clearing;
+        // Drawn by the position: a candidate that is tried again has the same lot.
+        density > 0.0 && unit_f64(self.seed, hash64(x.to_bits(), z.to_bits(), Stream::Edge), Stream::Thinning) < density
+    }
+}
+
+/// Places trees by `rules` within `width` metres around their area, beyond `stand`, which they have placed in it. They are
+/// as dense as in the area up to half of the width, and thin out to its end; clearings go on across the border. Nothing of
+/// the stand changes. The indices count from [`FIRST_SURROUNDING_INDEX`].
+///
+/// The ground must have heights there, whatever its [`Ground::contains`] says. A `width` of 0 places nothing.
+///
+/// # Errors
+/// Those of [`place_trees`] for the larger area.
+pub fn place_surroundings<G: Ground + ?Sized>(
+    rules: &PlacementRules,
+    stand: &Stand,
+    width: f64,
+    ground: &G,
+) -> Result<Stand, ScatterError> {
+    rules.validate()?;
+    if !(width.is_finite() && width > 0.0) {
+        return Ok(Stand::default());
+    }
+    let inner = rules.area;
+    let outer = Area { min: inner.min - width, max: inner.max + width };
+    let mask = rules.clearings.map(|noise| ClearingMask::new(&noise, inner, rules.seed));
+    let around = Around { ground, inner, width, seed: rules.seed, clearings: mask };
+    // Points of their own, not those of the area at another scale.
+    let seed = hash64(rules.seed, 0, Stream::Surroundings);
+    let placed = place_trees(&PlacementRules { area: outer, clearings: None, seed, ..rules.clone() }, &around)?;
+    let mut trees = placed.stand.trees;
+    if rules.min_distance_m > 0.0 {
+        // Those of the stand near the border come first.
+        let near = |tree: &&Tree| {
+            let point = tree.position.xz_plane();
+            (point - inner.min).min(inner.max - point).min_element() < rules.min_distance_m
+        };
+        let border: Vec<DVec2> = stand.trees.iter().filter(near).map(|tree| tree.position.xz_plane()).collect();
+        let mut grid = SpacingGrid::new(outer, rules.min_distance_m, border.len().max(1) as f64);
+        for point in border {
+            grid.insert(point);
+        }
+        trees.retain(|tree| {
+            let point = tree.position.xz_plane();
+            distance_beyond(&inner, point) >= rules.min_distance_m || grid.insert(point)
+        });
+    }
+    for tree in &mut trees {
+        tree.index |= FIRST_SURROUNDING_INDEX;
+    }
+    Ok(Stand { trees })
 }
 
 struct Placer<'a, G: ?Sized> {

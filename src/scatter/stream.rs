@@ -30,6 +30,8 @@ pub enum Stream {
     Edge = 10,
     /// Which trees go when there are too many.
     Thinning = 11,
+    /// Seed of the trees around an area.
+    Surroundings = 12,
 }
 
 impl From<Stream> for u64 {

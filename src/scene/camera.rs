@@ -13,13 +13,16 @@ pub struct Camera {
     pub start: Pose,
     /// The scripted flight, at least two keys in the order of time, or none. Default: none.
     pub path: Vec<PathKey>,
-    /// Vertical field of view in degrees, 5 to 120. Default 50.
+    /// Vertical field of view in degrees, 1 to 170. Default 50.
     pub field_of_view: f64,
+    /// Exposure value at ISO 100 that is kept everywhere and at all hours, -10 to 25: 14 is a sunny day, 10 the inside of a
+    /// wood. Default: it follows the light at the camera.
+    pub exposure: Option<f64>,
 }
 
 impl Default for Camera {
     fn default() -> Self {
-        Self { start: Pose::default(), path: Vec::new(), field_of_view: 50.0 }
+        Self { start: Pose::default(), path: Vec::new(), field_of_view: 50.0, exposure: None }
     }
 }
 
@@ -115,7 +118,10 @@ const LEAST_STEP: f64 = 0.000_999_9;
 impl Camera {
     pub(super) fn check(&self, check: &mut Check) {
         self.start.check("camera.start", check);
-        check.number("camera.field_of_view", self.field_of_view, 5.0..=120.0, "degrees");
+        check.number("camera.field_of_view", self.field_of_view, 1.0..=170.0, "degrees");
+        if let Some(exposure) = self.exposure {
+            check.number("camera.exposure", exposure, -10.0..=25.0, "EV");
+        }
         if self.path.len() == 1 {
             check.problem("camera.path", "has one key", "a path needs two keys or more; or leave `path` out");
         }

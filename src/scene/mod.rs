@@ -63,7 +63,7 @@ pub use locate::Position;
 pub use overrides::Overrides;
 pub use path::Path;
 pub use place::Place;
-pub use quality::Quality;
+pub use quality::{Quality, QualityLevel};
 pub use source::SceneSource;
 pub use species::{GltfPlants, GrownForm, GrownPlants, PlantSource, Species};
 pub use time::{LocalTime, TimeError, YEARS};

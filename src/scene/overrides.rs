@@ -9,6 +9,8 @@ pub struct Overrides {
     pub seed: Option<u64>,
     /// Samples per pixel, 1 or 4.
     pub msaa: Option<u32>,
+    /// Exposure value at ISO 100 to keep, -10 to 25.
+    pub exposure: Option<f64>,
     /// The lighting of all species. A species that already has this kind of lighting keeps its own values, except for
     /// how the sun lights it.
     #[reflect(ignore)]
@@ -26,6 +28,7 @@ impl Overrides {
     pub fn apply(&self, scene: &mut Scene) {
         scene.seed = self.seed.unwrap_or(scene.seed);
         scene.quality.msaa = self.msaa.unwrap_or(scene.quality.msaa);
+        scene.camera.exposure = self.exposure.or(scene.camera.exposure);
         let Some(lighting) = &self.lighting else { return };
         for species in &mut scene.species {
             let kind = |lighting: &Lighting| std::mem::discriminant(lighting);

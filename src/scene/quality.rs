@@ -6,13 +6,14 @@ use super::check::Check;
 use crate::lod::{FadeBand, Levels, MAX_LEVELS, Representation};
 
 /// The representations that a scene file can name.
-const REPRESENTATIONS: [Representation; 2] = [Representation::MODEL, Representation::CROSS];
+const REPRESENTATIONS: [Representation; 4] =
+    [Representation::MODEL, Representation::THINNED, Representation::CLOUD, Representation::CROSS];
 
 /// One level of detail in a scene file: `(draw: "model", until: 60, fade: 20)`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct QualityLevel {
-    /// Name of the representation: `"model"` or `"cross"`.
+    /// Name of the representation: `"model"`, `"thinned"`, `"cloud"` or `"cross"`.
     pub draw: String,
     /// Distance in metres at which it begins to give way to the next level, 0 to 200000. Without effect in the last
     /// level.
@@ -42,9 +43,7 @@ pub struct Quality {
     /// Distance in metres up to which the sun casts shadows, 10 to 20000. Higher: farther, coarser. Default 800.
     pub shadow_distance: f64,
     /// Distance in metres up to which trees are drawn as full models, 0 to 5000. Higher: truer, slower. Default 60.
-    /// Beyond are crosses, which are lit with constants of their own, set by eye (bulge, shadow of the own crown, bias)
-    /// and, with radiance transfer, the hot spot fitted to traced dense stands of oaks and of grown trees: the stands
-    /// that `docs/measurements/near-trees-against-ground-truth.md` judges crosses by.
+    /// Beyond are crosses.
     pub near_distance: f64,
     /// Width in metres of the band behind `near_distance` in which models fade into crosses, 0.1 to 1000.
     /// Wider: softer change, more trees drawn twice. Default 20.
@@ -126,7 +125,8 @@ impl Quality {
         for (index, level) in self.levels.iter().enumerate() {
             let place = |field: &str| format!("quality.levels[{index}].{field}");
             if !REPRESENTATIONS.iter().any(|known| known.name() == level.draw) {
-                let names = REPRESENTATIONS.map(|known| format!("\"{}\"", known.name())).join(" or ");
+                let [others @ .., last] = REPRESENTATIONS.map(|known| format!("\"{}\"", known.name()));
+                let names = format!("{} or {last}", others.join(", "));
                 check.problem(&place("draw"), format!("is \"{}\"", level.draw), format!("write {names}"));
             }
             if index + 1 == self.levels.len() {

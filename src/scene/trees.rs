@@ -45,6 +45,11 @@ pub struct ScatteredTrees {
     /// The wooded part of the terrain, `(west: ..., south: ..., east: ..., north: ...)` in metres from its centre, east
     /// and north positive. Default: all of it.
     pub area: Option<Area>,
+    /// Metres beyond the terrain's data over which the wood goes on by the same rules, 0 (it ends with the data) to 50000;
+    /// without effect where `area` says where it ends. In the outer half it thins out into ground that has the colour of
+    /// crowns. Default: 1000 in a scene, or less where that would be more than twice the trees of the data or farther than
+    /// `quality.view_distance`; 0 for a forest that a program spawns.
+    pub surroundings: Option<f64>,
     /// Treeless patches where smooth noise is high: `(wavelength: 400, share: 0.1, edge: 0.15)`. Default: none.
     pub clearings: Option<ClearingNoise>,
 }
@@ -58,6 +63,7 @@ impl Default for ScatteredTrees {
             slope_limit: 50.0,
             elevation: None,
             area: None,
+            surroundings: None,
             clearings: None,
         }
     }
@@ -195,6 +201,9 @@ impl ScatteredTrees {
         }
         if let Some(area) = self.area {
             check_area(&area, check);
+        }
+        if let Some(surroundings) = self.surroundings {
+            check.number("trees.surroundings", surroundings, 0.0..=50_000.0, "m");
         }
         if let Some(clearings) = self.clearings {
             check.number("trees.clearings.wavelength", clearings.wavelength_m, 1.0..=100_000.0, "m");

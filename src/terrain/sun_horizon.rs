@@ -51,6 +51,24 @@ pub struct HorizonGrid {
 /// # Errors
 /// A grid without cells or of more than [`MAX_SAMPLES`].
 pub fn sun_horizon(terrain: &Terrain, grid: &HorizonGrid, sun: DVec3) -> Result<Vec<f32>, TerrainError> {
+    sun_horizon_over(terrain, terrain.extent(), grid, sun)
+}
+
+/// As [`sun_horizon`], with the grid over `extent` metres around the field's centre instead of the field: its surroundings
+/// included, or a part of it.
+///
+/// # Errors
+/// Those of [`sun_horizon`], and an extent that is not above 0 and finite.
+pub fn sun_horizon_over(
+    terrain: &Terrain,
+    extent: DVec2,
+    grid: &HorizonGrid,
+    sun: DVec3,
+) -> Result<Vec<f32>, TerrainError> {
+    if !(extent.is_finite() && extent.min_element() > 0.0) {
+        let value = extent.min_element();
+        return Err(TerrainError::BadParameter { name: "the extent of the horizons", value, range: "above 0 m" });
+    }
     let HorizonGrid { columns, rows, .. } = *grid;
     if columns == 0 || rows == 0 {
         return Err(TerrainError::TooSmall { columns, rows });
@@ -58,7 +76,7 @@ pub fn sun_horizon(terrain: &Terrain, grid: &HorizonGrid, sun: DVec3) -> Result<
     if columns.checked_mul(rows).is_none_or(|count| count > MAX_SAMPLES) {
         return Err(TerrainError::TooLarge { columns, rows, limit: MAX_SAMPLES });
     }
-    let sweep = Sweep::new(terrain, grid, sun);
+    let sweep = Sweep::new(terrain, extent, grid, sun);
     let lines: Vec<Vec<f32>> = (0..sweep.lines).into_par_iter().map(|line| sweep.line(terrain, line)).collect();
     let mut horizon = vec![0.0; columns * rows];
     horizon.par_chunks_mut(columns).enumerate().for_each(|(row, cells)| {
@@ -94,7 +112,7 @@ struct Sweep {
 }
 
 impl Sweep {
-    fn new(terrain: &Terrain, grid: &HorizonGrid, sun: DVec3) -> Self {
+    fn new(terrain: &Terrain, extent: DVec2, grid: &HorizonGrid, sun: DVec3) -> Self {
         let sun = if sun.is_finite() { sun.normalize_or(DVec3::Y) } else { DVec3::Y };
         let flat = DVec2::new(sun.x, sun.z);
         let tangent = if flat.length() > 1.0e-6 {
@@ -105,7 +123,6 @@ impl Sweep {
             TANGENTS.0
         };
         let azimuth = flat.normalize_or(DVec2::X);
-        let extent = terrain.extent();
         let cell = extent / DVec2::new(grid.columns as f64, grid.rows as f64);
         let in_cells = azimuth / cell;
         let along_x = in_cells.x.abs() >= in_cells.y.abs();

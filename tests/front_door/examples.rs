@@ -25,6 +25,10 @@ mod forest_in_code;
 #[path = "../../examples/clock.rs"]
 mod clock;
 
+#[expect(dead_code, reason = "its file")]
+#[path = "../../examples/headless.rs"]
+mod headless;
+
 #[expect(dead_code, reason = "its window")]
 #[path = "../../examples/meshes.rs"]
 mod meshes;
@@ -102,6 +106,25 @@ fn two_forests_are_both_drawn() {
     renderer.app().world_mut().despawn(ready[1].0);
     assert_eq!(drawn(&mut renderer, &view), 0);
     assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+#[test]
+fn a_program_without_a_window_draws_a_whole_image() {
+    let gpu = gpu();
+    let size = UVec2::new(192, 108);
+    let image = headless::draw("assets/scenes/inventory.ron", size).expect("an image");
+    let again = headless::draw("assets/scenes/inventory.ron", size).expect("an image");
+    assert!(image == again, "two images differ");
+    // The sky is bright and blue, the trees below it are not.
+    let mean = |rows: std::ops::Range<u32>| {
+        let pixels = rows.clone().flat_map(|y| (0..size.x).map(move |x| (x, y)));
+        let sum = pixels.fold(Vec3::ZERO, |sum, (x, y)| sum + Vec3::from(image.get_pixel(x, y).0.map(f32::from)));
+        sum / (rows.len() as f32 * size.x as f32)
+    };
+    let (sky, ground) = (mean(0..10), mean(80..108));
+    assert!(sky.z > sky.x && sky.z > 100.0 && ground.z < 0.7 * sky.z, "{sky} over {ground}");
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+    assert!(headless::draw("assets/scenes/absent.ron", size).is_err());
 }
 
 /// Runs the example until its scene is shown.

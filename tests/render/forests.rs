@@ -67,7 +67,7 @@ fn a_forest_without_trees_or_plants_draws_nothing_and_is_no_error_of_the_device(
 }
 
 /// Buffers, textures and bind groups that the program holds. Views and samplers are held by bind groups.
-fn objects(renderer: &mut Renderer) -> [usize; 3] {
+pub(super) fn objects(renderer: &mut Renderer) -> [usize; 3] {
     let instance = renderer.app().sub_app(RenderApp).world().resource::<RenderInstance>();
     let report = instance.generate_report().expect("a report of a native device");
     let hub = report.hub_report();
@@ -82,7 +82,7 @@ fn forests_that_come_and_go_leave_nothing_on_the_device() {
     let from = view(stage, (0.0, 10.0, 60.0), 0.0, -5.0);
     let mut renderer = bare(stage);
     let (mut counts, mut most) = (Vec::new(), [0; 3]);
-    for _ in 0..30 {
+    for _ in 0..100 {
         renderer.app().world_mut().spawn(stage.forest().expect("a forest"));
         draw(&mut renderer, stage, &from, NOON);
         most = objects(&mut renderer);

@@ -7,18 +7,23 @@ use bevy::{
     render::{RenderApp, renderer::RenderDevice},
 };
 use canopy::{
-    app::{RenderedImage, Renderer},
-    bake::{BakedLevel, BakedPlant},
+    app::{RenderedImage, Renderer, Side, Studio},
+    bake::{
+        BakeSettings, BakedLevel, BakedPlant, bake_plant,
+        levels::cloud::CloudSettings,
+        lighting::{LightingSettings, transfer::TransferSettings},
+    },
+    plant::grow::{GrowParameters, grow},
     prelude::*,
     render::forest::{ForestStatistics, LevelStatistics},
 };
 use glam::{DVec2, DVec3};
 
-use super::{NOON, SIZE, draw, renderer};
+use super::{NOON, SIZE, draw, renderer, showing};
 use crate::support::{
     gpu::gpu,
-    image::keep,
-    stage::{project, trees_at, view},
+    image::{difference, keep},
+    stage::{grove, project, trees_at, trees_of_quality, view},
 };
 
 #[expect(dead_code, reason = "the example's own program opens a window")]
@@ -151,10 +156,96 @@ fn more_crosses_than_a_texture_array_holds_are_refused_with_the_number_that_fits
     }
     draw(&mut renderer, stage, &from, NOON);
     let told = gpu.messages();
-    let remedy = format!("at most {} plants", limit / 3);
+    let remedy = format!("at most {} plants", limit / 6);
     assert!(told.len() == 1 && told[0].contains("texture layers") && told[0].contains(&remedy), "{told:?}");
     // A scene is refused before it is shown.
     let crowded = Stage { plants, ..built.stage };
     let refused = crowded.check_device(renderer.app().world().resource::<RenderDevice>());
-    assert!(refused.is_err_and(|error| error.to_string().contains(&format!("at most {}", limit / 3))));
+    assert!(refused.is_err_and(|error| error.to_string().contains(&format!("at most {}", limit / 6))));
+}
+
+/// Billboard clouds and simplified models against the full model, isolated, in the same light.
+#[test]
+fn clouds_and_simplified_models_cover_and_shine_about_as_the_full_model_does() {
+    const ALL: &[Representation] = &[Representation::MODEL, Representation::THINNED, Representation::CLOUD];
+    let _gpu = gpu();
+    let plant = Arc::new(grow(&GrowParameters::broadleaf(), 1, 6000).expect("a shipped species grows"));
+    let transfer = LightingSettings::Transfer(TransferSettings { rays: 64, ..TransferSettings::default() });
+    for lighting in [LightingSettings::Local, transfer] {
+        let settings = BakeSettings {
+            representations: ALL,
+            lighting,
+            cloud: CloudSettings { planes: 60, resolution: 512, supersampling: 2, ..CloudSettings::default() },
+            ..BakeSettings::default()
+        };
+        let (baked, _) = bake_plant(plant.clone(), &settings, None);
+        let mut studio = Studio::new(baked, 128, None, 4).expect("a renderer");
+        studio.show(None).expect("nothing");
+        let empty = studio.cutout(Side::South, &Sun::default(), 1.0).expect("an image");
+        assert!(empty.area() < 1.0, "{} pixels of nothing are covered", empty.area());
+        for side in [Side::West, Side::Above] {
+            let mut image = |level| {
+                studio.show(Some(level)).expect("a tree");
+                studio.cutout(side, &Sun::default(), 1.0).expect("an image")
+            };
+            let truth = image(Representation::MODEL);
+            assert!(truth.area() > 1000.0 && truth.mean_luminance() > 0.01);
+            for level in [Representation::THINNED, Representation::CLOUD] {
+                let error = image(level).error(&truth);
+                let near = |ratio: f64, most: f64| (ratio - 1.0).abs() < most;
+                assert!(near(error.coverage, 0.15) && near(error.luminance, 0.35), "{level:?} {side:?}: {error:?}");
+                assert!(error.rmse > 0.0, "{level:?} is the model itself");
+            }
+        }
+    }
+}
+
+/// A scene that names the levels draws them, with their bakes, and they cast a shadow.
+#[test]
+fn a_scene_names_the_levels_between_model_and_crosses() {
+    let _gpu = gpu();
+    let quality = "quality: (levels: [(draw: \"model\", until: 20, fade: 5), (draw: \"thinned\", until: 40, fade: 5), (draw: \
+                   \"cloud\", until: 60, fade: 5), (draw: \"cross\", until: 80, fade: 5)], msaa: 1)";
+    // Distances from the camera: 10, 30, 50 and 80 m.
+    let places = [DVec2::new(-3.0, 50.0), DVec2::new(3.0, 30.0), DVec2::new(-6.0, 10.0), DVec2::new(8.0, -20.0)];
+    let stage = trees_of_quality(&places, quality).stage;
+    let levels = stage.scene.quality.lod_levels();
+    let names: Vec<&str> = levels.representations().iter().map(|level| level.name()).collect();
+    assert_eq!(names, ["model", "thinned", "cloud", "cross"]);
+    let mut drawn = renderer(1);
+    drawn.show(&stage);
+    let picture = draw(&mut drawn, &stage, &view(&stage, (0.0, 6.0, 60.0), 0.0, -3.0), NOON);
+    let trees = |name: &str| -> usize {
+        let levels = statistics(&mut drawn);
+        levels.iter().filter(|level| level.representation.name() == name).map(|level| level.trees).sum()
+    };
+    let counts = ["model", "thinned", "cloud", "cross"].map(trees);
+    keep(&picture, "levels-between");
+    assert_eq!(counts, [1, 1, 1, 1]);
+}
+
+#[test]
+fn crosses_whose_depth_is_drawn_first_look_the_same() {
+    let gpu = gpu();
+    for samples in [1, 4] {
+        let built = grove(samples);
+        let from = view(&built.stage, (0.0, 10.0, 60.0), 0.0, -5.0);
+        let mut renderer = showing(&built.stage);
+        let world = renderer.app().world_mut();
+        for mut forest in world.query::<&mut Forest>().iter_mut(world) {
+            forest.levels = Levels::only(Representation::CROSS);
+        }
+        let mut drawn = |depth_first: bool| {
+            let world = renderer.app().world_mut();
+            let mut views = world.query::<&mut ViewOptions>();
+            views.iter_mut(world).for_each(|mut options| options.depth_first = depth_first);
+            draw(&mut renderer, &built.stage, &from, NOON)
+        };
+        let (first, at_once) = (drawn(true), drawn(false));
+        assert!(first == at_once, "{samples} samples: mean FLIP {}", difference(&first, &at_once));
+        // It is no accident: there are trees.
+        let statistics = statistics(&mut renderer);
+        assert!(statistics.iter().any(|level| level.trees > 50), "{statistics:?}");
+    }
+    assert_eq!(gpu.messages(), Vec::<String>::new());
 }

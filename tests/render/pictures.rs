@@ -14,6 +14,7 @@ use crate::support::{
     glb::TreeFile,
     gpu::gpu,
     image::{SAME, compare, difference, keep, luminance, mean_color},
+    program::{command, said},
     stage::{BROADLEAF, PLACE, build, grove, instant, project, quality, trees_at, view},
 };
 
@@ -175,6 +176,31 @@ fn crosses_have_the_light_of_their_models() {
         let [same, other] = [&crosses, &night].map(|picture| light(picture) / light(&models));
         assert!((0.85..1.15).contains(&same), "{at}: {same} of the models' light");
         assert!(!(0.85..1.15).contains(&other), "{at}: {other} of the models' light at night");
+    }
+}
+
+#[test]
+fn an_image_has_the_same_bytes_with_any_number_of_threads() {
+    let _gpu = gpu();
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let scene = folder.path().join("scene.ron");
+    let text = format!(
+        "(terrain: Noise(size: 200, amplitude: 6, seed: 3), {PLACE}, {}, trees: Scattered(stems_per_hectare: 110), \
+         species: [{BROADLEAF}])",
+        quality(1)
+    );
+    std::fs::write(&scene, text).expect("a temporary file");
+    let drawn = |threads: &str| {
+        let out = folder.path().join(format!("{threads}.png"));
+        let mut render = command(&["render", "--size", "96x54", "--quiet"]);
+        render.env("RAYON_NUM_THREADS", threads).env("LP_NUM_THREADS", threads).arg(&scene).arg("--out").arg(&out);
+        let output = render.output().expect("the program");
+        assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+        std::fs::read(out).expect("an image")
+    };
+    let one = drawn("1");
+    for threads in ["2", "5"] {
+        assert!(drawn(threads) == one, "{threads} threads draw another image");
     }
 }
 

@@ -65,7 +65,7 @@ fn local(plant: &Plant) -> BakedPlant {
 /// `plant` with another light.
 fn lit(plant: &Plant, lighting: ExpressiveLighting) -> BakedPlant {
     let lighting = BakedLighting::Expressive(lighting);
-    let cross = BakedLevel::Cross(Arc::new(bake_cross(plant, &lighting, &CrossSettings::default())));
+    let cross = BakedLevel::Cross(Arc::new(bake_cross(&Arc::new(plant.clone()), &lighting, &CrossSettings::default())));
     BakedPlant { lighting: Arc::new(lighting), ..local(plant) }.with_level(cross)
 }
 
@@ -103,7 +103,7 @@ fn drawn(plant: BakedPlant, ground: Option<Ground>, fade: f32, above: bool, hour
     if let Some(ground) = ground {
         world.spawn(ground);
     }
-    renderer.set_sun(Sun { instant: instant(hour), ..Sun::default() });
+    renderer.set_sun(Sun { instant: instant(hour), fixed_ev100: Some(14.0), ..Sun::default() });
     renderer.set_shadow(SunShadowSettings { cascades: 0, ..SunShadowSettings::default() });
     again(&mut renderer);
     let picture = again(&mut renderer);
@@ -209,7 +209,7 @@ fn plain(covered: bool) -> Ground {
     let terrain = Arc::new(Terrain::new(field, None, Surroundings::Border));
     let cover = vec![if covered { 255 } else { 0 }; 64 * 64];
     let cover = CoverMap { origin: DVec2::splat(-128.0), texel: 4.0, columns: 64, rows: 64, cover };
-    Ground { terrain, cover: Some(Arc::new(cover)), error_pixels: 1.0, view_distance: 1e3 }
+    Ground { terrain, cover: Some(Arc::new(cover)), surroundings: 0.0, error_pixels: 1.0, view_distance: 1e3 }
 }
 
 /// What is in the common field of trees that are lit together was once counted again, by the cover around each of them.

@@ -294,7 +294,6 @@ fn a_scene_moves_with_its_ground() {
     let _gpu = gpu();
     let built = grove(1);
     let stage = &built.stage;
-    // The ground's noise repeats after 1,024 m, so that the image is the same there.
     let seen = |offset: DVec3| {
         let mut renderer = super::renderer(1);
         renderer.set_instant(stage, instant(NOON));

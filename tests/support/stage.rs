@@ -85,8 +85,8 @@ pub fn grove(msaa: u32) -> Built {
     build(
         &format!(
             "(name: \"grove\", seed: 7, terrain: Noise(size: 200, amplitude: 6, wavelength: 120, base: 300, seed: 3), \
-             species: [{BROADLEAF}], trees: Scattered(stems_per_hectare: 110, min_distance: 3, clearings: \
-             (wavelength: 90, share: 0.25)), {PLACE}, {quality})"
+             species: [{BROADLEAF}], trees: Scattered(stems_per_hectare: 110, min_distance: 3, surroundings: 0, \
+             clearings: (wavelength: 90, share: 0.25)), {PLACE}, {quality})"
         ),
         &[],
     )
@@ -94,7 +94,11 @@ pub fn grove(msaa: u32) -> Built {
 
 /// Trees at these places (metres east and south of the middle) on a plane of 200 m.
 pub fn trees_at(places: &[DVec2], msaa: u32) -> Built {
-    let quality = quality(msaa);
+    trees_of_quality(places, &quality(msaa))
+}
+
+/// The same with a `quality: (...)` of their own.
+pub fn trees_of_quality(places: &[DVec2], quality: &str) -> Built {
     let mut table = "x_m,y_m,height_m\n".to_owned();
     for place in places {
         table.push_str(&format!("{},{},11\n", place.x, -place.y));

@@ -26,9 +26,12 @@ mod window;
 use std::sync::Arc;
 
 use bevy::{
-    app::{App, AppExit, PluginGroup, PostUpdate, PreUpdate, Startup, Update},
+    app::{App, AppExit, PluginGroup, PostUpdate, PreUpdate, Startup, TerminalCtrlCHandlerPlugin, Update},
     asset::AssetEventSystems,
-    ecs::schedule::{IntoScheduleConfigs, common_conditions::resource_exists},
+    ecs::{
+        message::MessageWriter,
+        schedule::{IntoScheduleConfigs, common_conditions::resource_exists},
+    },
     log::{Level, LogPlugin},
     prelude::DefaultPlugins,
     render::{
@@ -39,21 +42,19 @@ use bevy::{
 };
 use bevy_egui::{EguiPlugin, EguiPostUpdateSet, EguiPreUpdateSet, EguiPrimaryContextPass};
 
-use super::{FlyOptions, adapter, error::AppError};
+use super::{FlyOptions, adapter, error::AppError, interrupt};
 use crate::{plugin::CanopyPlugins, progress::Progress};
 use loading::{Ending, Request, Terminal};
 use session::Session;
 use tour::Tour;
-
-/// Exit code of an app that the user interrupted with Ctrl-C (Bevy's `TerminalCtrlCHandlerPlugin`).
-const INTERRUPTED: u8 = 130;
 
 /// Opens a window and flies until the user quits. Blocks; must be called on the program's main thread. `progress` hears
 /// of the scene's build.
 ///
 /// # Errors
 /// [`AppError`] if the scene cannot be used, if there is no display or no graphics adapter, or if the device fails
-/// during the flight; [`AppError::Interrupted`] after Ctrl-C. What can be known of it is checked before the window opens.
+/// during the flight; [`AppError::Interrupted`] after an interrupt, if the program listens to them
+/// ([`listen_to_interrupts`](super::listen_to_interrupts)). What can be known of it is checked before the window opens.
 pub fn fly(options: &FlyOptions, progress: impl Progress + 'static) -> Result<(), AppError> {
     display::check()?;
     let settings = adapter::settings(options.adapter.as_deref())?;
@@ -67,7 +68,7 @@ pub fn fly(options: &FlyOptions, progress: impl Progress + 'static) -> Result<()
     match (ending.take(), exit) {
         (Some(error), _) => Err(error),
         (None, AppExit::Success) => Ok(()),
-        (None, AppExit::Error(code)) if code.get() == INTERRUPTED => {
+        (None, AppExit::Error(_)) if interrupt::received().is_some() => {
             Err(AppError::Interrupted("the flight was ended".to_owned()))
         }
         (None, AppExit::Error(_)) => {
@@ -95,7 +96,9 @@ fn build(request: Request, terminal: Terminal, settings: WgpuSettings) -> App {
                 render_creation: RenderCreation::Automatic(Box::new(settings)),
                 ..RenderPlugin::default()
             })
-            .set(LogPlugin { level: Level::WARN, filter, ..LogPlugin::default() }),
+            .set(LogPlugin { level: Level::WARN, filter, ..LogPlugin::default() })
+            // The program has its own handler, which knows the request to terminate too.
+            .disable::<TerminalCtrlCHandlerPlugin>(),
     );
     if request.options.explain {
         app.add_systems(Update, explain::explain.after(window::follow).run_if(resource_exists::<Session>));
@@ -110,6 +113,7 @@ fn build(request: Request, terminal: Terminal, settings: WgpuSettings) -> App {
         .add_systems(
             Update,
             (
+                end_when_interrupted,
                 loading::report,
                 window::capture_mouse,
                 window::handle_keys,
@@ -125,4 +129,11 @@ fn build(request: Request, terminal: Terminal, settings: WgpuSettings) -> App {
     // Glyphs that the overlay shows for the first time must be uploaded in the same frame.
     app.configure_sets(PostUpdate, AssetEventSystems.after(EguiPostUpdateSet::PostProcessOutput));
     app
+}
+
+/// Ends the app when an interrupt has arrived.
+fn end_when_interrupted(mut exit: MessageWriter<AppExit>) {
+    if let Some(interrupt) = interrupt::received() {
+        exit.write(AppExit::from_code(interrupt.exit_code()));
+    }
 }

@@ -9,13 +9,18 @@ use super::{
 };
 use crate::{
     app::AppError,
-    assets::{ground::build_terrain, plants, stage::observer, trees::StandPlan},
+    assets::{
+        ground::build_terrain,
+        plants,
+        stage::observer,
+        trees::{StandPlan, WoodBeyond},
+    },
     bake::plant_size,
     light::sun::{Observer, SunPosition},
     math::digits::grouped,
     plant::{PartKind, Plant, grow::GrowParameters},
     progress::Progress,
-    scatter::{InventoryOptions, PlantSize, Stand, read_inventory},
+    scatter::{FIRST_SURROUNDING_INDEX, InventoryOptions, PlantSize, Stand, read_inventory},
     scene::{self, PlantSource, Scene, Species, Trees},
     terrain::Terrain,
 };
@@ -64,7 +69,10 @@ fn describe(page: &mut Page, scene: &Scene, path: &Path) -> Result<(), AppError>
         individuals.push(plant);
     }
     let sizes: Vec<PlantSize> = individuals.iter().map(plant_size).collect();
-    let stand = StandPlan::new(scene, &ground)?.build(&plan, &sizes, &mut heard)?;
+    let mut planned = StandPlan::new(scene, &ground, WoodBeyond::Grows)?;
+    planned.fit_surroundings(None);
+    let surroundings = planned.surroundings();
+    let stand = planned.build(&plan, &sizes, &mut heard)?;
 
     page.title(format!("{}: a scene", path.display()));
     page.inset(|page| {
@@ -74,7 +82,7 @@ fn describe(page: &mut Page, scene: &Scene, path: &Path) -> Result<(), AppError>
         for (species, variants) in scene.species.iter().zip(&plan.variants) {
             describe_species(page, species, variants, &individuals);
         }
-        describe_trees(page, scene, &plan.variants, &stand, &heard.notes)?;
+        describe_trees(page, scene, &plan.variants, (&stand, surroundings), &heard.notes)?;
         describe_place(page, scene, &observer)?;
         describe_camera(page, scene);
         describe_quality(page, scene);
@@ -158,9 +166,11 @@ fn describe_trees(
     page: &mut Page,
     scene: &Scene,
     variants: &[Range<u16>],
-    stand: &Stand,
+    (stand, surroundings): (&Stand, f64),
     notes: &[String],
 ) -> Result<(), AppError> {
+    let beyond = stand.trees.iter().filter(|tree| tree.index >= FIRST_SURROUNDING_INDEX).count();
+    let inside = stand.trees.len() - beyond;
     match &scene.trees {
         Trees::None => {
             page.row("trees", "none");
@@ -170,7 +180,7 @@ fn describe_trees(
             "trees",
             format!(
                 "{} scattered by {:?}: {} stems per hectare requested, at least {} apart",
-                grouped(stand.trees.len()),
+                grouped(inside),
                 rules.sequence,
                 rules.stems_per_hectare,
                 length(rules.min_distance)
@@ -181,6 +191,12 @@ fn describe_trees(
         }
     }
     page.inset(|page| {
+        if surroundings > 0.0 {
+            page.row(
+                "around them",
+                format!("{} more, to {} beyond the terrain's data", grouped(beyond), length(surroundings)),
+            );
+        }
         for note in notes {
             page.row("density", note);
         }

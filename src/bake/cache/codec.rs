@@ -26,7 +26,7 @@ use crate::bake::lighting::BakedLighting;
 use crate::plant::Plant;
 
 /// Version of the format *and* of the bakes: to be raised whenever either gives other bytes for the same input.
-pub(super) const VERSION: u32 = 15;
+pub(super) const VERSION: u32 = 17;
 
 const MAGIC: [u8; 8] = *b"CANOPYBK";
 const HEAD: usize = 52;
@@ -100,6 +100,7 @@ mod tests {
     use glam::{Vec2, Vec3};
 
     use super::*;
+    use crate::bake::levels::DEFAULT;
     use crate::bake::levels::cross::{Cross, CrossPlane, CrossTextures};
     use crate::bake::lighting::ExpressiveLighting;
     use crate::bake::lighting::TransferLighting;
@@ -132,7 +133,12 @@ mod tests {
                 BakedLevel::ShadowProxy(Arc::new(vec![mesh])),
                 BakedLevel::Cross(Arc::new(Cross {
                     planes: vec![plane],
-                    textures: CrossTextures { color: vec![chain.clone()], properties: vec![chain], light: Vec::new() },
+                    textures: CrossTextures {
+                        color: vec![chain.clone()],
+                        properties: vec![chain.clone()],
+                        sun: vec![chain.clone(), chain],
+                        light: Vec::new(),
+                    },
                     transmission: Vec3::new(0.1, 0.2, 0.3),
                     isotropic_fraction: [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 1.0],
                 })),
@@ -141,7 +147,7 @@ mod tests {
         }
     }
 
-    const KEY: CacheKey = CacheKey { hash: [7; 32], representations: BAKED };
+    const KEY: CacheKey = CacheKey { hash: [7; 32], representations: DEFAULT };
 
     /// The same with radiance transfer.
     fn transferred() -> BakedPlant {

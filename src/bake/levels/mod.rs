@@ -3,21 +3,28 @@
 //! | module | makes | after |
 //! |---|---|---|
 //! | [`cross`] | crossed billboards with colour, normal, ambient term | [Franzke 2005, 4.3] |
-//! | [`shadow_proxy`] | a lighter model with the same projected area | [Cook et al. 2007] |
-//! | [`rasterize`] | which triangle each sample of an image shows; used by both | |
+//! | [`cloud`] | a hundred textured planes and a trunk of few sides | [Franzke 2005, 4.3.1] |
+//! | [`thinned`] | a model with fewer and larger leaves | [Cook et al. 2007] |
+//! | [`shadow_proxy`] | a lighter model with the same projected area, for shadows | [Cook et al. 2007] |
+//! | [`reduced`] | meshes in the light of the plant that they stand for | |
+//! | [`rasterize`] | which triangle each sample of an image shows | |
 //!
 //! A bake for another representation is a module here, a variant of [`BakedLevel`] (at the end: the cache counts them),
 //! and a line in the list of bakers.
 
+pub mod cloud;
 pub mod cross;
 pub mod rasterize;
+pub mod reduced;
 pub mod shadow_proxy;
+pub mod thinned;
+mod tubes;
 
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use self::cross::Cross;
+use self::{cloud::Cloud, cross::Cross, reduced::ReducedPlant};
 use super::{BakeSettings, lighting::BakedLighting};
 use crate::lod::Representation;
 use crate::plant::{Plant, PlantMesh};
@@ -30,6 +37,10 @@ pub enum BakedLevel {
     ShadowProxy(#[serde(with = "shared")] Arc<Vec<PlantMesh>>),
     /// For [`Representation::CROSS`]: crossed billboards.
     Cross(#[serde(with = "shared")] Arc<Cross>),
+    /// For [`Representation::CLOUD`]: a billboard cloud.
+    Cloud(#[serde(with = "shared")] Arc<Cloud>),
+    /// For [`Representation::THINNED`]: a model with fewer and larger leaves.
+    Thinned(#[serde(with = "shared")] Arc<ReducedPlant>),
 }
 
 impl BakedLevel {
@@ -38,6 +49,8 @@ impl BakedLevel {
         match self {
             Self::ShadowProxy(_) => Representation::MODEL,
             Self::Cross(_) => Representation::CROSS,
+            Self::Cloud(_) => Representation::CLOUD,
+            Self::Thinned(_) => Representation::THINNED,
         }
     }
 
@@ -46,6 +59,8 @@ impl BakedLevel {
         match self {
             Self::ShadowProxy(meshes) => meshes.len() == plant.parts.len() && meshes.iter().all(PlantMesh::is_whole),
             Self::Cross(cross) => cross.is_whole(matches!(lighting, BakedLighting::Transfer(_))),
+            Self::Cloud(cloud) => cloud.fits(plant, matches!(lighting, BakedLighting::Transfer(_))),
+            Self::Thinned(reduced) => reduced.fits(plant),
         }
     }
 }
@@ -65,11 +80,23 @@ mod shared {
     }
 }
 
-type Bake = fn(&Plant, &BakedLighting, &BakeSettings) -> BakedLevel;
+type Bake = fn(&Arc<Plant>, &BakedLighting, &BakeSettings) -> BakedLevel;
 
 /// The representations that need a bake, and the functions that bake them.
-const BAKERS: [(Representation, Bake); 2] =
-    [(Representation::MODEL, bake_proxy), (Representation::CROSS, bake_crosses)];
+const BAKERS: [(Representation, Bake); 4] = [
+    (Representation::MODEL, bake_proxy),
+    (Representation::CROSS, bake_crosses),
+    (Representation::CLOUD, bake_cloud),
+    (Representation::THINNED, bake_thinned),
+];
+
+/// The representations that are drawn by default.
+pub const DEFAULT: &[Representation] = &[Representation::MODEL, Representation::CROSS];
+
+/// Whether a representation is drawn with the filtered textures of the full model.
+pub fn needs_textures(representation: Representation) -> bool {
+    [Representation::MODEL, Representation::CLOUD, Representation::THINNED].contains(&representation)
+}
 
 /// The representations that [`bake_levels`] knows.
 pub const BAKED: &[Representation] = &{
@@ -83,19 +110,27 @@ pub const BAKED: &[Representation] = &{
 };
 
 /// Bakes `plant` under `lighting` for the representations that `settings` list; one that needs no bake is passed over.
-pub fn bake_levels(plant: &Plant, lighting: &BakedLighting, settings: &BakeSettings) -> Vec<BakedLevel> {
+pub fn bake_levels(plant: &Arc<Plant>, lighting: &BakedLighting, settings: &BakeSettings) -> Vec<BakedLevel> {
     let listed = |(representation, _): &&(Representation, Bake)| settings.representations.contains(representation);
     BAKERS.iter().filter(listed).map(|(_, bake)| bake(plant, lighting, settings)).collect()
 }
 
-fn bake_proxy(plant: &Plant, _: &BakedLighting, settings: &BakeSettings) -> BakedLevel {
+fn bake_proxy(plant: &Arc<Plant>, _: &BakedLighting, settings: &BakeSettings) -> BakedLevel {
     let triangles: usize = plant.parts.iter().map(|part| part.mesh.triangles.len()).sum();
     let target = (triangles as f64 * f64::from(settings.shadow_share)).round() as usize;
     BakedLevel::ShadowProxy(Arc::new(shadow_proxy::shadow_proxy(plant, target)))
 }
 
-fn bake_crosses(plant: &Plant, lighting: &BakedLighting, settings: &BakeSettings) -> BakedLevel {
+fn bake_crosses(plant: &Arc<Plant>, lighting: &BakedLighting, settings: &BakeSettings) -> BakedLevel {
     BakedLevel::Cross(Arc::new(cross::bake_cross(plant, lighting, &settings.cross)))
+}
+
+fn bake_cloud(plant: &Arc<Plant>, lighting: &BakedLighting, settings: &BakeSettings) -> BakedLevel {
+    BakedLevel::Cloud(Arc::new(cloud::bake_cloud(plant, lighting, &settings.cloud)))
+}
+
+fn bake_thinned(plant: &Arc<Plant>, _: &BakedLighting, settings: &BakeSettings) -> BakedLevel {
+    BakedLevel::Thinned(Arc::new(thinned::bake_thinned(plant, &settings.thinned)))
 }
 
 #[cfg(test)]
@@ -104,7 +139,8 @@ mod tests {
 
     #[test]
     fn each_baker_makes_the_level_of_its_representation() {
-        let (plant, settings) = (Plant::default(), BakeSettings::default());
+        let (plant, settings) =
+            (Arc::new(Plant::default()), BakeSettings { representations: BAKED, ..BakeSettings::default() });
         let made = bake_levels(&plant, &BakedLighting::Local, &settings);
         let names: Vec<_> = made.iter().map(BakedLevel::representation).collect();
         assert_eq!(names, BAKERS.map(|(representation, _)| representation));

@@ -8,6 +8,8 @@
 //! Triangles are drawn from front to back: in a crown of many layers the depth buffer then rejects most samples
 //! before their alpha is looked up.
 
+use std::sync::Arc;
+
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -55,6 +57,22 @@ impl Hit {
     }
 }
 
+/// A triangle of a plant at a position that need not be its own.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PlacedTriangle {
+    /// Which part.
+    pub part: u32,
+    /// Place in the part's `triangles`; its corners must be valid.
+    pub triangle: u32,
+    /// Its corners, metres.
+    pub corners: [Vec3; 3],
+}
+
+/// The materials of all parts of `plant`, for several images of it.
+pub(crate) fn surfaces(plant: &Plant) -> Arc<Vec<Surface>> {
+    Arc::new(plant.parts.iter().map(Surface::new).collect())
+}
+
 /// A triangle in samples (x right, y down) and metres (z toward the viewer).
 struct Projected {
     corners: [Vec3; 3],
@@ -65,7 +83,7 @@ struct Projected {
 
 /// A plant projected and sorted into bands, ready to be drawn band by band.
 pub(crate) struct Raster {
-    surfaces: Vec<Surface>,
+    surfaces: Arc<Vec<Surface>>,
     projected: Vec<Projected>,
     /// For each band the triangles that touch it, nearest first.
     bands: Vec<Vec<u32>>,
@@ -77,6 +95,25 @@ pub(crate) struct Raster {
 impl Raster {
     /// Projects `plant` for an image of `width` x `height` samples, in bands of `band_rows` rows.
     pub fn new(plant: &Plant, view: &View, width: u32, height: u32, band_rows: u32) -> Self {
+        let placed = plant.parts.iter().enumerate().flat_map(|(part, PlantPart { mesh, .. })| {
+            geometry::triangles(mesh).map(move |(triangle, corners)| PlacedTriangle {
+                part: part as u32,
+                triangle,
+                corners: corners.map(|i| mesh.positions[i]),
+            })
+        });
+        Self::of_triangles(plant, surfaces(plant), placed, view, [width, height], band_rows)
+    }
+
+    /// Projects these triangles of `plant`, whose materials are `surfaces`.
+    pub fn of_triangles(
+        plant: &Plant,
+        surfaces: Arc<Vec<Surface>>,
+        triangles: impl Iterator<Item = PlacedTriangle>,
+        view: &View,
+        [width, height]: [u32; 2],
+        band_rows: u32,
+    ) -> Self {
         let inverse = |axis: Vec3| if axis.length_squared() > 0.0 { axis / axis.length_squared() } else { Vec3::ZERO };
         let (right, up) = (inverse(view.right), inverse(view.up));
         let half = 0.5 * Vec2::new(width as f32, height as f32);
@@ -84,17 +121,12 @@ impl Raster {
             let p = position - view.center;
             Vec3::new(half.x * (1.0 + p.dot(right)), half.y * (1.0 - p.dot(up)), p.dot(view.toward))
         };
-        let mut projected: Vec<Projected> = plant
-            .parts
-            .iter()
-            .enumerate()
-            .flat_map(|(part, PlantPart { mesh, .. })| {
-                geometry::triangles(mesh).map(move |(triangle, corners)| Projected {
-                    corners: corners.map(|i| project(mesh.positions[i])),
-                    uvs: corners.map(|i| mesh.uvs[i]),
-                    part: part as u32,
-                    triangle,
-                })
+        let mut projected: Vec<Projected> = triangles
+            .map(|placed| {
+                let mesh = &plant.parts[placed.part as usize].mesh;
+                let uvs = mesh.triangles[placed.triangle as usize].map(|corner| mesh.uvs[corner as usize]);
+                let PlacedTriangle { part, triangle, corners } = placed;
+                Projected { corners: corners.map(project), uvs, part, triangle }
             })
             .filter(|t| t.corners.iter().all(|c| c.is_finite()))
             .collect();
@@ -111,8 +143,17 @@ impl Raster {
                 bands[first..=last].iter_mut().for_each(|list| list.push(index as u32));
             }
         }
-        let surfaces = plant.parts.iter().map(Surface::new).collect();
         Self { surfaces, projected, bands, width, height, band_rows }
+    }
+
+    /// Samples in a row.
+    pub fn width(&self) -> usize {
+        self.width as usize
+    }
+
+    /// First row of a band.
+    pub fn first_row(&self, band: usize) -> usize {
+        band * self.band_rows as usize
     }
 
     /// Number of bands.

@@ -65,16 +65,17 @@ pub fn simplify_foliage(plant: &Plant, triangle_target: usize) -> Plant {
                     PartKind::Wood => 1.0,
                     PartKind::Foliage => correction * area_keeping_scale(&elements[index], &kept[index]),
                 };
-                let mesh = extract(&part.mesh, &elements[index], &kept[index], scale);
+                let (mesh, _) = extract(&part.mesh, &elements[index], &kept[index], scale);
                 PlantPart { kind: part.kind, mesh, material: part.material.clone() }
             })
             .collect(),
     };
-    calibrate(plant, build)
+    calibrate(plant, build, |model| model)
 }
 
-/// Finds the correction of the scale with which `build` has the projected area of `plant`.
-fn calibrate(plant: &Plant, build: impl Fn(f32) -> Plant) -> Plant {
+/// Finds the scale with which what `build` makes, `drawn` as a plant, has the projected area of `plant` in the mean over
+/// five directions.
+pub(super) fn calibrate<T>(plant: &Plant, build: impl Fn(f32) -> T, drawn: impl Fn(&T) -> &Plant) -> T {
     const RESOLUTION: u32 = 320;
     const STEPS: usize = 4;
     const GOOD_ENOUGH: f32 = 0.01;
@@ -98,7 +99,7 @@ fn calibrate(plant: &Plant, build: impl Fn(f32) -> Plant) -> Plant {
     let (mut scale, mut last) = (1.0f32, None::<(f32, f32)>);
     for _ in 0..STEPS {
         let model = build(scale);
-        let excess = seen(&model) / wanted - 1.0;
+        let excess = seen(drawn(&model)) / wanted - 1.0;
         if excess.abs() < best.0 {
             best = (excess.abs(), model);
         }
@@ -128,7 +129,7 @@ fn stoutest(part: &PlantPart, elements: &[Element], target: usize) -> Vec<u32> {
 /// An even choice over the crown: elements are sorted along a space-filling curve through coarse cells (at random
 /// within a cell, so that no orientation that a cell's cards alternate in is preferred) and taken in the order of the
 /// radical inverse of their rank, whose every beginning is spread evenly.
-fn evenly_chosen(elements: &[Element], origin: Vec3, extent: f32, target: usize) -> Vec<u32> {
+pub(super) fn evenly_chosen(elements: &[Element], origin: Vec3, extent: f32, target: usize) -> Vec<u32> {
     const CELLS: f32 = 32.0;
     let mut curve: Vec<(u32, u32, u32)> = elements
         .iter()
@@ -163,16 +164,17 @@ fn take_up_to(target: usize, elements: &[Element], order: impl IntoIterator<Item
 }
 
 /// Linear factor by which the kept elements grow to the area of all.
-fn area_keeping_scale(elements: &[Element], kept: &[u32]) -> f32 {
+pub(super) fn area_keeping_scale(elements: &[Element], kept: &[u32]) -> f32 {
     let all: f64 = elements.iter().map(|element| f64::from(element.area)).sum();
     let rest: f64 = kept.iter().map(|&index| f64::from(elements[index as usize].area)).sum();
     let scale = (all / rest).sqrt() as f32;
     if scale.is_finite() { scale } else { 1.0 }
 }
 
-/// The mesh of the kept elements, each scaled about its centre.
-fn extract(mesh: &PlantMesh, elements: &[Element], kept: &[u32], scale: f32) -> PlantMesh {
+/// The mesh of the kept elements, each scaled about its centre, and for each of its vertices that of the whole mesh.
+pub(super) fn extract(mesh: &PlantMesh, elements: &[Element], kept: &[u32], scale: f32) -> (PlantMesh, Vec<u32>) {
     let mut out = PlantMesh::default();
+    let mut sources = Vec::new();
     let mut slots = vec![u32::MAX; mesh.positions.len()];
     for &index in kept {
         let element = &elements[index as usize];
@@ -187,13 +189,14 @@ fn extract(mesh: &PlantMesh, elements: &[Element], kept: &[u32], scale: f32) -> 
                     out.positions.push(element.center + scale * (mesh.positions[from] - element.center));
                     out.normals.push(mesh.normals[from]);
                     out.uvs.push(mesh.uvs[from]);
+                    sources.push(corner);
                 }
                 slots[from]
             });
             out.triangles.push(moved);
         }
     }
-    out
+    (out, sources)
 }
 
 /// Spreads the lowest ten bits of `bits` to every third bit.

@@ -4,7 +4,13 @@ use std::{collections::HashSet, sync::Arc};
 
 use super::{Forest3d, ForestError, ForestTrees};
 use crate::{
-    assets::{PlantAsset, StageError, background::Wanted, plants::PlantPlan, stage::cover, trees::StandPlan},
+    assets::{
+        PlantAsset, StageError,
+        background::Wanted,
+        plants::PlantPlan,
+        stage::cover,
+        trees::{StandPlan, WoodBeyond},
+    },
     bake::{BakedPlant, lighting::SunLight},
     progress::Progress,
     scatter::{
@@ -40,6 +46,8 @@ pub struct Built {
     pub suns: Arc<[SunLight]>,
     /// Canopy cover of the terrain; `None` on level ground, and without trees.
     pub cover: Option<Arc<CoverMap>>,
+    /// Metres beyond the terrain's data on which its trees stand too.
+    pub surroundings: f64,
     /// Warnings for the program's author.
     pub warnings: Vec<String>,
 }
@@ -88,6 +96,7 @@ impl Ingredients {
             plan.variants.push(first as u16..plants.len() as u16);
         }
         let sizes: Vec<PlantSize> = plants.iter().map(BakedPlant::size).collect();
+        let mut surroundings = 0.0;
         let stand = match &self.forest.trees {
             ForestTrees::Given(trees) => {
                 if let Some(limit) = self.most_trees.filter(|limit| trees.len() > *limit) {
@@ -102,8 +111,10 @@ impl Ingredients {
                     Some(terrain) => Arc::clone(terrain),
                     None => level_ground()?,
                 };
-                let planned = StandPlan::new(&scene, &terrain)?;
+                let mut planned = StandPlan::new(&scene, &terrain, WoodBeyond::Ends)?;
                 planned.check(self.most_trees)?;
+                planned.fit_surroundings(self.most_trees);
+                surroundings = planned.surroundings();
                 planned.build(&plan, &sizes, &mut listener)?
             }
         };
@@ -118,6 +129,7 @@ impl Ingredients {
             plants: Arc::new(plants),
             suns: suns.into(),
             cover: cover.map(Arc::new),
+            surroundings,
             warnings: listener.warnings,
         })
     }

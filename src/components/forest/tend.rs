@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use bevy::{
-    asset::{AssetEvent, AssetId, AssetLoadFailedEvent, AssetServer, Assets, LoadState, UntypedAssetId},
+    asset::{Asset, AssetEvent, AssetId, AssetLoadFailedEvent, AssetServer, Assets, LoadState, UntypedAssetId},
     ecs::{
         change_detection::DetectChanges,
         component::Component,
@@ -102,22 +102,18 @@ pub struct Sources<'w, 's> {
 }
 
 impl Sources<'_, '_> {
-    /// What the server knows of an asset; `None` for assets that the program made itself.
-    fn state(&self, id: impl Into<UntypedAssetId>) -> Option<LoadState> {
-        self.server.as_ref()?.get_load_state(id)
-    }
-
     /// Why an asset cannot be loaded, if it failed.
     fn failure(&self, id: impl Into<UntypedAssetId>) -> Option<String> {
-        match self.state(id)? {
+        match self.server.as_ref()?.get_load_state(id)? {
             LoadState::Failed(error) => Some(load_error(&error)),
             LoadState::NotLoaded | LoadState::Loading | LoadState::Loaded => None,
         }
     }
 
-    /// Whether an asset is being loaded. One that is there already is then about to be replaced.
-    fn loads(&self, id: impl Into<UntypedAssetId>) -> bool {
-        matches!(self.state(id), Some(LoadState::Loading))
+    /// An asset; `None` while it is being loaded, even if its earlier version is there.
+    fn loaded<'a, A: Asset>(&self, assets: &'a Assets<A>, id: AssetId<A>) -> Option<&'a A> {
+        let state = self.server.as_ref().and_then(|server| server.get_load_state(id));
+        if matches!(state, Some(LoadState::Loading)) { None } else { assets.get(id) }
     }
 
     /// What `forest` is built of; `None` while something is still being loaded.
@@ -134,16 +130,11 @@ impl Sources<'_, '_> {
         if let Some(error) = ground.and_then(|map| self.failure(map)) {
             return Err(ForestError::Terrain(error));
         }
-        if forest.species.iter().any(|species| self.loads(species.plant.id()))
-            || ground.is_some_and(|map| self.loads(map))
-        {
-            return Ok(None);
-        }
         let plants: Option<Vec<PlantAsset>> =
-            forest.species.iter().map(|species| self.plants.get(species.plant.id()).cloned()).collect();
+            forest.species.iter().map(|species| self.loaded(&self.plants, species.plant.id()).cloned()).collect();
         let terrain = match ground {
             None => Some(None),
-            Some(map) => self.maps.get(map).map(|map| Some(map.terrain.clone())),
+            Some(map) => self.loaded(&self.maps, map).map(|map| Some(map.terrain.clone())),
         };
         let (Some(plants), Some(terrain)) = (plants, terrain) else { return Ok(None) };
         let most_trees = self.device.as_ref().map(|device| most_trees(&device.limits()));
@@ -239,7 +230,7 @@ fn show(
     let trees = built.stand.trees.len();
     let mut target = commands.entity(entity);
     match (built.cover, ground) {
-        (Some(map), Some(ground)) => target.try_insert(ForestCover { ground, map }),
+        (Some(map), Some(ground)) => target.try_insert(ForestCover { ground, map, surroundings: built.surroundings }),
         _ => target.try_remove::<ForestCover>(),
     };
     if trees > 0 {

@@ -143,6 +143,7 @@ impl Stage {
             instant,
             moon: self.scene.place.moon,
             visibility_km: self.scene.place.visibility * 1e-3,
+            fixed_ev100: self.scene.camera.exposure.map(|ev100| ev100 as f32),
             ..Sun::default()
         }
     }

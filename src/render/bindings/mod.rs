@@ -28,11 +28,11 @@ use bevy::{
         renderer::{RenderDevice, RenderQueue},
     },
 };
+use glam::DVec3;
 
 use super::{extract::ExtractedScene, gpu, view::PreparedFrame};
-use uniforms::{
-    CascadeUniform, CascadeViewUniform, FrameUniform, LightUniform, MAX_CASCADES, NOISE_PERIOD, ShadowUniform,
-};
+use crate::terrain::ground_noise::NOISE_BLOCK;
+use uniforms::{CascadeUniform, CascadeViewUniform, FrameUniform, LightUniform, MAX_CASCADES, ShadowUniform};
 
 /// Format of the shadow maps.
 pub const SHADOW_FORMAT: TextureFormat = TextureFormat::Depth32Float;
@@ -178,6 +178,12 @@ impl Plugin for BindingsPlugin {
     }
 }
 
+/// The block of the ground's noise that a coordinate in metres lies in, modulo 2³², and the metres from its middle.
+fn noise_position(value: f64) -> (i32, f32) {
+    let block = (value / NOISE_BLOCK).round();
+    (block as i64 as i32, (value - block * NOISE_BLOCK) as f32)
+}
+
 fn prepare_bind_group(
     scene: Res<ExtractedScene>,
     frame: Res<PreparedFrame>,
@@ -191,14 +197,17 @@ fn prepare_bind_group(
 ) {
     group.0 = None;
     let (Some(view), Some(daylight)) = (&frame.view, &scene.daylight) else { return };
-    let modulo = |value: f64| value.rem_euclid(NOISE_PERIOD) as f32;
+    // The noise is the ground's, and moves with it.
+    let on_ground = view.camera - scene.ground.as_ref().map_or(DVec3::ZERO, |(.., origin)| *origin);
+    let [(block_x, x), (block_z, z)] = [on_ground.x, on_ground.z].map(noise_position);
     let frame_uniform = FrameUniform {
         clip_from_relative: view.clip_from_relative.to_cols_array_2d(),
         relative_from_clip: view.clip_from_relative.inverse().to_cols_array_2d(),
-        camera: [modulo(view.camera.x), view.camera.y as f32, modulo(view.camera.z)],
+        camera: [x, view.camera.y as f32, z],
         focal_length_pixels: view.focal_pixels,
         mean_cover: placement.mean_cover,
-        padding: [0.0; 3],
+        padding: 0.0,
+        noise_block: [block_x, block_z],
     };
     let light_uniform = light::light_uniform(&daylight.0, view.exposure);
     let shadow_uniform = ShadowUniform {

@@ -2,9 +2,6 @@
 
 use bytemuck::{Pod, Zeroable};
 
-/// Period in metres of everything that is drawn by world position (ground noise); a power of two.
-pub const NOISE_PERIOD: f64 = 1024.0;
-
 /// Maximum number of cascades of a view.
 pub const MAX_CASCADES: usize = 4;
 
@@ -16,14 +13,17 @@ pub struct FrameUniform {
     pub clip_from_relative: [[f32; 4]; 4],
     /// Its inverse.
     pub relative_from_clip: [[f32; 4]; 4],
-    /// Camera position: x and z modulo [`NOISE_PERIOD`], y above the datum; metres.
+    /// Camera position: x and z on the ground, from the middle of their [block](crate::terrain::ground_noise::NOISE_BLOCK), y above the datum;
+    /// metres.
     pub camera: [f32; 3],
     /// Focal length in pixels (vertical).
     pub focal_length_pixels: f32,
     /// Mean canopy cover where the terrain is known, 0..1.
     pub mean_cover: f32,
-    /// WGSL rounds the size up to 16 bytes.
-    pub padding: [f32; 3],
+    /// WGSL aligns vectors of two to 8 bytes.
+    pub padding: f32,
+    /// The camera's block of the ground's noise: column and row, modulo 2³².
+    pub noise_block: [i32; 2],
 }
 
 /// `Light` of `frame.wgsl`, premultiplied by the exposure.

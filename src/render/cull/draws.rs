@@ -6,7 +6,10 @@ use bevy::{
 };
 use bytemuck::{Pod, Zeroable};
 
-use crate::{cull::Grouping, render::gpu::Gpu};
+use crate::{
+    cull::{Grouping, Share},
+    render::gpu::Gpu,
+};
 
 /// What is drawn for each tree of a draw call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -15,6 +18,13 @@ pub enum TreeVertices {
     Pulled(u32),
     /// So many indices of the index buffer that is set. The instances are the trees: `visible[instance_index]`.
     Indexed(u32),
+    /// Vertices that the shader pulls. The instances are the trees, as for indices.
+    Instanced {
+        /// Index of the first one.
+        first: u32,
+        /// Number of them.
+        count: u32,
+    },
 }
 
 /// A draw call of a level.
@@ -34,24 +44,42 @@ pub struct TreeDrawWords {
     pub group: u32,
     /// Vertices or indices of a tree.
     pub vertices: u32,
-    /// 1 for indices.
-    pub indexed: u32,
+    /// 1: indices, and trees are instances; 2: vertices, and trees are instances; 0: neither.
+    pub kind: u32,
+    /// The first vertex of kind 2.
+    pub first_vertex: u32,
+    /// Which share of the group.
+    pub share: u32,
+    /// How many shares there are.
+    pub shares: u32,
+}
+
+impl TreeDrawWords {
+    fn new(group: usize, vertices: TreeVertices, share: Share) -> Self {
+        let (kind, first_vertex, vertices) = match vertices {
+            TreeVertices::Pulled(vertices) => (0, 0, vertices),
+            TreeVertices::Indexed(indices) => (1, 0, indices),
+            TreeVertices::Instanced { first, count } => (2, first, count),
+        };
+        Self { group: group as u32, vertices, kind, first_vertex, share: share.index, shares: share.of }
+    }
 }
 
 /// All draw calls of a forest into one kind of target, each once.
 pub struct DrawTable {
     /// [`TreeDrawWords`].
     pub buffer: Buffer,
-    slots: HashMap<(usize, TreeDraw), u32>,
+    slots: HashMap<(usize, TreeDraw, Share), u32>,
 }
 
 impl DrawTable {
-    /// The table of `draws`, each with its level. `groupings` has one entry for each level.
+    /// The table of `draws`, each with its level, for each of `shares`. `groupings` has one entry for each level.
     pub fn new(
         gpu: &Gpu,
         groupings: &[Grouping],
         variants: usize,
         draws: impl Iterator<Item = (usize, TreeDraw)>,
+        shares: &[Share],
     ) -> Self {
         let mut first_groups = vec![0];
         for grouping in groupings {
@@ -60,15 +88,12 @@ impl DrawTable {
         let (mut slots, mut words) = (HashMap::default(), Vec::new());
         for (level, draw) in draws {
             let Some([first, end]) = first_groups.get(level..level + 2) else { continue };
-            if first + draw.group >= *end || slots.contains_key(&(level, draw)) {
-                continue;
+            for share in shares.iter().filter(|_| first + draw.group < *end) {
+                slots.entry((level, draw, *share)).or_insert_with(|| {
+                    words.push(TreeDrawWords::new(first + draw.group, draw.vertices, *share));
+                    words.len() as u32 - 1
+                });
             }
-            slots.insert((level, draw), words.len() as u32);
-            let (vertices, indexed) = match draw.vertices {
-                TreeVertices::Pulled(vertices) => (vertices, 0),
-                TreeVertices::Indexed(indices) => (indices, 1),
-            };
-            words.push(TreeDrawWords { group: (first + draw.group) as u32, vertices, indexed });
         }
         let buffer = gpu.filled_buffer("canopy_tree_draws", BufferUsages::STORAGE, &words);
         Self { buffer, slots }
@@ -84,8 +109,8 @@ impl DrawTable {
         self.slots.is_empty()
     }
 
-    /// Index of a draw call of `level`.
-    pub fn slot(&self, level: usize, draw: TreeDraw) -> Option<u32> {
-        self.slots.get(&(level, draw)).copied()
+    /// Index of a draw call of `level` for a share of its trees.
+    pub fn slot(&self, level: usize, draw: TreeDraw, share: Share) -> Option<u32> {
+        self.slots.get(&(level, draw, share)).copied()
     }
 }

@@ -8,7 +8,7 @@ use bevy::{
 };
 
 use crate::{
-    cull::DrawLists,
+    cull::{DrawLists, Share},
     render::cull::{DrawTable, TreeDraw, TreeVertices},
 };
 
@@ -39,16 +39,17 @@ impl PageTrees {
         }
     }
 
-    /// The trees of `level`.
-    pub fn level(&self, level: usize) -> DrawnTrees<'_> {
-        DrawnTrees { trees: self, level, calls: Cell::new(0) }
+    /// A share of the trees of `level`.
+    pub fn level(&self, level: usize, share: Share) -> DrawnTrees<'_> {
+        DrawnTrees { trees: self, level, share, calls: Cell::new(0) }
     }
 }
 
-/// The trees of one level of one page.
+/// The trees of one level of one page, or a share of them.
 pub struct DrawnTrees<'a> {
     trees: &'a PageTrees,
     level: usize,
+    share: Share,
     calls: Cell<u64>,
 }
 
@@ -65,16 +66,16 @@ impl<'a> DrawnTrees<'a> {
     pub fn draw(&self, pass: &mut TrackedRenderPass<'a>, draw: TreeDraw) {
         match self.trees {
             PageTrees::Listed(lists) => {
-                let Some(range) = lists.ranges(self.level).get(draw.group).filter(|range| !range.is_empty()) else {
-                    return;
-                };
+                let range = lists.ranges(self.level).get(draw.group).map(|range| self.share.cut(range));
+                let Some(range) = range.filter(|range| !range.is_empty()) else { return };
                 match draw.vertices {
                     TreeVertices::Pulled(vertices) => pass.draw(range.start * vertices..range.end * vertices, 0..1),
-                    TreeVertices::Indexed(indices) => pass.draw_indexed(0..indices, 0, range.clone()),
+                    TreeVertices::Indexed(indices) => pass.draw_indexed(0..indices, 0, range),
+                    TreeVertices::Instanced { first, count } => pass.draw(first..first + count, range),
                 }
             }
             PageTrees::Indirect { table, arguments, first } => {
-                let Some(slot) = table.slot(self.level, draw) else {
+                let Some(slot) = table.slot(self.level, draw, self.share) else {
                     error_once!(
                         "level {} of a forest makes a draw call that `GpuLevel::draws` does not list: {draw:?}",
                         self.level
@@ -83,7 +84,7 @@ impl<'a> DrawnTrees<'a> {
                 };
                 let offset = first + ARGUMENT_BYTES * u64::from(slot);
                 match draw.vertices {
-                    TreeVertices::Pulled(_) => pass.draw_indirect(arguments, offset),
+                    TreeVertices::Pulled(_) | TreeVertices::Instanced { .. } => pass.draw_indirect(arguments, offset),
                     TreeVertices::Indexed(_) => pass.draw_indexed_indirect(arguments, offset),
                 }
             }

@@ -21,31 +21,26 @@ use bevy::{
 
 use super::{
     leaves::Leaves,
-    representation::{ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight, Representations},
+    pipelines::{LevelPipelines, targets},
+    representation::{ForestLevel, LevelTarget, Relight, Representations},
     transfer::TransferLight,
     uniforms::variants,
+    upload::{BYTES_PER_FRAME, DeviceWrites, ForestUpload},
 };
 use crate::{
     bake::BakedPlant,
-    cull::{Drawn, Grouping, Page, TreeSize, pages},
+    cull::{Drawn, Grouping, Page, Share, TreeSize, pages},
     light::StandTrees,
     render::{
-        components::Forest,
+        components::{Forest, ForestUpdates},
         cull::{DrawTable, ListSources},
         extract::ExtractedScene,
         gpu::{self, Gpu},
-        view::ViewFormat,
+        report::FrameReport,
+        view::{PreparedFrame, ViewFormat},
     },
     scatter::{PackedStand, PackedTree, PlantSize},
 };
-
-/// A level of one forest on the device.
-pub struct ForestLevel {
-    /// The renderer that draws it.
-    pub renderer: Arc<dyn LevelRenderer>,
-    /// Its plants.
-    pub gpu: Box<dyn GpuLevel>,
-}
 
 /// A part of a forest whose trees fit into one buffer.
 struct GpuPage {
@@ -55,6 +50,10 @@ struct GpuPage {
     /// [`Cluster`](crate::cull::Cluster)s, for lists that the device makes.
     clusters: OnceLock<Buffer>,
 }
+
+/// Number of frames over which a shadow map is drawn that takes up forests which arrive over several frames: it is drawn
+/// in so many shares.
+pub const MAP_SHARES: u32 = 4;
 
 /// What a list is for: its draw calls differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -140,15 +139,18 @@ impl GpuForest {
         let storage = BufferUsages::STORAGE;
         let upload = || gpu.filled_buffer("canopy_clusters", storage, &page.page.clusters);
         let sizes = || gpu.filled_buffer("canopy_tree_sizes", storage, &self.tree_sizes);
-        let draws = |target: LevelTarget| {
+        let draws = |target: LevelTarget, shares: &[Share]| {
             let calls = self
                 .levels()
                 .flat_map(|(index, level)| level.gpu.draws(target).into_iter().map(move |draw| (index, draw)));
-            Arc::new(DrawTable::new(gpu, &self.groupings, self.sizes.len(), calls))
+            Arc::new(DrawTable::new(gpu, &self.groupings, self.sizes.len(), calls, shares))
         };
         let table = match target {
-            ListTarget::View => self.tables[0].get_or_init(|| draws(LevelTarget::View(ViewFormat::ANY))),
-            ListTarget::ShadowMap => self.tables[1].get_or_init(|| draws(LevelTarget::ShadowMap)),
+            ListTarget::View => self.tables[0].get_or_init(|| draws(LevelTarget::View(ViewFormat::ANY), &[Share::ALL])),
+            ListTarget::ShadowMap => self.tables[1].get_or_init(|| {
+                let shares: Vec<Share> = [Share::ALL].into_iter().chain(Share::each(MAP_SHARES)).collect();
+                draws(LevelTarget::ShadowMap, &shares)
+            }),
         };
         Some(ListSources {
             trees: &page.trees,
@@ -195,15 +197,17 @@ impl GpuForest {
     ) -> Self {
         let forest = &Forest { stand: drawn_stand(component), ..component.clone() };
         let storage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
-        let device = &upload.gpu.device;
         let sizes: Vec<PlantSize> = forest.plants.iter().map(BakedPlant::size).collect();
         let on_device = |page: Page| {
-            let trees = forest.stand.trees.get(page.trees.clone()).unwrap_or(&[]);
-            let trees = gpu::buffer_with::<PackedTree>(device, "canopy_trees", storage, trees);
+            let of_page = Arc::new((forest.stand.clone(), page.trees.clone()));
+            let trees = upload.shared_buffer("canopy_trees", storage, &of_page, |(stand, range)| {
+                stand.trees.get(range.clone()).unwrap_or(&[])
+            });
             GpuPage { page, trees, clusters: OnceLock::new() }
         };
         let pages = pages(&forest.stand, &sizes, trees_per_buffer).into_iter().map(on_device).collect();
-        let variants = gpu::buffer_with(device, "canopy_variants", storage, &variants(&forest.plants, &sizes));
+        let variants =
+            gpu::buffer_with(&upload.gpu.device, "canopy_variants", storage, &variants(&forest.plants, &sizes));
         let level = |representation| {
             let renderer = known.get(representation).cloned();
             if renderer.is_none() {
@@ -228,7 +232,7 @@ impl GpuForest {
             sizes_buffer: OnceLock::new(),
             tables: Default::default(),
             variants,
-            leaves: Leaves::of(forest),
+            leaves: Leaves::of(&forest.stand, &forest.plants),
             tree_sizes: sizes.iter().map(TreeSize::from).collect(),
             sizes,
             max_scale: forest.stand.cells.iter().map(|cell| cell.max_scale).fold(0.0, f32::max),
@@ -253,7 +257,7 @@ impl GpuForest {
     /// Updates the lighting of plants that are already drawn: new bakes overwrite the data on the device. Meshes,
     /// outlines, the stand and therefore the shadow maps stay.
     ///
-    /// Cost: packing and writing 20 bytes per vertex, and 1 MB per plant whose crosses changed (256 texels).
+    /// All of it happens in this frame. Cost: packing and writing 20 bytes per vertex, and 1 MB per plant whose crosses changed (256 texels).
     fn relight(&mut self, forest: &Forest, upload: &mut ForestUpload) {
         let relight = Relight { old: &self.plants, new: &forest.plants, suns: &forest.suns };
         for level in self.levels.iter_mut().flatten() {
@@ -261,6 +265,7 @@ impl GpuForest {
         }
         let variants = variants(&forest.plants, &self.sizes);
         upload.gpu.queue.write_buffer(&self.variants, 0, bytemuck::cast_slice(&variants));
+        upload.writes.run(&upload.gpu.queue, &mut { u64::MAX });
         self.plants = forest.plants.clone();
     }
 }
@@ -280,11 +285,19 @@ fn drawn_stand(forest: &Forest) -> Arc<PackedStand> {
     Arc::new(PackedStand { trees: Vec::new(), indices: Vec::new(), cells: Vec::new(), grid: forest.stand.grid })
 }
 
+/// A forest that is not drawn yet.
+struct Arriving {
+    forest: GpuForest,
+    /// What the device does not have of it.
+    writes: DeviceWrites,
+}
+
 /// All forests of the world by their main-world entity.
 #[derive(Resource, Default)]
 pub struct GpuForests {
     forests: HashMap<Entity, GpuForest>,
-    /// Entities in a fixed order.
+    arriving: HashMap<Entity, Arriving>,
+    /// Entities of the forests that are drawn, in a fixed order.
     pub order: Vec<Entity>,
     generations: u64,
 }
@@ -298,6 +311,11 @@ impl GpuForests {
     /// All levels of all forests.
     pub fn levels(&self) -> impl Iterator<Item = &ForestLevel> {
         self.iter().flat_map(|(_, forest)| forest.levels().map(|(_, level)| level))
+    }
+
+    /// All levels of the forests that are not drawn yet, in no fixed order.
+    pub fn arriving_levels(&self) -> impl Iterator<Item = &ForestLevel> {
+        self.arriving.values().flat_map(|arriving| arriving.forest.levels().map(|(_, level)| level))
     }
 
     /// Whether there is no tree in any forest.
@@ -330,16 +348,18 @@ pub fn most_trees(limits: &WgpuLimits) -> usize {
     trees_in_buffer(limits).saturating_mul(MOST_PAGES).min(u32::MAX as usize)
 }
 
-/// Uploads new and changed forests, and drops despawned ones.
+/// Uploads new and changed forests, all at once or a share of them, and drops despawned ones.
 pub fn prepare_forests(
     scene: Res<ExtractedScene>,
+    frame: Res<PreparedFrame>,
     representations: Res<Representations>,
+    pipelines: Res<LevelPipelines>,
     gpu: Gpu,
+    report: Res<FrameReport>,
     mut forests: ResMut<GpuForests>,
     mut transfer: ResMut<TransferLight>,
 ) {
     let forests = &mut *forests;
-    let mut upload = ForestUpload { gpu: &gpu, transfer: &mut transfer };
     let limit = most_trees(&gpu.device.limits());
     let trees_per_buffer = trees_in_buffer(&gpu.device.limits()).min(scene.tree_lists.trees_per_buffer);
     let fits = |forest: &Forest| {
@@ -349,14 +369,23 @@ pub fn prepare_forests(
         }
         count <= limit
     };
+    let blocking = scene.forest_updates == ForestUpdates::Blocking;
+    let mut budget = if blocking { u64::MAX } else { BYTES_PER_FRAME };
+    let has_pipelines = |forest: &GpuForest| {
+        let levels = || forest.levels().map(|(_, level)| level);
+        targets(&scene, &frame).all(|target| pipelines.ready(levels(), target, &gpu.pipelines))
+    };
     let drawn: Vec<_> = scene.forests.iter().filter(|(_, forest)| fits(forest)).collect();
-    forests.order = drawn.iter().map(|(entity, _)| *entity).collect();
-    let alive: Vec<Entity> = forests.order.clone();
+    let alive: Vec<Entity> = drawn.iter().map(|(entity, _)| *entity).collect();
     forests.forests.retain(|entity, _| alive.contains(entity));
+    forests.arriving.retain(|entity, _| alive.contains(entity));
+    let mut uploads = Vec::new();
     for (entity, forest) in drawn {
         if let Some(known) = forests.forests.get_mut(entity).filter(|known| known.can_follow(forest)) {
+            forests.arriving.remove(entity);
             if !Arc::ptr_eq(&known.plants, &forest.plants) {
-                known.relight(forest, &mut upload);
+                let mut writes = DeviceWrites::default();
+                known.relight(forest, &mut ForestUpload { gpu: &gpu, transfer: &mut transfer, writes: &mut writes });
             }
             if known.forest.origin != forest.origin {
                 forests.generations += 1;
@@ -365,8 +394,38 @@ pub fn prepare_forests(
             known.forest = Forest { stand: known.forest.stand.clone(), ..forest.clone() };
             continue;
         }
-        forests.generations += 1;
-        let made = GpuForest::new(forest, forests.generations, trees_per_buffer, &representations, &mut upload);
-        forests.forests.insert(*entity, made);
+        let under_way = forests.arriving.remove(entity);
+        let same = |arriving: &Arriving| {
+            arriving.forest.can_follow(forest) && Arc::ptr_eq(&arriving.forest.plants, &forest.plants)
+        };
+        let mut arriving = match under_way.filter(same) {
+            Some(mut arriving) => {
+                arriving.forest.forest = Forest { stand: arriving.forest.forest.stand.clone(), ..forest.clone() };
+                arriving
+            }
+            None => {
+                forests.generations += 1;
+                let mut writes = DeviceWrites::default();
+                let mut upload = ForestUpload { gpu: &gpu, transfer: &mut transfer, writes: &mut writes };
+                let forest =
+                    GpuForest::new(forest, forests.generations, trees_per_buffer, &representations, &mut upload);
+                Arriving { forest, writes }
+            }
+        };
+        arriving.writes.run(&gpu.queue, &mut budget);
+        let (done, total) = arriving.writes.progress();
+        uploads.push(format!("{:.1} of {:.1} MB", done as f64 * 1e-6, total as f64 * 1e-6));
+        if blocking || (arriving.writes.are_done() && has_pipelines(&arriving.forest)) {
+            forests.forests.insert(*entity, arriving.forest);
+        } else {
+            forests.arriving.insert(*entity, arriving);
+        }
+    }
+    forests.order = alive;
+    forests.order.retain(|entity| forests.forests.contains_key(entity));
+    if uploads.is_empty() {
+        report.skipped("forest upload", "no forest is new");
+    } else {
+        report.ran("forest upload", uploads.join(", "));
     }
 }

@@ -2,10 +2,10 @@
 
 use glam::Vec3;
 
-use crate::{bake::BakedPlant, light::StandTrees, render::components::Forest};
+use crate::{bake::BakedPlant, light::StandTrees, scatter::PackedStand};
 
 /// Sums over leaves, weighted by area.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Leaves {
     area: f32,
     reflected: Vec3,
@@ -15,10 +15,10 @@ pub struct Leaves {
 }
 
 impl Leaves {
-    /// The sums of all trees of a stand.
-    pub fn of(forest: &Forest) -> Self {
-        let mut areas = vec![0.0; forest.plants.len()];
-        for tree in &forest.stand.trees {
+    /// The sums of all trees of a stand of `plants`, by variant.
+    pub fn of(stand: &PackedStand, plants: &[BakedPlant]) -> Self {
+        let mut areas = vec![0.0; plants.len()];
+        for tree in &stand.trees {
             if let Some(area) = areas.get_mut(usize::from(tree.variant())) {
                 *area += tree.scale().powi(2);
             }
@@ -34,7 +34,7 @@ impl Leaves {
                 crown_length: plant.plant.crown_length() * area,
             }
         };
-        forest.plants.iter().zip(areas).map(of_plant).fold(Self::default(), Self::add)
+        plants.iter().zip(areas).map(of_plant).fold(Self::default(), Self::add)
     }
 
     /// The sums of two forests.

@@ -6,8 +6,9 @@
 //! how.
 //!
 //! Limits: at most 1,024 variants per forest; crosses for as many variants as a texture array has room for, three
-//! layers each; no motion vectors; one camera.
+//! layers each, and clouds, one layer each; no motion vectors; one camera.
 
+mod cloud_uniforms;
 mod draw;
 mod drawn_trees;
 mod gpu_forest;
@@ -20,10 +21,12 @@ mod lists;
 mod pass;
 mod pipelines;
 pub mod representation;
+mod request_pipelines;
 mod rotated_light;
 mod textures;
 pub(super) mod transfer;
 pub(super) mod uniforms;
+mod upload;
 mod vertex;
 
 use bevy::{
@@ -37,11 +40,13 @@ use super::{
     sets::{CanopyPasses, CanopyRenderSystems},
     shaders::CanopyShaders,
 };
+pub use cloud_uniforms::{CloudPlaneUniform, CloudVariantUniform};
 pub use draw::draw_levels;
 pub use drawn_trees::{DrawnTrees, PageTrees};
-pub use gpu_forest::{ForestLevel, GpuForest, GpuForests, ListTarget, most_trees};
+pub use gpu_forest::{GpuForest, GpuForests, ListTarget, MAP_SHARES, most_trees};
 pub use instance_layout::instance_layout;
 pub use instances::{forest_view, instance_bind_group};
+pub(super) use leaves::Leaves;
 pub use list_slot::{ListSlot, ListWork, PreparedPage};
 pub use lists::{ForestStatistics, LevelStatistics, PreparedForests, collect_view_counts};
 pub use pipelines::LevelPipelines;
@@ -76,7 +81,7 @@ impl Plugin for ForestPassPlugin {
                     gpu_forest::prepare_forests.in_set(CanopyRenderSystems::Upload),
                     lists::prepare_view_lists.in_set(CanopyRenderSystems::Cull),
                     rotated_light::prepare_transfer_light.in_set(CanopyRenderSystems::Light),
-                    pipelines::prepare_pipelines.in_set(CanopyRenderSystems::Pipelines),
+                    request_pipelines::prepare_pipelines.in_set(CanopyRenderSystems::Pipelines),
                 ),
             )
             .add_systems(Core3d, pass::forest_pass.in_set(CanopyPasses::Forest));

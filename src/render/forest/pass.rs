@@ -18,7 +18,10 @@ use super::{
     pipelines::LevelPipelines,
     representation::LevelTarget,
 };
-use crate::render::{bindings::FrameBindGroup, components::CanopyCamera, frame_work::FrameWork, view::PreparedFrame};
+use crate::{
+    cull::Share,
+    render::{bindings::FrameBindGroup, components::CanopyCamera, frame_work::FrameWork, view::PreparedFrame},
+};
 
 /// Draws every forest into the camera's colour and depth, level by level.
 pub fn forest_pass(
@@ -36,7 +39,7 @@ pub fn forest_pass(
     let (target, depth, camera) = view.into_inner();
     let (Some(group), Some(prepared_view)) = (group, &frame.view) else { return };
     let level_target = LevelTarget::View(prepared_view.attachment);
-    if !prepared.draw_something() || !pipelines.ready(&forests, level_target, &cache) {
+    if !prepared.draw_something() || !pipelines.ready(forests.levels(), level_target, &cache) {
         return;
     }
     let diagnostics = ctx.diagnostic_recorder();
@@ -57,7 +60,8 @@ pub fn forest_pass(
     for (entity, forest) in forests.iter() {
         let Some(lists) = prepared.get(entity) else { continue };
         let offset = PreparedForest::offset;
-        draw_levels(&mut pass, forest, &lists.pages, level_target, &pipelines, &cache, &work, offset);
+        let pages = &lists.pages;
+        draw_levels(&mut pass, forest, pages, Share::ALL, level_target, &pipelines, &cache, &work, offset);
     }
     span.end(&mut pass);
 }

@@ -26,8 +26,11 @@ use bevy::{
 };
 use glam::Vec3;
 
-pub use super::drawn_trees::DrawnTrees;
-use super::{instance_layout::instance_layout, transfer::TransferLight};
+use super::instance_layout::instance_layout;
+pub use super::{
+    drawn_trees::DrawnTrees,
+    upload::{DeviceWrites, ForestUpload},
+};
 pub use crate::render::cull::{TreeDraw, TreeVertices};
 use crate::{
     bake::BakedPlant,
@@ -36,7 +39,7 @@ use crate::{
     render::{
         bindings::{SHADOW_FORMAT, caster_layout, frame_layout},
         components::{Forest, SunLight},
-        gpu::{Gpu, opaque_depth, reversed_depth},
+        gpu::{opaque_depth, reversed_depth},
         view::ViewFormat,
     },
 };
@@ -96,7 +99,18 @@ pub trait LevelRenderer: Send + Sync + 'static {
     /// The pipeline for `features` (bits that only this renderer interprets) and `target`. Both entry points of its
     /// shader use groups 0 and 1 as in [`LevelTarget::layouts`].
     fn pipeline(&self, features: u32, target: LevelTarget) -> RenderPipelineDescriptor;
+
+    /// A pipeline of the same layout that writes the depth alone of what [`pipeline`](Self::pipeline) draws into a view of
+    /// `format`, for a level whose light costs much more than its depth. `None`: depth and light are drawn at once. Where
+    /// there is one, both are compiled with the shader definition [`DEPTH_FIRST`], under which their positions must be
+    /// `@invariant`.
+    fn depth_pipeline(&self, _features: u32, _format: ViewFormat) -> Option<RenderPipelineDescriptor> {
+        None
+    }
 }
+
+/// Shader definition of the pipelines of a level whose depth is drawn before its light.
+pub const DEPTH_FIRST: &str = "DEPTH_FIRST";
 
 /// The plants of one forest in one representation on the device.
 pub trait GpuLevel: Send + Sync + 'static {
@@ -127,14 +141,6 @@ pub struct Relight<'a> {
     pub new: &'a [BakedPlant],
     /// How the sun lights each plant; the default beyond the end of the list.
     pub suns: &'a [SunLight],
-}
-
-/// The resources that an upload writes to.
-pub struct ForestUpload<'a, 'w> {
-    /// The device.
-    pub gpu: &'a Gpu<'w>,
-    /// The light for radiance transfer, which records what plants need of it.
-    pub transfer: &'a mut TransferLight,
 }
 
 /// All representations that can be drawn: a resource of the main world until the app is finished, then of the render
@@ -185,4 +191,12 @@ impl RegisterRepresentation for App {
         }
         self
     }
+}
+
+/// A level of one forest on the device.
+pub struct ForestLevel {
+    /// The renderer that draws it.
+    pub renderer: Arc<dyn LevelRenderer>,
+    /// Its plants.
+    pub gpu: Box<dyn GpuLevel>,
 }

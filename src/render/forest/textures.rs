@@ -4,14 +4,17 @@ use std::sync::Arc;
 
 use bevy::{
     platform::collections::HashMap,
-    render::render_resource::{TextureFormat, TextureView},
+    render::render_resource::{TextureFormat, TextureView, TextureViewDescriptor, TextureViewDimension},
 };
 
 use crate::{
     bake::textures::{FilteredTexture, PartTextures},
     math::MipView,
     plant::PartKind,
-    render::gpu::{self, Gpu},
+    render::{
+        forest::upload::ForestUpload,
+        gpu::{self, Gpu},
+    },
 };
 
 /// Textures that several parts share are uploaded once.
@@ -25,22 +28,22 @@ pub struct TextureCache {
 
 impl TextureCache {
     /// The base colour of a part of `kind`; white without a texture.
-    pub fn color(&mut self, textures: &PartTextures, kind: PartKind, gpu: &Gpu) -> TextureView {
+    pub fn color(&mut self, textures: &PartTextures, kind: PartKind, upload: &mut ForestUpload) -> TextureView {
         let format = TextureFormat::Rgba8UnormSrgb;
         let Some(texture) = &textures.color else {
-            return plain("canopy_white", format, [255; 4], gpu);
+            return plain("canopy_white", format, [255; 4], upload.gpu);
         };
         let smallest = if kind == PartKind::Foliage { gpu::SMALLEST_TESTED_MIP } else { 1 };
-        self.uploaded("canopy_base_color", format, texture, smallest, gpu)
+        self.uploaded("canopy_base_color", format, texture, smallest, upload)
     }
 
     /// The normal map. Without one: a texel that no pipeline samples, shared by all materials.
-    pub fn normal(&mut self, textures: &PartTextures, gpu: &Gpu) -> TextureView {
+    pub fn normal(&mut self, textures: &PartTextures, upload: &mut ForestUpload) -> TextureView {
         let format = TextureFormat::Rgba8Unorm;
         match &textures.normals {
-            Some(texture) => self.uploaded("canopy_normal", format, texture, 1, gpu),
+            Some(texture) => self.uploaded("canopy_normal", format, texture, 1, upload),
             None => {
-                let flat = || plain("canopy_flat", format, [128, 128, 255, 255], gpu);
+                let flat = || plain("canopy_flat", format, [128, 128, 255, 255], upload.gpu);
                 self.no_normals.get_or_insert_with(flat).clone()
             }
         }
@@ -52,10 +55,15 @@ impl TextureCache {
         format: TextureFormat,
         texture: &Arc<FilteredTexture>,
         smallest: u32,
-        gpu: &Gpu,
+        upload: &mut ForestUpload,
     ) -> TextureView {
-        let upload = || gpu::texture(&gpu.device, &gpu.queue, label, format, texture.mips(), smallest);
-        self.views.entry(Arc::as_ptr(texture)).or_insert_with(upload).clone()
+        let new = || {
+            let (texture, _) =
+                upload.texture_array(label, format, 1, smallest, texture, |texture, _| Some(texture.mips()));
+            let plain = TextureViewDescriptor { dimension: Some(TextureViewDimension::D2), ..Default::default() };
+            texture.create_view(&plain)
+        };
+        self.views.entry(Arc::as_ptr(texture)).or_insert_with(new).clone()
     }
 }
 

@@ -76,12 +76,14 @@ pub struct Wanted {
 }
 
 impl TransferLight {
-    /// Group 3 of a part; `tint`: the colour of light scattered between leaves ([`indirect_light_color`]).
+    /// Group 3 of a part; `tint`: the colour of light scattered between leaves ([`indirect_light_color`]), `coefficients`:
+    /// a buffer of the part's bytes.
     pub fn bind_group(
         &mut self,
         (settings, part): (&TransferSettings, &PackedPart),
         tint: Vec3,
         sun: SunLight,
+        coefficients: &Buffer,
         gpu: &Gpu,
     ) -> BindGroup {
         self.wanted.bands = self.wanted.bands.max(settings.bands.into());
@@ -95,8 +97,6 @@ impl TransferLight {
                 mapped_at_creation: false,
             })
         });
-        let words = [part.bytes.as_slice(), part.indirect_sun.as_slice()].concat();
-        let coefficients = buffer_with(&gpu.device, "canopy_transfer", BufferUsages::STORAGE, &words);
         let uniform = [TransferUniform::new(settings, part, tint)];
         let uniform = buffer_with(&gpu.device, "canopy_transfer_layout", BufferUsages::STORAGE, &uniform);
         gpu.bind_group(

@@ -11,12 +11,17 @@ use bevy::{
 };
 
 use super::casters::MeshShadows;
-use crate::render::{
-    components::CanopyCamera,
-    forest::{GpuForests, LevelPipelines, draw_levels, representation::LevelTarget},
-    frame_work::FrameWork,
-    gpu::UNIFORM_STRIDE,
+use crate::{
+    cull::Share,
+    render::{
+        components::CanopyCamera,
+        forest::{GpuForests, LevelPipelines, draw_levels, representation::LevelTarget},
+        frame_work::FrameWork,
+        gpu::UNIFORM_STRIDE,
+    },
 };
+
+const TARGET: LevelTarget = LevelTarget::ShadowMap;
 
 /// Draws the casters of every map of the camera's directional lights.
 pub fn draw_mesh_shadows(
@@ -46,7 +51,7 @@ pub fn draw_mesh_shadows(
         pass.set_bind_group(0, group, &[slot as u32 * UNIFORM_STRIDE as u32]);
         for forest in &cast.forests {
             let Some(of) = forests.get(forest.entity) else { continue };
-            draw_levels(&mut pass, of, &forest.pages, LevelTarget::ShadowMap, &pipelines, &cache, &work, |_| 0);
+            draw_levels(&mut pass, of, &forest.pages, Share::ALL, TARGET, &pipelines, &cache, &work, |_| 0);
         }
         span.end(&mut pass);
     }

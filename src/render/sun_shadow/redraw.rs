@@ -20,9 +20,10 @@ use crate::{
             SharedPlacement, SharedTextures, caster_layout,
             uniforms::{CascadeViewUniform, MAX_CASCADES},
         },
+        components::ForestUpdates,
         cull::{CullJobs, ListMaker},
         extract::ExtractedScene,
-        forest::{GpuForests, ListSlot, ListTarget, ListWork, PageTrees, PreparedPage, forest_view},
+        forest::{GpuForests, ListSlot, ListTarget, ListWork, MAP_SHARES, PageTrees, PreparedPage, forest_view},
         gpu::{self, Gpu, UNIFORM_STRIDE},
         report::FrameReport,
         view::PreparedFrame,
@@ -61,6 +62,7 @@ pub fn prepare_shadows(
         None
     };
     if let Some(why) = why_none {
+        maps.fresh = None;
         report.skipped("sun_shadow", why);
         return;
     }
@@ -76,19 +78,40 @@ pub fn prepare_shadows(
         .map(|&radius| CascadeBox::new(view.camera, radius, maps.map_size, direction, f64::from(tallest)))
         .collect();
 
-    for (index, &place) in maps.cascades.iter().enumerate() {
+    // Where forests arrive over several frames, one map a frame takes up those that are new.
+    let spread = scene.forest_updates == ForestUpdates::Spread;
+    let (mut takes_new, mut goes_on) = (true, false);
+    for index in 0..maps.cascades.len() {
+        let place = maps.cascades[index];
         // Near the camera, a finer map already contains the trees' shadows.
         let served = index.checked_sub(1).map_or(0.0, |finer| 0.7 * maps.cascades[finer].radius);
         let content = forests.iter().map(|(entity, forest)| {
             let casting = forest.casting_distances(served..settings.proxy_distance, place.texel);
             (entity, forest.generation, forest.forest.origin, casting)
         });
-        let key = CascadeKey { place, forests: content.collect(), meshes: meshes.state() };
+        let mut key = CascadeKey { place, forests: content.collect(), meshes: meshes.state() };
         let name = format!("sun_shadow cascade {index}");
         let this_view = (view.camera, view.clip_from_relative);
         let drawn = maps.drawn[index].as_ref();
-        let fits = |drawn: &DrawnCascade| drawn.key == key && drawn.seen_by.is_none_or(|seen_by| seen_by == this_view);
-        if drawn.is_some_and(fits) {
+        let fits = |drawn: &DrawnCascade, key: &CascadeKey| {
+            drawn.key == *key && drawn.seen_by.is_none_or(|seen_by| seen_by == this_view) && !drawn.incomplete
+        };
+        let mut fresh = false;
+        if let Some(older) = spread.then(|| key.without_new_forests(drawn.map(|drawn| &drawn.key))).flatten() {
+            let moved = drawn.is_some_and(|drawn| drawn.key.place != place);
+            if drawn.is_some_and(|drawn| fits(drawn, &older)) {
+                if !std::mem::take(&mut takes_new) {
+                    report.skipped(name, "another map takes up a new forest first");
+                    continue;
+                }
+                fresh = true;
+            } else if !moved || !std::mem::take(&mut takes_new) {
+                // What it holds is not what the world was before the new forest. It takes that forest up in another
+                // frame; if it moves, at once, as it may move again in the next frame.
+                key = older;
+            }
+        }
+        if drawn.is_some_and(|drawn| fits(drawn, &key)) {
             report.skipped(name, "light, box and casters have not changed");
             continue;
         }
@@ -99,17 +122,27 @@ pub fn prepare_shadows(
         let same_light = drawn.is_some_and(|drawn| drawn.key.place.direction == key.place.direction);
         let margin = 6.0 * place.texel + 0.6 * f64::from(widest);
         let lowest = lowest_receiver(&scene, view.camera, place.radius) - margin;
-        let seen = (!same_light).then_some(SeenShadows { camera: view.camera, frustum: &view.frustum, lowest, margin });
-        let casting: Vec<_> = key.forests.iter().map(|(.., casting)| casting.clone()).collect();
-        let content = DrawnCascade { key, seen_by: seen.as_ref().map(|_| this_view) };
+        let seen = (!same_light && !fresh).then_some(SeenShadows {
+            camera: view.camera,
+            frustum: &view.frustum,
+            lowest,
+            margin,
+        });
+        let casting = key.forests.clone();
+        let content = DrawnCascade { key, seen_by: seen.as_ref().map(|_| this_view), incomplete: false };
+        if fresh {
+            maps.continue_fresh(&gpu.device, index, &content);
+            goes_on = true;
+        }
         let uniform = CascadeViewUniform {
             clip_from_anchor: place.clip_from_anchor().to_cols_array_2d(),
             direction: place.direction.as_vec3().to_array(),
             padding: 0.0,
         };
         gpu.write(&maps.cascade_uniforms, index as u64 * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));
-        let mut work = CascadeWork { index, content, forests: Vec::new() };
-        for ((entity, forest), casting) in forests.iter().zip(&casting) {
+        let mut work = CascadeWork { index, content, fresh, forests: Vec::new() };
+        for (entity, .., casting) in &casting {
+            let (entity, Some(forest)) = (*entity, forests.get(*entity)) else { continue };
             let buffers = maps.casters.entry(entity).or_insert_with(|| CasterBuffers {
                 uniform: gpu::uniform_slots(&gpu.device, "canopy_caster_views", MAX_CASCADES as u64),
                 lists: Default::default(),
@@ -139,8 +172,12 @@ pub fn prepare_shadows(
         };
         let trees: Option<usize> = work.forests.iter().flat_map(|forest| &forest.pages).map(listed).sum();
         let trees = trees.map_or_else(|| "trees".to_owned(), |count| format!("{count} trees"));
-        report.ran(name, format!("{trees} within {:.0} m", place.radius));
+        let part = if fresh { format!(", one of {MAP_SHARES} parts") } else { String::new() };
+        report.ran(name, format!("{trees} within {:.0} m{part}", place.radius));
         maps.work.push(work);
+    }
+    if !goes_on {
+        maps.fresh = None;
     }
     maps.cascade_bind_group = Some(gpu.bind_group(
         "canopy_cascade",
@@ -159,11 +196,14 @@ fn collect(maps: &mut ShadowMaps, gpu: &Gpu, forests: &GpuForests) -> bool {
     let mut short = false;
     for (entity, buffers) in &mut maps.casters {
         let Some(forest) = forests.get(*entity) else { continue };
-        for (slots, drawn) in buffers.lists.iter_mut().zip(&mut maps.drawn) {
+        for (index, (slots, drawn)) in buffers.lists.iter_mut().zip(&mut maps.drawn).enumerate() {
             for (page, slot) in slots.iter_mut().enumerate() {
-                if slot.collect(gpu, forest, page, ListTarget::ShadowMap) {
-                    (short, *drawn) = (true, None);
+                if !slot.collect(gpu, forest, page, ListTarget::ShadowMap) {
+                    continue;
                 }
+                short = true;
+                drawn.iter_mut().for_each(|drawn| drawn.incomplete = true);
+                maps.fresh.take_if(|fresh| fresh.index == index);
             }
         }
     }

@@ -26,23 +26,25 @@ use crate::{
         report::FrameReport,
         view::PreparedFrame,
     },
-    scatter::CoverMap,
+    scatter::{Area, CoverMap, distance_beyond, surroundings_density},
     terrain::{
         Terrain, TerrainError,
-        sun_horizon::{HorizonGrid, sun_horizon},
+        sun_horizon::{HorizonGrid, sun_horizon_over},
     },
 };
 
-/// Texels along the longer side of the map.
+/// Texels along the longer side of the terrain's data.
 const LONGEST_SIDE: f64 = 512.0;
+/// The most texels along the longer side of a map that reaches beyond them.
+const MOST_SIDE: f64 = 1024.0;
 /// Metres towards the light within which relief can hide it.
 const HORIZON_DISTANCE: u32 = 12_000;
 
 /// Radius in metres of the cover that shades a tree: oblique light passes over about as much ground as trees are high.
 const SHADING_RADIUS: f64 = 32.0;
 
-/// Height in metres above the ground from which the key light is visible (R), canopy cover (G), and canopy cover of the
-/// surroundings (B).
+/// Height in metres above the ground from which the key light is visible (R), canopy cover (G), canopy cover of the
+/// surroundings (B), and cover of trees that are not drawn, because they are beyond those of the scene (A).
 #[derive(Resource)]
 pub struct GroundMap {
     table: LightTable<MapKey>,
@@ -56,6 +58,8 @@ pub struct GroundMap {
 struct MapKey {
     terrain: Arc<Terrain>,
     cover: Option<Arc<CoverMap>>,
+    /// Metres beyond the data that the map reaches.
+    surroundings: f64,
     /// Unit vector to the key light.
     light: Vec3,
 }
@@ -68,7 +72,7 @@ impl PartialEq for MapKey {
 
 impl MapKey {
     fn has_terrain_of(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.terrain, &other.terrain)
+        Arc::ptr_eq(&self.terrain, &other.terrain) && self.surroundings == other.surroundings
     }
 
     fn has_cover_of(&self, other: &Self) -> bool {
@@ -85,22 +89,47 @@ impl MapKey {
         self.has_terrain_of(old) && LightUpdates::is_near(old.light, self.light)
     }
 
+    /// Size of the map in metres.
+    fn extent(&self) -> DVec2 {
+        self.terrain.extent() + 2.0 * self.surroundings
+    }
+
     /// Columns and rows of the map.
     fn size(&self) -> (u32, u32) {
-        let extent = self.terrain.extent();
-        let texel = extent.max_element() / LONGEST_SIDE;
+        let extent = self.extent();
+        let texel = (self.terrain.extent().max_element() / LONGEST_SIDE).max(extent.max_element() / MOST_SIDE);
         ((extent.x / texel).ceil().max(1.0) as u32, (extent.y / texel).ceil().max(1.0) as u32)
+    }
+
+    /// The middle of a texel, metres from the terrain's centre.
+    fn place(&self, column: u32, row: u32) -> DVec2 {
+        let ((columns, rows), extent) = (self.size(), self.extent());
+        let cell = extent / DVec2::new(f64::from(columns), f64::from(rows));
+        (DVec2::new(f64::from(column), f64::from(row)) + 0.5) * cell - 0.5 * extent
     }
 
     /// Computes the map; `wide` is the cover of the surroundings, if it is known.
     fn content(&self, wide: Option<Arc<CoverMap>>) -> Result<MapContent, TerrainError> {
         let (columns, rows) = self.size();
         let grid = HorizonGrid { columns: columns as usize, rows: rows as usize, max_distance: HORIZON_DISTANCE };
-        let horizon = sun_horizon(&self.terrain, &grid, self.light.as_dvec3())?;
+        let horizon = sun_horizon_over(&self.terrain, self.extent(), &grid, self.light.as_dvec3())?;
         let wide = wide.or_else(|| self.cover.as_ref().map(|cover| Arc::new(cover.widened(SHADING_RADIUS))));
-        let texels = texels(self, wide.as_deref(), &horizon);
-        let sum: f32 = texels.iter().map(|texel| texel[1].to_f32()).sum();
-        Ok(MapContent { mean_cover: sum / texels.len().max(1) as f32, texels, wide })
+        let mut texels = texels(self, wide.as_deref(), &horizon);
+        // Of the data, not of what thins out around it.
+        let half = 0.5 * self.terrain.extent();
+        let beyond = |index: usize| {
+            distance_beyond(&Area { min: -half, max: half }, self.place(index as u32 % columns, index as u32 / columns))
+        };
+        let of_data = texels.iter().enumerate().filter(|(index, _)| beyond(*index) <= 0.0);
+        let (sum, count) = of_data.fold((0.0f32, 0), |(sum, count), (_, texel)| (sum + texel[1].to_f32(), count + 1));
+        let mean_cover = sum / count.max(1) as f32;
+        if self.surroundings > 0.0 {
+            for (index, texel) in texels.iter_mut().enumerate() {
+                let drawn = surroundings_density(beyond(index), self.surroundings) as f32;
+                texel[3] = f16::from_f32(mean_cover * (1.0 - drawn));
+            }
+        }
+        Ok(MapContent { mean_cover, texels, wide })
     }
 }
 
@@ -170,8 +199,10 @@ fn update(
         return;
     };
     let Some(daylight) = &scene.daylight else { return };
-    let Ground { terrain, cover, .. } = ground;
-    let wanted = MapKey { terrain: terrain.clone(), cover: cover.clone(), light: daylight.0.key_direction };
+    let Ground { terrain, cover, surroundings, .. } = ground;
+    let surroundings = if surroundings.is_finite() { surroundings.clamp(0.0, 1e6) } else { 0.0 };
+    let wanted =
+        MapKey { terrain: terrain.clone(), cover: cover.clone(), surroundings, light: daylight.0.key_direction };
     let known = map.content.key().is_some_and(|key| key.has_cover_of(&wanted));
     let wide = map.content.value().and_then(|content| content.as_ref().ok()?.wide.clone()).filter(|_| known);
     let key = wanted.clone();
@@ -187,7 +218,7 @@ fn update(
     };
     let size = key.size();
     map.table.resize(device, size);
-    map.extent = key.terrain.extent();
+    map.extent = key.extent();
     map.mean_cover = content.mean_cover;
     map.table.update(queue, key.clone(), || &content.texels);
     let cells = format!("{} × {} cells", size.0, size.1);
@@ -202,10 +233,8 @@ fn update(
 /// One texel per cell, row by row from the north.
 fn texels(key: &MapKey, wide: Option<&CoverMap>, horizon: &[f32]) -> Vec<[f16; 4]> {
     let (columns, rows) = key.size();
-    let extent = key.terrain.extent();
-    let cell = extent / DVec2::new(f64::from(columns), f64::from(rows));
     let texel = |column: u32, row: u32| {
-        let place = (DVec2::new(f64::from(column), f64::from(row)) + 0.5) * cell - 0.5 * extent;
+        let place = key.place(column, row);
         let height = key.terrain.height(place.x, place.y) as f32;
         let clears = horizon.get((row * columns + column) as usize).map_or(0.0, |h| h - height);
         let cover = key.cover.as_ref().map_or(0.0, |cover| cover.at(place));

@@ -5,10 +5,10 @@
 //! neighbours always match ([`crate::terrain::tiles`]). A tile's heights and normals are evaluated on the CPU from the
 //! same smooth surface on which the trees stand, once, and kept on the GPU while the tile is in use.
 //!
-//! Ground colour follows slope, height, canopy cover and noise (`shaders/terrain/terrain.wgsl`).
+//! Ground colour follows slope, canopy cover and noise that never repeats (`shaders/terrain/ground_color.wgsl`,
+//! [`crate::terrain::ground_noise`]). Octaves finer than a pixel are not computed.
 
 mod ground_map;
-mod noise_texture;
 mod pass;
 mod pipeline;
 mod tile_cache;

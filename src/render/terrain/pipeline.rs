@@ -9,9 +9,8 @@ use bevy::{
     },
     render::render_resource::{
         BindGroupLayoutDescriptor, BindGroupLayoutEntries, CachedRenderPipelineId, Face, PipelineCache, PrimitiveState,
-        RenderPipelineDescriptor, SamplerBindingType, ShaderStages, SpecializedRenderPipeline,
-        SpecializedRenderPipelines, TextureSampleType,
-        binding_types::{sampler, storage_buffer_read_only_sized, texture_2d},
+        RenderPipelineDescriptor, ShaderStages, SpecializedRenderPipeline, SpecializedRenderPipelines,
+        binding_types::storage_buffer_read_only_sized,
     },
     shader::Shader,
 };
@@ -23,18 +22,13 @@ use crate::render::{
     view::{PreparedFrame, ViewFormat},
 };
 
-/// Group 1: vertices, tiles, noise.
+/// Group 1: vertices, tiles.
 pub fn terrain_layout() -> BindGroupLayoutDescriptor {
     BindGroupLayoutDescriptor::new(
         "canopy_terrain",
         &BindGroupLayoutEntries::sequential(
             ShaderStages::VERTEX_FRAGMENT,
-            (
-                storage_buffer_read_only_sized(false, None),
-                storage_buffer_read_only_sized(false, None),
-                texture_2d(TextureSampleType::Float { filterable: true }),
-                sampler(SamplerBindingType::Filtering),
-            ),
+            (storage_buffer_read_only_sized(false, None), storage_buffer_read_only_sized(false, None)),
         ),
     )
 }

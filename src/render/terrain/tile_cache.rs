@@ -75,11 +75,15 @@ impl TileCache {
         self.free = (0..capacity).rev().collect();
     }
 
+    /// The most tiles that `device` holds: their vertices lie in one storage buffer.
+    pub fn most(device: &RenderDevice) -> usize {
+        let limit = device.limits().max_storage_buffer_binding_size.min(device.limits().max_buffer_size) as usize;
+        limit / (TILE_VERTICES * size_of::<GpuTileVertex>())
+    }
+
     /// Makes room for `wanted` tiles; the current tiles may have to be uploaded again.
     pub fn reserve(&mut self, device: &RenderDevice, wanted: usize) {
-        let limit = device.limits().max_storage_buffer_binding_size as usize;
-        let most = limit / (TILE_VERTICES * size_of::<GpuTileVertex>());
-        let capacity = wanted.next_power_of_two().max(FIRST_SLOTS).min(most);
+        let capacity = wanted.next_power_of_two().max(FIRST_SLOTS).min(Self::most(device));
         if capacity > self.capacity {
             self.clear(device, capacity);
         }

@@ -6,19 +6,15 @@ use bevy::{
         system::{Res, ResMut},
         world::{FromWorld, World},
     },
-    log::error_once,
+    log::{error_once, warn_once},
     render::{
-        render_resource::{
-            AddressMode, BindGroup, BindGroupEntries, Buffer, BufferUsages, FilterMode, MipmapFilterMode,
-            PipelineCache, Sampler, SamplerDescriptor, TextureView,
-        },
+        render_resource::{BindGroup, BindGroupEntries, Buffer, BufferUsages, PipelineCache},
         renderer::{RenderDevice, RenderQueue},
     },
 };
 use glam::DVec3;
 
 use super::{
-    noise_texture::noise_texture,
     pipeline::terrain_layout,
     tile_cache::{TILE_VERTICES, TileCache},
     vertex::GpuTile,
@@ -49,8 +45,6 @@ pub struct GpuTerrain {
     pub count: u32,
     /// Group 1.
     pub bind_group: Option<BindGroup>,
-    noise: Option<TextureView>,
-    sampler: Sampler,
     frame: u64,
 }
 
@@ -65,16 +59,6 @@ impl FromWorld for GpuTerrain {
             index_count: indices.len() as u32,
             count: 0,
             bind_group: None,
-            noise: None,
-            sampler: device.create_sampler(&SamplerDescriptor {
-                label: Some("canopy_ground_noise"),
-                address_mode_u: AddressMode::Repeat,
-                address_mode_v: AddressMode::Repeat,
-                mag_filter: FilterMode::Linear,
-                min_filter: FilterMode::Linear,
-                mipmap_filter: MipmapFilterMode::Linear,
-                ..Default::default()
-            }),
             frame: 0,
         }
     }
@@ -130,7 +114,8 @@ pub fn prepare_tiles(
     let Some(cache) = &mut gpu.cache else { return };
     gpu.frame += 1;
     let mut chosen: Vec<Tile> = Vec::new();
-    let clearance = cache.tree.select(
+    let (clearance, factor) = cache.tree.select_at_most(
+        TileCache::most(&device),
         camera,
         f64::from(view.focal_pixels),
         |min: DVec3, max: DVec3| view.frustum.sees_box((min - camera).as_vec3(), (max - camera).as_vec3()),
@@ -141,7 +126,8 @@ pub fn prepare_tiles(
     let mut tiles = Vec::with_capacity(chosen.len());
     for tile in &chosen {
         let Some(slot) = cache.slot((tile.level, tile.ix, tile.iz), gpu.frame, &queue, &mut made) else {
-            error_once!("the view needs more terrain tiles than the device can hold; raise `terrain_error`");
+            // A bound on the number of tiles is in the selection.
+            error_once!("a terrain tile found no room on the device");
             break;
         };
         let corner = cache.tree.tile_origin(tile.level, tile.ix, tile.iz);
@@ -158,21 +144,23 @@ pub fn prepare_tiles(
     gpu.tiles.write(&device, &queue, &tiles);
     gpu.count = tiles.len() as u32;
     *statistics = TerrainStatistics { tiles: tiles.len(), triangles: tiles.len() * gpu.index_count as usize / 3 };
-    report.ran("terrain", format!("{} tiles", tiles.len()));
+    let coarser = if factor > 1.0 {
+        warn_once!(
+            "the device cannot hold the terrain tiles of the view: they are coarser than `terrain_error` asks for; raise it"
+        );
+        format!(", with {factor} times the error, because the device holds no more")
+    } else {
+        String::new()
+    };
+    report.ran("terrain", format!("{} tiles{coarser}", tiles.len()));
     if made == 0 {
         report.skipped("terrain tiles", "all tiles of the view are on the GPU");
     } else {
         report.ran("terrain tiles", format!("{made} uploaded"));
     }
-    let noise = gpu.noise.get_or_insert_with(|| noise_texture(&device, &queue));
     gpu.bind_group = Some(device.create_bind_group(
         "canopy_terrain",
         &pipelines.get_bind_group_layout(&terrain_layout()),
-        &BindGroupEntries::sequential((
-            cache.vertices.as_entire_binding(),
-            gpu.tiles.buffer().as_entire_binding(),
-            &*noise,
-            &gpu.sampler,
-        )),
+        &BindGroupEntries::sequential((cache.vertices.as_entire_binding(), gpu.tiles.buffer().as_entire_binding())),
     ));
 }

@@ -66,6 +66,9 @@ const NEVER: f64 = 1.0e12;
 /// Cameras farther out (metres) are taken as standing here, so that tile coordinates fit i32.
 const FARTHEST_CAMERA: f64 = 1.0e7;
 
+/// The most by which the pixel error is raised for a bound of the number of tiles: the ranges change no more.
+const LARGEST_FACTOR: f64 = 1_048_576.0;
+
 /// Settings for the detail of the drawn ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TileSettings {
@@ -286,6 +289,29 @@ impl TileTree {
             morph_end: ranges[node.level].end as f32,
         }));
         clearance
+    }
+
+    /// As [`select`](Self::select), with at most `most` tiles: where the pixel error would need more, it is doubled until
+    /// they suffice, so that coarser tiles cover the ground. Returns the clearance, and the factor on the pixel error.
+    ///
+    /// No error is large enough for less than a few dozen tiles a level: then the nearest `most` are left.
+    pub fn select_at_most(
+        &self,
+        most: usize,
+        camera: DVec3,
+        focal_px: f64,
+        visible: impl Fn(DVec3, DVec3) -> bool,
+        out: &mut Vec<Tile>,
+    ) -> (f64, f64) {
+        let mut factor = 1.0;
+        loop {
+            let clearance = self.select(camera, focal_px / factor, &visible, out);
+            if out.len() <= most || factor >= LARGEST_FACTOR {
+                out.truncate(most);
+                return (clearance, factor);
+            }
+            factor *= 2.0;
+        }
     }
 
     /// The vertices of a tile, row by row from the north, each row from the west: `(N + 1)²` of them; x and z follow

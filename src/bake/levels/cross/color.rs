@@ -13,8 +13,18 @@ use crate::plant::texture::{AlphaFade, alpha_tested_mips, dilate_colors, fade_al
 /// Colour mips of a texture of `resolution`² texels. Alpha is the coverage, restructured by [`fade_alpha`] with the
 /// cutoff for which the area inside the outline is the sum of the coverages: a thin crown is full of texels that are
 /// covered in part, and a cutoff of one half would drop or fill them all.
-pub(super) fn mips(texels: &[Texel], resolution: usize, fade: AlphaFade) -> MipChain {
-    let mut image = RgbaImage::new(resolution as u32, resolution as u32);
+pub(in crate::bake::levels) fn mips(texels: &[Texel], resolution: usize, fade: AlphaFade) -> MipChain {
+    let mut image = outlined(texels, resolution, fade);
+    if texels.iter().any(|texel| texel.coverage > 0.0) {
+        dilate_colors(&mut image);
+    }
+    alpha_tested_mips(&image)
+}
+
+/// The texels, rows of `width`, as colours whose alpha covers what they cover.
+pub(in crate::bake::levels) fn outlined(texels: &[Texel], width: usize, fade: AlphaFade) -> RgbaImage {
+    let height = texels.len().checked_div(width).unwrap_or(0);
+    let mut image = RgbaImage::new(width as u32, height as u32);
     for (out, texel) in image.pixels_mut().zip(texels) {
         if texel.coverage > 0.0 {
             let color = (texel.color / texel.coverage).to_array().map(srgb8);
@@ -22,11 +32,7 @@ pub(super) fn mips(texels: &[Texel], resolution: usize, fade: AlphaFade) -> MipC
         }
     }
     let coverage: f64 = texels.iter().map(|texel| f64::from(texel.coverage)).sum::<f64>() / texels.len().max(1) as f64;
-    if coverage > 0.0 {
-        image = restructured(&image, coverage, fade);
-        dilate_colors(&mut image);
-    }
-    alpha_tested_mips(&image)
+    if coverage > 0.0 { restructured(&image, coverage, fade) } else { image }
 }
 
 /// Restructures alpha so that it covers `coverage` (0..1) of the square.

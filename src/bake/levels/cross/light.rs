@@ -25,7 +25,7 @@
 
 use glam::{Mat3, Vec3, Vec4};
 
-use super::Texel;
+use super::{Texel, signed_mips::signed_mips};
 use crate::bake::lighting::BakedLighting;
 use crate::math::MipChain;
 
@@ -33,10 +33,10 @@ use crate::math::MipChain;
 pub const LIGHT_SCALE: f32 = 0.4;
 
 /// The two sides of a vertex in the plant's frame: the vector, and in w the first coefficient.
-pub(super) type Sides = [Vec4; 2];
+pub(in crate::bake::levels) type Sides = [Vec4; 2];
 
 /// Those of each vertex of each part; `None` where a plant is not lit by transfer.
-pub(super) fn vertex_sides(lighting: &BakedLighting) -> Option<Vec<Vec<Sides>>> {
+pub(in crate::bake::levels) fn vertex_sides(lighting: &BakedLighting) -> Option<Vec<Vec<Sides>>> {
     let BakedLighting::Transfer(transfer) = lighting else { return None };
     let baked = transfer.packed.unpack();
     let (count, channels) = (baked.settings.coefficients().max(1), baked.settings.channels.count());
@@ -56,50 +56,16 @@ pub(super) fn vertex_sides(lighting: &BakedLighting) -> Option<Vec<Vec<Sides>>> 
 }
 
 /// What a sample stores whose viewer sees `near`, with light of the share `transmission` from `far`.
-pub(super) fn stored(near: Vec4, far: Vec4, transmission: f32, to_plane: &Mat3) -> Vec4 {
+pub(in crate::bake::levels) fn stored(near: Vec4, far: Vec4, transmission: f32, to_plane: &Mat3) -> Vec4 {
     let sum = (near + far * transmission) / (1.0 + transmission);
     let sum = (*to_plane * sum.truncate()).extend(sum.w);
     if sum.is_finite() { sum } else { Vec4::ZERO }
 }
 
-/// Mips as signed bytes, a texture of `resolution`² texels (a power of two) on top. Means are weighted with the
-/// coverage, from level to level in floating point; a texel of air holds what the coarser level does, and one of no
-/// plant at all is in the open.
-pub(super) fn mips(texels: &[Texel], resolution: usize) -> MipChain {
-    let mut levels: Vec<Vec<(Vec4, f32)>> = vec![texels.iter().map(|texel| (texel.light, texel.coverage)).collect()];
-    let mut size = resolution;
-    while size > 1 {
-        let half = size / 2;
-        let finer = levels.last().map_or(&[][..], Vec::as_slice);
-        let halved = (0..half * half).map(|at| {
-            let corner = 2 * (at / half) * size + 2 * (at % half);
-            [corner, corner + 1, corner + size, corner + size + 1]
-                .iter()
-                .fold((Vec4::ZERO, 0.0), |(sum, weight), &i| (sum + finer[i].0, weight + finer[i].1))
-        });
-        let halved = halved.collect();
-        levels.push(halved);
-        size = half;
-    }
-    let mut above = vec![Vec3::ZERO.extend(0.282)];
-    let mut coded: Vec<Vec<u8>> = Vec::with_capacity(levels.len());
-    for (depth, level) in levels.into_iter().rev().enumerate() {
-        let (size, coarser) = (1usize << depth, (1usize << depth) / 2);
-        let mean = |(at, (sum, weight)): (usize, &(Vec4, f32))| {
-            let parent = (at / size / 2) * coarser + at % size / 2;
-            if *weight > 0.0 { *sum / *weight } else { above[parent.min(above.len() - 1)] }
-        };
-        let means: Vec<Vec4> = level.iter().enumerate().map(mean).collect();
-        coded.push(means.iter().flat_map(|mean| mean.to_array().map(code)).collect());
-        above = means;
-    }
-    coded.reverse();
-    MipChain { width: resolution as u32, height: resolution as u32, levels: coded }
-}
-
-/// A coefficient as a signed byte.
-fn code(value: f32) -> u8 {
-    ((value / LIGHT_SCALE).clamp(-1.0, 1.0) * 127.0).round() as i8 as u8
+/// Mips of the light, a texture of `resolution`² texels (a power of two) on top. One of no plant at all is in the open.
+pub(in crate::bake::levels) fn mips(texels: &[Texel], resolution: usize) -> MipChain {
+    let values = texels.iter().map(|texel| (texel.light, texel.coverage)).collect();
+    signed_mips(values, resolution, LIGHT_SCALE, Vec3::ZERO.extend(0.282))
 }
 
 #[cfg(test)]
@@ -107,7 +73,7 @@ mod tests {
     use std::f32::consts::PI;
     use std::sync::Arc;
 
-    use super::super::{CrossSettings, planes, render_plane};
+    use super::super::{CrossSettings, planes, render_plane, signed_mips::code};
     use super::*;
     use crate::bake::lighting::LightingSettings;
     use crate::bake::lighting::transfer::{TransferSettings, share};
@@ -128,7 +94,7 @@ mod tests {
         let plane = &planes(&plant)[0];
         let frame = plane.frame();
         let sides = vertex_sides(&lighting).unwrap();
-        let texels = render_plane(&plant, &lighting, Some(&sides), plane, &settings);
+        let texels = render_plane(&plant, &lighting, Some(&sides), plane, &settings).texels;
         let codes = mips(&texels, 64);
         let air = Atmosphere::new(AtmosphereParams::with_visibility_km(60.0)).unwrap();
         for elevation in [40.0, 5.0, -4.0] {
@@ -144,7 +110,7 @@ mod tests {
                 (0..count).map(side).collect::<Vec<Sides>>()
             };
             let lit: Vec<Vec<Sides>> = (0..baked.parts.len()).map(vertices).collect();
-            let truth = render_plane(&plant, &lighting, Some(&lit), plane, &settings);
+            let truth = render_plane(&plant, &lighting, Some(&lit), plane, &settings).texels;
             let vector = frame.transpose() * Vec3::new(-luminance(sky[1]), luminance(sky[2]), -luminance(sky[3]));
             let (mut error, mut error_by_ambient, mut square) = (0.0, 0.0, 0.0);
             for (at, (texel, truth)) in texels.iter().zip(&truth).enumerate().filter(|(_, (t, _))| t.foliage > 0.0) {
@@ -174,6 +140,7 @@ mod tests {
         texels[5] = Texel { coverage: 1.0, light: Vec4::new(0.2, -0.4, 0.0, 0.1), ..Texel::default() };
         let chain = mips(&texels, 4);
         assert_eq!(chain.levels.len(), 3);
+        let code = |value| code(value, LIGHT_SCALE);
         let expected = [0.2, -0.4, 0.0, 0.1].map(code);
         assert!(chain.levels.iter().flat_map(|level| level.chunks_exact(4)).all(|texel| texel == expected));
         assert_eq!([0.4, -0.4, 9.0, f32::NAN].map(|v| code(v) as i8), [127, -127, 127, 0]);

@@ -2,23 +2,28 @@
 //!
 //! Two vertical planes at right angles through the trunk's axis and a horizontal one through the foliage's centre.
 //! Each plane's texture shows the *whole* plant seen along the plane's normal, so three quads represent the tree from
-//! every side. No light is baked in: a texel has a base colour, normal, ambient term and a fraction of foliage, and is
-//! lit like the full model. If the plant is lit by radiance transfer, a texel also has the transfer of the sky's light
-//! (`light.rs`).
+//! every side. A texel has a base colour, normal, ambient term and a fraction of foliage; how much of the sun's light it shows,
+//! for every sun (`sun.rs`); and if the plant is lit by radiance transfer, the transfer of the sky's light (`light.rs`).
 //!
 //! ```text
 //! plant, lighting --rasterise (rasterize.rs)--> samples --resolve--> texels --color.rs-----> base colour, alpha
-//!                                                                           \-properties.rs-> normal, ambient term, foliage
+//!                                                           |               \-properties.rs-> normal, ambient term, foliage
+//!                                                           \-one sample of each texel--sun.rs--> light of the sun
 //! ```
 //!
 //! Cost: three images of (resolution * supersampling)² samples. Limits: a plane looks right along its normal and
 //! lacks parallax in other directions; a plane seen from behind shows the texture of its front, mirrored.
 
-mod color;
-mod light;
-mod properties;
+pub(super) mod color;
+pub(super) mod light;
+pub(super) mod properties;
+mod signed_mips;
+mod sun;
 
 pub use light::LIGHT_SCALE;
+pub use sun::SUN_SCALE;
+
+use std::sync::Arc;
 
 use glam::{Mat3, Vec3, Vec4};
 use rayon::prelude::*;
@@ -27,7 +32,7 @@ use serde::{Deserialize, Serialize};
 use self::properties::IsotropicSum;
 use super::rasterize::{Hit, Raster, View};
 use crate::bake::lighting::BakedLighting;
-use crate::math::{MipChain, luminance};
+use crate::math::{MipChain, hash::mix32, luminance};
 use crate::plant::{Bounds, PartKind, Plant, PlantMaterial, geometry, texture::AlphaFade};
 
 /// Crossed billboards of one plant.
@@ -50,12 +55,13 @@ impl Cross {
     /// Whether the lists go together, of a plant that is lit by radiance transfer or not, and all values are in their
     /// ranges.
     pub fn is_whole(&self, of_transfer: bool) -> bool {
-        let CrossTextures { color, properties, light } = &self.textures;
+        let CrossTextures { color, properties, sun, light } = &self.textures;
         let planes = self.planes.len();
         let finite = |plane: &CrossPlane| [plane.center, plane.u, plane.v, plane.normal].iter().all(|v| v.is_finite());
         self.planes.iter().all(finite)
-            && [color.len(), properties.len(), light.len()] == [planes, planes, if of_transfer { planes } else { 0 }]
-            && color.iter().chain(properties).chain(light).all(MipChain::is_whole)
+            && [color.len(), properties.len(), sun.len()] == [planes, planes, 2 * planes]
+            && light.len() == if of_transfer { planes } else { 0 }
+            && color.iter().chain(properties).chain(sun).chain(light).all(MipChain::is_whole)
             && self.transmission.is_finite()
             && self.isotropic_fraction.iter().all(|share| (0.0..=1.0).contains(share))
     }
@@ -106,6 +112,11 @@ pub struct CrossTextures {
     /// B: ambient term (ambient occlusion). A: fraction of foliage (1 leaf, 0 wood), the weight of transmission.
     /// Linear 8 bit; texels outside the outline continue those inside.
     pub properties: Vec<MipChain>,
+    /// The sun's light, two textures per plane: signed bytes, of which 127 stands for [`SUN_SCALE`], the coefficients of eight
+    /// functions of the direction to the sun (the page of `sun.rs`) in the plane's frame, whose third axis is flipped
+    /// like the normal's where the plane is seen from behind. The radiance of a texel under the sun is its base colour times
+    /// `1 + transmission`, times illuminance over pi, times their sum.
+    pub sun: Vec<MipChain>,
     /// Radiance transfer of the sky's light, for plants that are lit by it; empty for others. Signed bytes, of which
     /// 127 stands for [`LIGHT_SCALE`]. RGB: a vector in the plane's frame, whose third component is flipped like the
     /// normal's where the plane is seen from behind. A: the mean over all directions. The radiance of a texel under the
@@ -118,7 +129,7 @@ pub struct CrossTextures {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CrossSettings {
     /// Edge of the square textures in texels, 64..=1024, rounded up to a power of two. Larger textures allow crosses
-    /// nearer to the viewer; memory grows with the square (256: 2.1 MB per plant, 3.1 MB if it is lit by transfer).
+    /// nearer to the viewer; memory grows with the square (256: 4.2 MB per plant, 5.2 MB if it is lit by transfer).
     pub resolution: u32,
     /// Samples per texel along each axis, 1..=8. More give smoother colours and normals; time grows with the square.
     pub supersampling: u32,
@@ -154,34 +165,42 @@ impl CrossSettings {
 /// Makes the crossed billboards of `plant` with the normals and the ambient term of its `lighting`; missing values are
 /// the plant's own, or 1. The planes cover the plant's bounds exactly; an empty plant gets three planes without extent
 /// and wholly transparent textures.
-pub fn bake_cross(plant: &Plant, lighting: &BakedLighting, settings: &CrossSettings) -> Cross {
+pub fn bake_cross(plant: &Arc<Plant>, lighting: &BakedLighting, settings: &CrossSettings) -> Cross {
     let settings = settings.sanitized();
     let planes = planes(plant);
     let resolution = settings.resolution as usize;
     let sides = light::vertex_sides(lighting);
-    let images: Vec<_> = planes
+    let render = |plane| render_plane(plant, lighting, sides.as_deref(), plane, &settings);
+    let images: Vec<Image> = planes.par_iter().map(render).collect();
+    let samples: Vec<Vec<sun::Sample>> = images.iter().map(Image::samples).collect();
+    let coefficients = sun::coefficients(plant, &planes, &samples);
+    let textures: Vec<_> = images
         .par_iter()
-        .map(|plane| {
-            let texels = render_plane(plant, lighting, sides.as_deref(), plane, &settings);
-            let properties = properties::mips(&texels, resolution, settings.normal_smoothing);
-            let light = sides.is_some().then(|| light::mips(&texels, resolution));
-            (color::mips(&texels, resolution, settings.fade), (properties, light))
+        .zip(&coefficients)
+        .map(|(image, coefficients)| {
+            let texels = &image.texels;
+            let properties = properties::mips(texels, resolution, settings.normal_smoothing);
+            let light = sides.is_some().then(|| light::mips(texels, resolution));
+            let sun = sun::mips(image, coefficients, resolution);
+            (color::mips(texels, resolution, settings.fade), (properties, (sun, light)))
         })
         .collect();
-    let (color, properties): (Vec<_>, Vec<_>) = images.into_iter().unzip();
-    let (properties, light): (Vec<_>, Vec<_>) = properties.into_iter().unzip();
+    let (color, rest): (Vec<_>, Vec<_>) = textures.into_iter().unzip();
+    let (properties, rest): (Vec<_>, Vec<_>) = rest.into_iter().unzip();
+    let (sun, light): (Vec<_>, Vec<_>) = rest.into_iter().unzip();
     let (properties, isotropy): (Vec<_>, Vec<_>) = properties.into_iter().unzip();
-    let textures = CrossTextures { color, properties, light: light.into_iter().flatten().collect() };
+    let sun = sun.into_iter().flatten().collect();
+    let light = light.into_iter().flatten().collect();
     Cross {
         planes,
-        textures,
+        textures: CrossTextures { color, properties, sun, light },
         transmission: mean_transmission(plant),
         isotropic_fraction: mean_isotropic_fraction(&isotropy),
     }
 }
 
 /// Mean over the planes' images, level by level; levels beyond the coarsest mip repeat it.
-fn mean_isotropic_fraction(images: &[Vec<IsotropicSum>]) -> [f32; ISOTROPIC_LEVELS] {
+pub(in crate::bake::levels) fn mean_isotropic_fraction(images: &[Vec<IsotropicSum>]) -> [f32; ISOTROPIC_LEVELS] {
     std::array::from_fn(|level| {
         let (mut isotropic, mut weight) = (0.0, 0.0);
         for sum in images.iter().filter_map(|levels| levels.get(level).or(levels.last())) {
@@ -226,7 +245,7 @@ fn foliage_height(plant: &Plant) -> Option<f32> {
     height.is_finite().then_some(height)
 }
 
-fn mean_transmission(plant: &Plant) -> Vec3 {
+pub(in crate::bake::levels) fn mean_transmission(plant: &Plant) -> Vec3 {
     let (mut sum, mut total) = (Vec3::ZERO, 0.0);
     for part in plant.parts.iter().filter(|part| part.kind == PartKind::Foliage) {
         let area: f64 = geometry::triangles(&part.mesh).map(|(_, c)| f64::from(geometry::area(&part.mesh, c))).sum();
@@ -241,9 +260,9 @@ fn mean_transmission(plant: &Plant) -> Vec3 {
 /// The mean of a texel's samples. All but `coverage` are weighted with it: sums over the samples that see the plant,
 /// divided by the number of all samples.
 #[derive(Clone, Copy, Debug, Default)]
-struct Texel {
+pub(in crate::bake::levels) struct Texel {
     /// Share of the samples that see the plant, 0..1.
-    coverage: f32,
+    pub coverage: f32,
     /// Linear base colour.
     color: Vec3,
     /// Normal in the plane's frame; that of a leaf is flipped towards the viewer.
@@ -256,30 +275,87 @@ struct Texel {
     light: Vec4,
 }
 
-/// Renders the plant onto one plane, row by row from the top.
+/// What a plane shows.
+pub(in crate::bake::levels) struct Image {
+    /// Row by row from the top.
+    pub texels: Vec<Texel>,
+    /// Of each texel that shows the plant: which one, and one of its samples, chosen at random.
+    seen: Vec<(u32, sun::Sample)>,
+}
+
+impl Image {
+    fn samples(&self) -> Vec<sun::Sample> {
+        self.seen.iter().map(|(_, sample)| *sample).collect()
+    }
+}
+
+/// Renders the plant onto one plane.
 fn render_plane(
     plant: &Plant,
     lighting: &BakedLighting,
     sides: Option<&[Vec<light::Sides>]>,
     plane: &CrossPlane,
     settings: &CrossSettings,
-) -> Vec<Texel> {
+) -> Image {
     const ROWS: u32 = 8;
-    let (resolution, samples) = (settings.resolution, settings.supersampling);
     let view = View { center: plane.center, right: plane.u, up: plane.v, toward: plane.normal };
-    let side = resolution * samples;
-    let raster = Raster::new(plant, &view, side, side, ROWS * samples);
+    let side = settings.resolution * settings.supersampling;
+    let raster = Raster::new(plant, &view, side, side, ROWS * settings.supersampling);
     let shader =
         Shader { plant, lighting, sides, raster: &raster, to_plane: plane.frame().transpose(), toward: plane.normal };
-    let (side, samples, resolution) = (side as usize, samples as usize, resolution as usize);
-    let bands: Vec<Vec<Texel>> = (0..raster.band_count())
-        .into_par_iter()
-        .map(|band| {
-            let hits = raster.draw(band);
+    shader.image(settings.supersampling as usize)
+}
+
+/// Looks up what a sample sees.
+pub(in crate::bake::levels) struct Shader<'a> {
+    pub plant: &'a Plant,
+    pub lighting: &'a BakedLighting,
+    pub raster: &'a Raster,
+    pub sides: Option<&'a [Vec<light::Sides>]>,
+    pub to_plane: Mat3,
+    pub toward: Vec3,
+}
+
+/// The surface that a sample sees.
+struct Seen {
+    part: usize,
+    corners: [usize; 3],
+    weights: [f32; 3],
+    /// Whether it is seen from behind.
+    from_behind: bool,
+    /// Unit length, towards the viewer.
+    normal: Vec3,
+    /// Linear base colour.
+    color: Vec3,
+    /// Luminance of the light that comes through, as a share of what is reflected.
+    transmission: f32,
+}
+
+impl Seen {
+    fn weighted(&self) -> impl Iterator<Item = (usize, f32)> {
+        self.corners.into_iter().zip(self.weights)
+    }
+}
+
+impl Shader<'_> {
+    /// What the raster shows, row by row from the top: means of `samples`² of its samples. The rows of a band and the
+    /// columns of the image must be multiples of `samples`.
+    pub fn image(&self, samples: usize) -> Image {
+        let side = self.raster.width();
+        let row_texels = side / samples;
+        let of_band = |band: usize| {
+            let hits = self.raster.draw(band);
+            let first = self.raster.first_row(band) / samples * row_texels;
             let mut texels = vec![Texel::default(); hits.len() / (samples * samples)];
+            let mut chosen: Vec<Option<(u32, &Hit)>> = vec![None; texels.len()];
             for (at, hit) in hits.iter().enumerate().filter(|(_, hit)| hit.is_some()) {
                 let (row, column) = (at / side / samples, at % side / samples);
-                shader.add(hit, &mut texels[row * resolution + column]);
+                let texel = row * row_texels + column;
+                self.add(hit, &mut texels[texel]);
+                let lot = mix32((first * samples * samples + at) as u32);
+                if chosen[texel].is_none_or(|(other, _)| lot > other) {
+                    chosen[texel] = Some((lot, hit));
+                }
             }
             let share = 1.0 / (samples * samples) as f32;
             for texel in &mut texels {
@@ -290,24 +366,16 @@ fn render_plane(
                 texel.foliage *= share;
                 texel.light *= share;
             }
-            texels
-        })
-        .collect();
-    bands.concat()
-}
+            let chosen = chosen.into_iter().enumerate();
+            let seen = chosen.filter_map(|(texel, chosen)| Some(((first + texel) as u32, self.sample(chosen?.1))));
+            Image { texels, seen: seen.collect() }
+        };
+        let bands: Vec<Image> = (0..self.raster.band_count()).into_par_iter().map(of_band).collect();
+        let (texels, seen): (Vec<_>, Vec<_>) = bands.into_iter().map(|band| (band.texels, band.seen)).unzip();
+        Image { texels: texels.concat(), seen: seen.concat() }
+    }
 
-/// Looks up what a sample sees.
-struct Shader<'a> {
-    plant: &'a Plant,
-    lighting: &'a BakedLighting,
-    raster: &'a Raster,
-    sides: Option<&'a [Vec<light::Sides>]>,
-    to_plane: Mat3,
-    toward: Vec3,
-}
-
-impl Shader<'_> {
-    fn add(&self, hit: &Hit, texel: &mut Texel) {
+    fn seen(&self, hit: &Hit) -> Seen {
         let part = &self.plant.parts[hit.part as usize];
         let mesh = &part.mesh;
         let corners = mesh.triangles[hit.triangle as usize].map(|c| c as usize);
@@ -326,27 +394,39 @@ impl Shader<'_> {
         };
         let normal = if from_behind { -normal } else { normal };
         let normal = normal.try_normalize().unwrap_or(self.toward);
-
-        let values = self.lighting.ambient(hit.part as usize);
-        let ambient: f32 = weighted().map(|(c, w)| w * values.get(c).copied().unwrap_or(1.0)).sum();
         let uv = weighted().map(|(c, w)| w * mesh.uvs[c]).sum();
         let color = self.raster.surface(hit.part).color(uv);
+        let transmission = match part.kind {
+            PartKind::Foliage => luminance(part.material.transmitted(color)) / luminance(color).max(1e-6),
+            PartKind::Wood => 0.0,
+        };
+        Seen { part: hit.part as usize, corners, weights, from_behind, normal, color, transmission }
+    }
 
-        if let Some(sides) = self.sides.and_then(|parts| parts.get(hit.part as usize)) {
+    /// The sample for the sun's light.
+    fn sample(&self, hit: &Hit) -> sun::Sample {
+        let seen = self.seen(hit);
+        let positions = &self.plant.parts[seen.part].mesh.positions;
+        let position = seen.weighted().map(|(corner, weight)| weight * positions[corner]).sum();
+        sun::Sample { position, normal: seen.normal, transmission: seen.transmission }
+    }
+
+    fn add(&self, hit: &Hit, texel: &mut Texel) {
+        let seen = self.seen(hit);
+        let kind = self.plant.parts[seen.part].kind;
+        let values = self.lighting.ambient(seen.part);
+        let ambient: f32 = seen.weighted().map(|(c, w)| w * values.get(c).copied().unwrap_or(1.0)).sum();
+        if let Some(sides) = self.sides.and_then(|parts| parts.get(seen.part)) {
             let blended = |side: usize| -> Vec4 {
-                weighted().map(|(c, w)| w * sides.get(c).map_or(Vec4::ZERO, |sides| sides[side])).sum()
+                seen.weighted().map(|(c, w)| w * sides.get(c).map_or(Vec4::ZERO, |sides| sides[side])).sum()
             };
-            let front = usize::from(from_behind && part.kind == PartKind::Foliage);
-            let through = match part.kind {
-                PartKind::Foliage => luminance(part.material.transmitted(color)) / luminance(color).max(1e-6),
-                PartKind::Wood => 0.0,
-            };
-            texel.light += light::stored(blended(front), blended(1 - front), through, &self.to_plane);
+            let front = usize::from(seen.from_behind && kind == PartKind::Foliage);
+            texel.light += light::stored(blended(front), blended(1 - front), seen.transmission, &self.to_plane);
         }
         texel.coverage += 1.0;
-        texel.color += if color.is_finite() { color.clamp(Vec3::ZERO, Vec3::ONE) } else { Vec3::ZERO };
-        texel.normal += self.to_plane * normal;
+        texel.color += if seen.color.is_finite() { seen.color.clamp(Vec3::ZERO, Vec3::ONE) } else { Vec3::ZERO };
+        texel.normal += self.to_plane * seen.normal;
         texel.ambient += if ambient.is_finite() { ambient.clamp(0.0, 1.0) } else { 1.0 };
-        texel.foliage += if part.kind == PartKind::Foliage { 1.0 } else { 0.0 };
+        texel.foliage += if kind == PartKind::Foliage { 1.0 } else { 0.0 };
     }
 }

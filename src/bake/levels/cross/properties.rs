@@ -30,7 +30,7 @@ impl Sum {
 
 /// Isotropic fraction summed over the texels of one level: the sum of the weights, and the weighted sum.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct IsotropicSum {
+pub(in crate::bake::levels) struct IsotropicSum {
     pub weight: f64,
     pub isotropic: f64,
 }
@@ -52,7 +52,11 @@ fn isotropic_sum(level: &[Sum]) -> IsotropicSum {
 /// Property mips of a texture of `resolution`² texels (a power of two), and the isotropic fraction level by level.
 /// Means are weighted with the coverage, from level to level in floating point, so empty texels have no weight. An
 /// empty texel takes the value of the coarser level.
-pub(super) fn mips(texels: &[Texel], resolution: usize, smoothing: f32) -> (MipChain, Vec<IsotropicSum>) {
+pub(in crate::bake::levels) fn mips(
+    texels: &[Texel],
+    resolution: usize,
+    smoothing: f32,
+) -> (MipChain, Vec<IsotropicSum>) {
     let normals = smoothed(texels, resolution, smoothing * resolution as f32);
     let finest = texels.iter().zip(normals).map(|(texel, normal)| Sum {
         normal: texel.coverage * normal,

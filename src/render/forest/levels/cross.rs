@@ -10,8 +10,9 @@ use bevy::{
         render_phase::TrackedRenderPass,
         render_resource::{
             AddressMode, BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer,
-            BufferUsages, FilterMode, FragmentState, MipmapFilterMode, RenderPipelineDescriptor, SamplerBindingType,
-            SamplerDescriptor, ShaderStages, Texture, TextureFormat, TextureSampleType, VertexState,
+            BufferUsages, ColorWrites, FilterMode, FragmentState, MipmapFilterMode, RenderPipelineDescriptor,
+            SamplerBindingType, SamplerDescriptor, ShaderStages, Texture, TextureFormat, TextureSampleType,
+            VertexState,
             binding_types::{sampler, storage_buffer_read_only_sized, texture_2d_array},
         },
     },
@@ -28,12 +29,14 @@ use crate::{
         components::Forest,
         forest::{
             representation::{
-                DrawnTrees, ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight, TreeDraw, TreeVertices,
+                DEPTH_FIRST, DrawnTrees, ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight, TreeDraw,
+                TreeVertices,
             },
             uniforms::{CROSS_CASTER_VERTICES, CROSS_VERTICES, PLANES, cross_variants},
         },
-        gpu::{self, Gpu},
+        gpu,
         shaders::{CanopyShaders, ShaderFile},
+        view::ViewFormat,
     },
 };
 
@@ -81,7 +84,7 @@ fn has_light(plant: &BakedPlant) -> bool {
     plant.cross().is_some_and(|cross| !cross.textures.light.is_empty())
 }
 
-/// Group 2: colours, properties, sampler, and the data of each plant's crosses.
+/// Group 2: colours, properties, sampler, the data of each plant's crosses, and the light of the sun.
 fn cross_layout() -> BindGroupLayoutDescriptor {
     let float = TextureSampleType::Float { filterable: true };
     BindGroupLayoutDescriptor::new(
@@ -93,6 +96,7 @@ fn cross_layout() -> BindGroupLayoutDescriptor {
                 texture_2d_array(float),
                 sampler(SamplerBindingType::Filtering),
                 storage_buffer_read_only_sized(false, None).visibility(ShaderStages::VERTEX_FRAGMENT),
+                texture_2d_array(float),
             ),
         ),
     )
@@ -137,19 +141,21 @@ impl LevelRenderer for CrossRenderer {
                 plant.plant.name
             );
         }
-        let (layers, limit) = (plants.len() * PLANES, upload.gpu.device.limits().max_texture_array_layers as usize);
+        let (layers, limit) =
+            (plants.len() * PLANES * SUN_LAYERS, upload.gpu.device.limits().max_texture_array_layers as usize);
         if layers > limit {
             error!(
                 "a forest's {} plants need {layers} texture layers for their crossed billboards, but this device has at \
                  most {limit}: they are not drawn so; use at most {} plants in a forest, or another list of levels",
                 plants.len(),
-                limit / PLANES
+                limit / (PLANES * SUN_LAYERS)
             );
             return Box::new(GpuCrosses { drawn: None });
         }
-        let (properties, variants, bind_group) = upload_textures(plants, upload.gpu);
-        let (light, light_textures) = (CrossLight::of(plants), upload_light(plants, upload.gpu));
-        Box::new(GpuCrosses { drawn: Some(DrawnCrosses { properties, variants, bind_group, light, light_textures }) })
+        let (properties, sun, variants, bind_group) = upload_textures(plants, upload);
+        let (light, light_textures) = (CrossLight::of(plants), upload_light(plants, upload));
+        let drawn = DrawnCrosses { properties, sun, variants, bind_group, light, light_textures };
+        Box::new(GpuCrosses { drawn: Some(drawn) })
     }
 
     fn same_shape(&self, old: &BakedPlant, new: &BakedPlant) -> bool {
@@ -200,6 +206,23 @@ impl LevelRenderer for CrossRenderer {
         pipeline.multisample.alpha_to_coverage_enabled = to_coverage;
         pipeline
     }
+
+    fn depth_pipeline(&self, _: u32, format: ViewFormat) -> Option<RenderPipelineDescriptor> {
+        // With several samples a pixel the depth costs more than it saves: docs/decisions/0023.
+        if format.samples > 1 {
+            return None;
+        }
+        let plain = CrossLight::ALL.iter().position(|light| *light == CrossLight::Plain)?;
+        let mut pipeline = self.pipeline(plain as u32, LevelTarget::View(format));
+        pipeline.label = Some("canopy_crosses_depth".into());
+        pipeline.vertex.shader_defs.push(DEPTH_FIRST.into());
+        let fragment = pipeline.fragment.as_mut()?;
+        fragment.shader_defs.push(DEPTH_FIRST.into());
+        fragment.entry_point = Some("depth".into());
+        // The attachment's colours stay as they are.
+        fragment.targets.iter_mut().flatten().for_each(|target| target.write_mask = ColorWrites::empty());
+        Some(pipeline)
+    }
 }
 
 /// The crosses of a forest's plants; `None` if the device cannot hold them.
@@ -210,6 +233,8 @@ struct GpuCrosses {
 struct DrawnCrosses {
     /// Normals, ambient occlusion (k_a) and foliage, three layers per variant.
     properties: Texture,
+    /// The light of the sun, six layers per variant.
+    sun: Texture,
     /// [`CrossVariantUniform`](crate::render::forest::CrossVariantUniform)s.
     variants: Buffer,
     /// Group 2.
@@ -265,41 +290,70 @@ impl GpuLevel for GpuCrosses {
         };
         let pairs = || relight.old.iter().zip(relight.new);
         for (index, (_, new)) in pairs().enumerate().filter(|(_, pair)| changed(pair)) {
-            for (plane, chain) in new.cross().into_iter().flat_map(|cross| &cross.textures.properties).enumerate() {
+            let Some(cross) = new.cross() else { continue };
+            for (plane, chain) in cross.textures.properties.iter().enumerate() {
                 gpu::write_layer(&upload.gpu.queue, &drawn.properties, (index * PLANES + plane) as u32, &chain.view());
+            }
+            for (layer, chain) in cross.textures.sun.iter().enumerate() {
+                let layer = (index * PLANES * SUN_LAYERS + layer) as u32;
+                gpu::write_layer(&upload.gpu.queue, &drawn.sun, layer, &chain.view());
             }
         }
         upload.gpu.queue.write_buffer(&drawn.variants, 0, bytemuck::cast_slice(&cross_variants(relight.new)));
         if pairs().filter(changed).any(|(old, new)| has_light(old) || has_light(new)) {
             // Adding or removing a plant's lighting textures moves the layers of the others.
             drawn.light = CrossLight::of(relight.new);
-            drawn.light_textures = upload_light(relight.new, upload.gpu);
+            drawn.light_textures = upload_light(&Arc::new(relight.new.to_vec()), upload);
         }
     }
 }
 
-/// Three layers per plant of the textures that `of` takes from a cross. A plant without a cross gets those of another
-/// one; its planes have no extent, so they are never seen.
-fn layers(plants: &[BakedPlant], of: fn(&Cross) -> &[MipChain]) -> Vec<MipView<'_>> {
-    let crosses = || plants.iter().filter_map(BakedPlant::cross);
-    let Some(blank) = crosses().find_map(|cross| of(cross).first()) else { return Vec::new() };
-    let mut all = Vec::with_capacity(plants.len() * PLANES);
-    for plant in plants {
-        let own = plant.cross().map_or(&[][..], |cross| of(cross));
-        all.extend((0..PLANES).map(|plane| own.get(plane).unwrap_or(blank).view()));
-    }
-    all
+/// Layers of the sun's light per plane.
+const SUN_LAYERS: usize = 2;
+
+/// A layer, of `count` per plant, of the textures that `of` takes from a cross. A plant without a cross gets those of
+/// another one; its planes have no extent, so they are never seen.
+fn layer(plants: &[BakedPlant], index: usize, count: usize, of: fn(&Cross) -> &[MipChain]) -> Option<MipView<'_>> {
+    let own = plants.get(index / count)?.cross().and_then(|cross| of(cross).get(index % count));
+    let blank = || plants.iter().filter_map(BakedPlant::cross).find_map(|cross| of(cross).first());
+    own.or_else(blank).map(MipChain::view)
 }
 
-/// The property texture of all crosses, the data of each plant's crosses, and their bind group.
-fn upload_textures(plants: &[BakedPlant], gpu: &Gpu) -> (Texture, Buffer, BindGroup) {
-    let colors = layers(plants, |cross| &cross.textures.color);
-    let properties = layers(plants, |cross| &cross.textures.properties);
-    let upload = |label: &str, format: TextureFormat, layers: &[MipView]| {
-        gpu::texture_array(&gpu.device, &gpu.queue, label, format, layers, gpu::SMALLEST_TESTED_MIP)
-    };
-    let (_, colors) = upload("canopy_cross_color", TextureFormat::Rgba8UnormSrgb, &colors);
-    let (texture, properties) = upload("canopy_cross_properties", TextureFormat::Rgba8Unorm, &properties);
+/// A layer of the lighting textures, of those plants that have them.
+fn light_layer(plants: &[BakedPlant], index: usize) -> Option<MipView<'_>> {
+    let crosses = plants.iter().filter_map(BakedPlant::cross);
+    crosses.flat_map(|cross| &cross.textures.light).nth(index).map(MipChain::view)
+}
+
+/// The textures of all crosses' properties and of the sun's light, the data of each plant's crosses, and their bind group.
+fn upload_textures(plants: &Arc<Vec<BakedPlant>>, upload: &mut ForestUpload) -> (Texture, Texture, Buffer, BindGroup) {
+    let has_crosses = plants.iter().any(|plant| plant.cross().is_some());
+    let (layers, smallest) = (if has_crosses { plants.len() * PLANES } else { 0 }, gpu::SMALLEST_TESTED_MIP);
+    let (_, colors) = upload.texture_array(
+        "canopy_cross_color",
+        TextureFormat::Rgba8UnormSrgb,
+        layers,
+        smallest,
+        plants,
+        |plants, index| layer(plants, index, PLANES, |cross| &cross.textures.color),
+    );
+    let (property_texture, properties) = upload.texture_array(
+        "canopy_cross_properties",
+        TextureFormat::Rgba8Unorm,
+        layers,
+        smallest,
+        plants,
+        |plants, index| layer(plants, index, PLANES, |cross| &cross.textures.properties),
+    );
+    let (sun_texture, sun) = upload.texture_array(
+        "canopy_cross_sun",
+        TextureFormat::Rgba8Snorm,
+        layers * SUN_LAYERS,
+        smallest,
+        plants,
+        |plants, index| layer(plants, index, PLANES * SUN_LAYERS, |cross| &cross.textures.sun),
+    );
+    let gpu = upload.gpu;
     let sampler = gpu.device.create_sampler(&SamplerDescriptor {
         label: Some("canopy_cross"),
         address_mode_u: AddressMode::ClampToEdge,
@@ -314,21 +368,22 @@ fn upload_textures(plants: &[BakedPlant], gpu: &Gpu) -> (Texture, Buffer, BindGr
     let bind_group = gpu.bind_group(
         "canopy_cross",
         &cross_layout(),
-        &BindGroupEntries::sequential((&colors, &properties, &sampler, variants.as_entire_binding())),
+        &BindGroupEntries::sequential((&colors, &properties, &sampler, variants.as_entire_binding(), &sun)),
     );
-    (texture, variants, bind_group)
+    (property_texture, sun_texture, variants, bind_group)
 }
 
 /// The lighting textures, of those plants that have them.
-fn upload_light(plants: &[BakedPlant], gpu: &Gpu) -> Option<BindGroup> {
-    let crosses = plants.iter().filter_map(BakedPlant::cross);
-    let layers: Vec<MipView> = crosses.flat_map(|cross| &cross.textures.light).map(MipChain::view).collect();
-    if layers.is_empty() {
+fn upload_light(plants: &Arc<Vec<BakedPlant>>, upload: &mut ForestUpload) -> Option<BindGroup> {
+    let layers = plants.iter().filter_map(BakedPlant::cross).map(|cross| cross.textures.light.len()).sum();
+    if layers == 0 {
         return None;
     }
     let (label, format) = ("canopy_cross_light", TextureFormat::Rgba8Snorm);
-    let (_, view) = gpu::texture_array(&gpu.device, &gpu.queue, label, format, &layers, gpu::SMALLEST_TESTED_MIP);
-    Some(gpu.bind_group(label, &light_layout(), &BindGroupEntries::single(&view)))
+    let (_, view) = upload.texture_array(label, format, layers, gpu::SMALLEST_TESTED_MIP, plants, |plants, index| {
+        light_layer(plants, index)
+    });
+    Some(upload.gpu.bind_group(label, &light_layout(), &BindGroupEntries::single(&view)))
 }
 
 /// Whether crosses have the same planes, colours and outlines. A bake with another lighting creates equal ones in other

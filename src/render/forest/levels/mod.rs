@@ -1,7 +1,10 @@
 //! The built-in representations, one file each.
 
+mod cloud;
 mod cross;
 mod model;
+mod reduced;
+mod thinned;
 
 use std::sync::Arc;
 
@@ -9,8 +12,13 @@ use super::representation::LevelRenderer;
 use crate::render::shaders::CanopyShaders;
 
 /// All built-in representations.
-pub fn built_in(shaders: &CanopyShaders) -> [Arc<dyn LevelRenderer>; 2] {
-    [Arc::new(model::ModelRenderer::new(shaders)), Arc::new(cross::CrossRenderer::new(shaders))]
+pub fn built_in(shaders: &CanopyShaders) -> [Arc<dyn LevelRenderer>; 4] {
+    [
+        Arc::new(model::ModelRenderer::new(shaders)),
+        Arc::new(thinned::ThinnedRenderer::new(shaders)),
+        Arc::new(cloud::CloudRenderer::new(shaders)),
+        Arc::new(cross::CrossRenderer::new(shaders)),
+    ]
 }
 
 #[cfg(test)]

@@ -40,7 +40,7 @@ use crate::{
             uniforms::{PartUniform, indirect_light_color, part_uniform},
             vertex::PlantVertex,
         },
-        gpu::{self, Gpu},
+        gpu,
         shaders::{CanopyShaders, ShaderFile},
     },
 };
@@ -364,7 +364,7 @@ impl GpuLevel for GpuModels {
                 upload.gpu.queue.write_buffer(&gpu_part.uniform, 0, bytemuck::bytes_of(&uniform));
                 let traced = new.lighting.transfer(number);
                 gpu_part.light = PartLight::new(traced.map(|(settings, _)| settings), sun);
-                gpu_part.transfer = traced.map(|part| upload.transfer.bind_group(part, tint, sun, upload.gpu));
+                gpu_part.transfer = upload.transfer_group(&new.lighting, number, tint, sun);
             }
         }
     }
@@ -388,25 +388,23 @@ fn upload_parts(
         );
         return Vec::new();
     }
-    let proxies = plant.shadow_proxy();
-    if proxies.is_none() {
+    if plant.shadow_proxy().is_none() {
         error_once!(
             "the plant `{}` casts no near shadow, as no shadow proxy was baked for it: list `Representation::MODEL` in \
              `BakeSettings::representations`",
             plant.plant.name
         );
     }
+    let local = Arc::new(BakedLighting::Local);
     let mut parts = Vec::new();
     for (index, (part, filtered)) in plant.plant.parts.iter().zip(&plant.textures.0).enumerate() {
-        let empty = PlantMesh::default();
-        let proxy = proxies.and_then(|meshes| meshes.get(index)).unwrap_or(&empty);
         let material = &part.material;
         let coefficients = plant.lighting.transfer(index);
         let usage = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
         let uniform = part_uniform(material, &plant.lighting);
         let uniform = gpu::buffer_with(&gpu.device, "canopy_plant_part", usage, &[uniform]);
-        let color = textures.color(filtered, part.kind, gpu);
-        let normal = textures.normal(filtered, gpu);
+        let color = textures.color(filtered, part.kind, upload);
+        let normal = textures.normal(filtered, upload);
         let bind_group = gpu.bind_group(
             "canopy_plant_part",
             &part_layout(),
@@ -415,11 +413,11 @@ fn upload_parts(
         parts.push(GpuPart {
             surface: PartSurface { kind: part.kind, normal_map: material.normal_texture.is_some() },
             uniform,
-            model: upload_mesh(&part.mesh, &vertices(&part.mesh, &plant.lighting, index), gpu),
-            proxy: upload_mesh(proxy, &vertices(proxy, &BakedLighting::Local, index), gpu),
+            model: upload_mesh(plant, index, model_mesh, &plant.lighting, upload),
+            proxy: upload_mesh(plant, index, proxy_mesh, &local, upload),
             bind_group,
             light: PartLight::new(coefficients.map(|(settings, _)| settings), sun),
-            transfer: coefficients.map(|part| upload.transfer.bind_group(part, tint, sun, gpu)),
+            transfer: upload.transfer_group(&plant.lighting, index, tint, sun),
         });
     }
     parts
@@ -437,13 +435,38 @@ fn vertices(mesh: &PlantMesh, lighting: &BakedLighting, part: usize) -> Vec<Plan
     mesh.positions.iter().enumerate().map(vertex).collect()
 }
 
-fn upload_mesh(mesh: &PlantMesh, vertices: &[PlantVertex], gpu: &Gpu) -> GpuMesh {
-    let indices: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
-    let vertex = BufferUsages::VERTEX | BufferUsages::COPY_DST;
+/// The mesh of a plant's part.
+fn model_mesh(plant: &BakedPlant, part: usize) -> Option<&PlantMesh> {
+    plant.plant.parts.get(part).map(|part| &part.mesh)
+}
+
+/// The mesh that casts a part's near shadow.
+fn proxy_mesh(plant: &BakedPlant, part: usize) -> Option<&PlantMesh> {
+    plant.shadow_proxy()?.get(part)
+}
+
+/// The mesh that `mesh_of` finds for a part, with the normals and the ambient occlusion (k_a) of `lighting`.
+fn upload_mesh(
+    plant: &BakedPlant,
+    part: usize,
+    mesh_of: fn(&BakedPlant, usize) -> Option<&PlantMesh>,
+    lighting: &Arc<BakedLighting>,
+    upload: &mut ForestUpload,
+) -> GpuMesh {
+    let mesh = mesh_of(plant, part);
+    let vertex_count = mesh.map_or(0, |mesh| mesh.positions.len());
+    let index_count = mesh.map_or(0, |mesh| 3 * mesh.triangles.len());
+    let (owner, lighting) = (plant.clone(), Arc::clone(lighting));
+    let packed = move || mesh_of(&owner, part).map_or_else(Vec::new, |mesh| vertices(mesh, &lighting, part));
+    let owner = plant.clone();
+    let indices = move || {
+        let triangles = mesh_of(&owner, part).map(|mesh| mesh.triangles.iter().flatten());
+        triangles.map(|corners| corners.copied().collect()).unwrap_or_default()
+    };
     GpuMesh {
-        vertices: gpu::buffer_with(&gpu.device, "canopy_plant_vertices", vertex, vertices),
-        indices: gpu::buffer_with(&gpu.device, "canopy_plant_indices", BufferUsages::INDEX, &indices),
-        index_count: indices.len() as u32,
+        vertices: upload.buffer("canopy_plant_vertices", BufferUsages::VERTEX, vertex_count, packed),
+        indices: upload.buffer("canopy_plant_indices", BufferUsages::INDEX, index_count, indices),
+        index_count: index_count as u32,
     }
 }
 
