@@ -17,7 +17,7 @@ use canopy::{
     render::{
         components::{Forest, TreeListMaker, TreeLists},
         cull::TreeList,
-        forest::{GpuForest, GpuForests, ListSlot, PreparedForests},
+        forest::{ForestStatistics, GpuForest, GpuForests, ListSlot, PreparedForests},
         frame_work::FrameWork,
         readback::read_words,
         sun_shadow::ShadowMaps,
@@ -25,13 +25,13 @@ use canopy::{
     scatter::{PackedStand, Stand, Tree},
     scene::Viewpoint,
 };
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::{NOON, again, draw, renderer};
 use crate::support::{
     gpu::gpu,
     image::keep,
-    stage::{grove, instant, view},
+    stage::{grove, instant, trees_of_quality, view},
 };
 
 /// Sizes, places and plants by chance.
@@ -195,12 +195,13 @@ fn image_of(
     variants: usize,
     from: &Viewpoint,
     msaa: u32,
+    levels: &Levels,
     (maker, trees_per_buffer): (TreeListMaker, usize),
 ) -> (RenderedImage, Vec<String>) {
     let mut renderer = renderer(msaa);
     renderer.show(stage);
     make_by(&mut renderer, maker, trees_per_buffer);
-    replace(&mut renderer, stage, stand, variants, &Levels::model_and_cross(FadeBand::new(30.0, 12.0)));
+    replace(&mut renderer, stage, stand, variants, levels);
     let image = draw(&mut renderer, stage, from, NOON);
     (image, renderer.explain())
 }
@@ -213,23 +214,78 @@ fn the_image_does_not_depend_on_who_made_the_lists() {
         let stage = &built.stage;
         let from = view(stage, (10.0, 4.0, 30.0), 350.0, -6.0);
         let packed = stand(stage, 900, 180.0, 3, 64.0, 1);
+        let both = Levels::model_and_cross(FadeBand::new(30.0, 12.0));
         let all = usize::MAX;
-        let (expected, told) = image_of(stage, &packed, 3, &from, msaa, (TreeListMaker::Processor, all));
+        let (expected, told) = image_of(stage, &packed, 3, &from, msaa, &both, (TreeListMaker::Processor, all));
         assert!(
             told.iter().any(|line| line.contains("tree lists: ran (made on the processor: the program asks")),
             "{told:?}"
         );
         keep(&expected, "lists-of-the-processor");
-        let (made, told) = image_of(stage, &packed, 3, &from, msaa, (TreeListMaker::Device, all));
+        let (made, told) = image_of(stage, &packed, 3, &from, msaa, &both, (TreeListMaker::Device, all));
         assert!(told.iter().any(|line| line.contains("tree lists: ran (made on the device)")), "{told:?}");
         assert!(made == expected, "the device's lists give another image");
+
+        // Buffers are drawn one after the other, so trees come in another order. That is not seen with one sample a pixel,
+        // nor in crosses. With several samples it is seen in models: their light is interpolated at the centroid of
+        // the covered samples, and a driver may count only those that passed the depth test before, which depends on
+        // what was drawn already. The software driver does. Only the light of pixels at the edges of leaves differs.
+        let crosses = Levels::only(Representation::CROSS);
+        let (of_crosses, _) = image_of(stage, &packed, 3, &from, msaa, &crosses, (TreeListMaker::Processor, all));
         for pages in [(TreeListMaker::Processor, 100), (TreeListMaker::Device, 100)] {
-            let (split, _) = image_of(stage, &packed, 3, &from, msaa, pages);
-            // Pages are drawn one after the other: where the planes of two trees cut each other, a pixel has two fragments of
-            // equal depth, and the later one is seen.
-            let pixels = split.pixels.chunks(3).zip(expected.pixels.chunks(3)).filter(|(a, b)| a != b).count();
-            println!("{pages:?}, {msaa} samples: {pixels} pixels differ");
-            assert!(pixels <= 4, "a forest in several buffers gives another image: {pages:?}, {pixels} pixels");
+            let (split, _) = image_of(stage, &packed, 3, &from, msaa, &crosses, pages);
+            assert!(split == of_crosses, "{msaa} samples, {pages:?}: crosses in several buffers give another image");
+            let (split, _) = image_of(stage, &packed, 3, &from, msaa, &both, pages);
+            let pairs = || split.pixels.chunks(3).zip(expected.pixels.chunks(3)).filter(|(a, b)| a != b);
+            let values = pairs().flat_map(|(a, b)| a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)));
+            let (pixels, farthest) = (pairs().count(), values.max().unwrap_or(0));
+            println!("{pages:?}, {msaa} samples: {pixels} pixels differ, by {farthest} at most");
+            let allowed = if msaa == 1 { 0 } else { split.pixels.len() / 300 };
+            assert!(pixels <= allowed && farthest < 16, "{pages:?}: {pixels} pixels differ, by {farthest} at most");
+        }
+    }
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+/// All levels that forests have. In several buffers with one sample a pixel only, for the reason that the test before
+/// this one gives.
+#[test]
+fn every_level_is_the_same_whoever_lists_its_trees_and_in_how_many_buffers() {
+    let gpu = gpu();
+    let names = ["model", "thinned", "cloud", "cross"];
+    for samples in [1, 4] {
+        let quality = format!(
+            "quality: (levels: [(draw: \"model\", until: 20, fade: 8), (draw: \"thinned\", until: 40, fade: 8), (draw: \
+             \"cloud\", until: 70, fade: 8), (draw: \"cross\", until: 300, fade: 5)], shadow_map_size: 512, cascades: 3, \
+             shadow_distance: 150, cross_resolution: 64, msaa: {samples})"
+        );
+        let place = |index: u32| DVec2::new(f64::from(index % 13) - 6.0, f64::from(index / 13) - 6.0) * 14.0;
+        let places: Vec<DVec2> = (0..169).map(place).collect();
+        let stage = trees_of_quality(&places, &quality).stage;
+        let from = view(&stage, (3.0, 6.0, 60.0), 8.0, -3.0);
+        let image = |lists: TreeLists| {
+            let mut renderer = renderer(samples);
+            renderer.show(&stage);
+            renderer.app().insert_resource(lists);
+            let image = draw(&mut renderer, &stage, &from, NOON);
+            let statistics = renderer.app().sub_app(RenderApp).world().resource::<ForestStatistics>().clone();
+            (image, statistics)
+        };
+        let all = TreeLists { maker: TreeListMaker::Processor, ..TreeLists::default() };
+        let (expected, statistics) = image(all);
+        keep(&expected, "lists-of-every-level");
+        let counts = statistics.levels.iter().map(|level| (level.representation.name(), level.trees));
+        assert!(
+            counts.clone().map(|(name, _)| name).eq(names) && counts.clone().all(|(_, trees)| trees > 1),
+            "{statistics:?}"
+        );
+        for maker in [TreeListMaker::Processor, TreeListMaker::Device] {
+            for trees_per_buffer in [usize::MAX, 64].into_iter().take(if samples == 1 { 2 } else { 1 }) {
+                let lists = TreeLists { maker, trees_per_buffer };
+                let (found, of_lists) = image(lists);
+                assert!(found == expected, "{samples} samples, {lists:?}: another image");
+                assert_eq!(of_lists, statistics, "{samples} samples, {lists:?}");
+            }
         }
     }
     assert_eq!(gpu.messages(), Vec::<String>::new());
@@ -243,8 +299,9 @@ fn lists_that_are_too_short_grow_and_the_image_is_whole() {
     let mut from = view(stage, (0.0, 260.0, 300.0), 0.0, -40.0);
     from.field_of_view = 90f64.to_radians();
     let packed = stand(stage, 40_000, 500.0, 2, 64.0, 3);
-    let (expected, before) = image_of(stage, &packed, 2, &from, 1, (TreeListMaker::Processor, usize::MAX));
-    let (made, after) = image_of(stage, &packed, 2, &from, 1, (TreeListMaker::Device, usize::MAX));
+    let levels = Levels::model_and_cross(FadeBand::new(30.0, 12.0));
+    let (expected, before) = image_of(stage, &packed, 2, &from, 1, &levels, (TreeListMaker::Processor, usize::MAX));
+    let (made, after) = image_of(stage, &packed, 2, &from, 1, &levels, (TreeListMaker::Device, usize::MAX));
     let forest = |lines: &[String]| lines.iter().find(|line| line.contains(" forest: ran")).cloned();
     assert_eq!(forest(&before), forest(&after));
     assert!(made == expected, "trees are missing");
