@@ -6,12 +6,11 @@ use bevy::{
     log::{error_once, info_once},
     render::render_resource::{BindGroup, BindGroupEntries, Buffer, BufferDescriptor, BufferUsages},
 };
-use bytemuck::{Pod, Zeroable};
 
 use super::{
     draws::DrawTable,
-    pass::{CountCopy, CullJob, CullJobs},
-    pipelines::list_layout,
+    jobs::{CountCopy, CullJob, CullJobs},
+    layout::{ListRoom, list_layout},
     readback::Readback,
 };
 use crate::{
@@ -28,20 +27,6 @@ const FIRST_CAPACITY: usize = 1 << 14;
 const FIRST_STAGING: usize = 1 << 12;
 /// Words of an indirect draw's arguments.
 const ARGUMENTS: usize = 5;
-
-/// `ListRoom` of `shaders/cull/lists.wgsl`.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
-pub struct ListRoom {
-    /// Entries of the list.
-    pub capacity: u32,
-    /// Entries that can be sorted by variant.
-    pub staging: u32,
-    /// Number of groups of all levels.
-    pub group_count: u32,
-    /// Number of draw calls.
-    pub draw_count: u32,
-}
 
 /// What lists are made from.
 #[derive(Clone, Copy)]

@@ -12,7 +12,10 @@ use bevy::{
 };
 use wgpu::{DeviceType, DownlevelFlags};
 
-use super::pipelines::{ListPipelines, STORAGE_BUFFERS, WORKGROUP_BYTES};
+use super::{
+    layout::STORAGE_BUFFERS,
+    pipelines::{ListPipelines, WORKGROUP_BYTES},
+};
 use crate::{
     cull::device_lists::SORT_THREADS,
     render::{components::TreeListMaker, extract::ExtractedScene, report::FrameReport, shaders::CanopyShaders},

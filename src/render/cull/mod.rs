@@ -23,6 +23,8 @@
 //! numbers of trees come back a frame late or later.
 
 mod draws;
+mod jobs;
+mod layout;
 mod list;
 mod maker;
 mod pass;
@@ -38,9 +40,10 @@ use bevy::{
 
 use super::{frame_work::FrameWork, sets::CanopyRenderSystems};
 pub use draws::{DrawTable, TreeDraw, TreeDrawWords, TreeVertices};
-pub use list::{ListCounts, ListRoom, ListSources, TreeList};
+pub use jobs::{CountCopy, CullJob, CullJobs};
+pub use layout::ListRoom;
+pub use list::{ListCounts, ListSources, TreeList};
 pub use maker::{ListMaker, unavailable};
-pub use pass::{CountCopy, CullJob, CullJobs};
 pub use readback::Readback;
 
 /// Makes lists of trees on the device.

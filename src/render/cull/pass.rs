@@ -1,44 +1,15 @@
 //! Records the dispatches of a frame.
 
 use bevy::{
-    ecs::{
-        resource::Resource,
-        system::{Res, ResMut},
-    },
+    ecs::system::{Res, ResMut},
     render::{
-        render_resource::{BindGroup, Buffer, ComputePassDescriptor, PipelineCache},
+        render_resource::{ComputePassDescriptor, PipelineCache},
         renderer::RenderContext,
     },
 };
 
-use super::{pipelines::ListPipelines, readback::Readback};
+use super::{jobs::CullJobs, pipelines::ListPipelines};
 use crate::{cull::device_lists::TEST_THREADS, render::frame_work::FrameWork};
-
-/// A list to make in this frame.
-pub struct CullJob {
-    /// Group 0.
-    pub bind_group: BindGroup,
-    /// Number of clusters.
-    pub clusters: u32,
-    /// The copy of its counts; `None` while an earlier one is on its way.
-    pub copy: Option<CountCopy>,
-}
-
-/// A copy of the counts of a list, for the processor.
-pub struct CountCopy {
-    /// The results of the list.
-    pub results: Buffer,
-    /// How many bytes of them.
-    pub bytes: u64,
-    /// Where to.
-    pub target: Buffer,
-    /// Who reads it.
-    pub readback: Readback,
-}
-
-/// The lists to make in this frame.
-#[derive(Resource, Default)]
-pub struct CullJobs(pub Vec<CullJob>);
 
 /// Makes the lists, step by step, all lists in each step.
 pub fn make_lists(

@@ -1,40 +1,20 @@
-//! The four compute pipelines and their bind group.
+//! The four compute pipelines.
 
 use bevy::{
     ecs::resource::Resource,
-    render::render_resource::{
-        BindGroupLayoutDescriptor, BindGroupLayoutEntries, CachedComputePipelineId, ComputePipeline,
-        ComputePipelineDescriptor, PipelineCache, ShaderStages,
-        binding_types::{storage_buffer_read_only_sized, storage_buffer_sized, uniform_buffer_sized},
-    },
+    render::render_resource::{CachedComputePipelineId, ComputePipeline, ComputePipelineDescriptor, PipelineCache},
 };
 
-use super::list::ListRoom;
+use super::layout::list_layout;
 use crate::{
     cull::device_lists::SORT_THREADS,
     render::shaders::{CanopyShaders, ShaderFile},
 };
 
-/// Storage buffers of the compute stage.
-pub const STORAGE_BUFFERS: u32 = 8;
 /// Bytes that a workgroup shares: 16 counters and a sum for each thread, and one number more.
 pub const WORKGROUP_BYTES: u32 = 4 * (17 * SORT_THREADS + 1);
 /// Entry points of `shaders/cull/lists.wgsl`, in their order.
 const STEPS: [&str; 4] = ["test_clusters", "sort_clusters", "write_trees", "group_trees"];
-
-/// Layout of group 0: volume, trees, clusters, sizes, draw calls, work, list, results, room.
-pub fn list_layout() -> BindGroupLayoutDescriptor {
-    let read = || storage_buffer_read_only_sized(false, None);
-    let write = || storage_buffer_sized(false, None);
-    let room = std::num::NonZeroU64::new(size_of::<ListRoom>() as u64);
-    BindGroupLayoutDescriptor::new(
-        "canopy_tree_lists",
-        &BindGroupLayoutEntries::sequential(
-            ShaderStages::COMPUTE,
-            (read(), read(), read(), read(), read(), write(), write(), write(), uniform_buffer_sized(false, room)),
-        ),
-    )
-}
 
 /// The pipelines, requested when lists are first made on the device.
 #[derive(Resource, Default)]
