@@ -4,6 +4,7 @@ use bevy::{
     prelude::*,
     render::{
         error_handler::{RenderErrorHandler, RenderErrorPolicy},
+        render_resource::PollType,
         renderer::RenderDevice,
         settings::RenderCreation,
     },
@@ -30,6 +31,8 @@ fn a_device_that_is_made_anew_draws_the_same_image() {
     renderer.app().insert_resource(recover);
     let lost = renderer.app().world().resource::<RenderDevice>().clone();
     lost.wgpu_device().destroy();
+    // The device reports its loss when it is polled. Until then Bevy writes to it, and panics.
+    let _ = lost.wgpu_device().poll(PollType::Poll);
     let same = |app: &App| app.world().resource::<RenderDevice>().wgpu_device() == lost.wgpu_device();
     for _ in 0..PATIENCE {
         if !same(renderer.app()) {
