@@ -169,7 +169,7 @@ fn gloss_and_the_way_of_the_sun_are_read() -> Outcome {
         oak.lighting,
         Some(Lighting::Transfer(Transfer { bands: 4, sun: SunLight::Harmonics, ..Transfer::default() }))
     );
-    assert_eq!(Transfer::default().sun, SunLight::LeafShader);
+    assert_eq!(Transfer::default().sun, SunLight::Combined);
     faulty("weight: 3", "weight: 3, gloss: (share: 0.5)", 26, &["`species[0].gloss.share` is 0.5", "0 to 0.09"]);
     faulty("weight: 3", "weight: 3, gloss: (roughness: 0)", 30, &["`species[0].gloss.roughness` is 0", "0.1 to 1"]);
     let wrong = parse(&FULL.replace("weight: 3", "weight: 3, lighting: Transfer(sun: Disc)"));
@@ -191,7 +191,7 @@ fn a_request_changes_the_way_of_the_sun_and_keeps_the_rest() -> Outcome {
     assert_eq!(transfer(&scene, 0), Some((5, SunLight::Harmonics)));
     assert_eq!(transfer(&scene, 1), Some((Transfer::default().bands, SunLight::Harmonics)));
     overrides("transfer")?.apply(&mut scene);
-    assert_eq!(transfer(&scene, 0), Some((5, SunLight::LeafShader)));
+    assert_eq!(transfer(&scene, 0), Some((5, SunLight::Combined)));
     overrides("local")?.apply(&mut scene);
     assert_eq!(scene.species[0].lighting, Some(Lighting::Local));
     Ok(())

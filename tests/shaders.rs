@@ -33,13 +33,14 @@ use naga::{
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 
 /// All that the pipelines switch on or off.
-const DEFINES: [&str; 8] = [
+const DEFINES: [&str; 9] = [
     "FOLIAGE",
     "ALPHA_TO_COVERAGE",
     "NORMAL_MAP",
     "TRANSFER",
     "TRANSFER_COLOR",
     "SUN_HARMONICS",
+    "SUN_DETAIL",
     "PLAIN_TOO",
     "DEPTH_FIRST",
 ];
@@ -51,9 +52,10 @@ fn variants() -> impl Iterator<Item = Vec<&'static str>> {
         DEFINES.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, define)| *define).collect::<Vec<_>>()
     });
     let needs = ["TRANSFER_COLOR", "SUN_HARMONICS", "PLAIN_TOO"];
-    let never_of_crosses = ["NORMAL_MAP", "TRANSFER_COLOR", "SUN_HARMONICS"];
+    let never_of_crosses = ["NORMAL_MAP", "TRANSFER_COLOR", "SUN_HARMONICS", "SUN_DETAIL"];
     let any_of = |defines: &[&str], some: &[&str]| some.iter().any(|define| defines.contains(define));
     all.filter(move |defines| defines.contains(&"TRANSFER") || !any_of(defines, &needs))
+        .filter(|defines| !defines.contains(&"SUN_DETAIL") || defines.contains(&"SUN_HARMONICS"))
         .filter(move |defines| !defines.contains(&"DEPTH_FIRST") || !any_of(defines, &never_of_crosses))
 }
 

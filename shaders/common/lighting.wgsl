@@ -5,8 +5,11 @@
 #import canopy::frame::light
 #import canopy::sky::sky_irradiance
 #import canopy::stand::{StandLight, in_stand}
+#import canopy::sun_visibility::LeafSample
 
 const INVERSE_PI: f32 = 0.31830989;
+// Weights of linear red, green and blue in the luminance.
+const LUMINANCE: vec3<f32> = vec3(0.2126, 0.7152, 0.0722);
 
 struct Surface {
     albedo: vec3<f32>,
@@ -87,28 +90,30 @@ fn leaf_gloss(surface: Surface, specular_albedo: vec3<f32>, room: vec3<f32>) -> 
     return fresnel * mix(strength * (distribution * masking * nl), specular_albedo * 0.25, surface.gloss_isotropy);
 }
 
-// Exitant radiance of a matt surface towards the viewer. `near` and `far`: unshadowed irradiance over pi of the key light
-// on the viewer's side and on the other; `visibility` of the key light in 0..1; `sky`: irradiance of the surroundings
-// over pi, transmitted light included.
-fn exitant_matt(surface: Surface, near: vec3<f32>, far: vec3<f32>, visibility: f32, sky: vec3<f32>) -> vec3<f32> {
-    return surface.albedo * ((near + far * surface.transmission) * visibility + sky);
+// Light of the key light on a surface, behind whatever hides it.
+struct KeyLight {
+    // Irradiance over pi on the viewer's side.
+    near: vec3<f32>,
+    // The same on the other side.
+    far: vec3<f32>,
+    // Its visibility, 0..1.
+    visibility: f32,
+}
+
+// Exitant radiance of a matt surface towards the viewer. `sky`: irradiance of the surroundings over pi, transmitted light
+// included.
+fn exitant_matt(surface: Surface, key: KeyLight, sky: vec3<f32>) -> vec3<f32> {
+    return surface.albedo * (key.near + key.far * surface.transmission + sky);
 }
 
 // The same of a leaf, whose specular reflectance may be 0. Only the diffuse part of the key light is reduced by the
 // gloss: the sky has no visible specular lobe.
-fn exitant(surface: Surface, near: vec3<f32>, far: vec3<f32>, visibility: f32, sky: vec3<f32>) -> vec3<f32> {
+fn exitant(surface: Surface, key: KeyLight, sky: vec3<f32>) -> vec3<f32> {
     let subsurface = subsurface_share(surface.albedo, surface.specular_reflectance);
     let room = 1.0 - surface.albedo * (subsurface + surface.transmission);
     let specular_albedo = surface.albedo * (1.0 - subsurface);
     let gloss = leaf_gloss(surface, specular_albedo, room) * light.key_illuminance * INVERSE_PI;
-    return exitant_matt(surface, near * subsurface, far, visibility, sky) + gloss * visibility;
-}
-
-// Unshadowed irradiance over pi of the key light on the two sides of a surface.
-struct KeySides {
-    // The viewer's side.
-    near: vec3<f32>,
-    far: vec3<f32>,
+    return exitant_matt(surface, KeyLight(key.near * subsurface, key.far, key.visibility), sky) + gloss * key.visibility;
 }
 
 // Cosines of the key light to the viewer's side and to the other, in the mean over the leaves.
@@ -120,24 +125,44 @@ fn key_cosines(surface: Surface) -> vec2<f32> {
     return vec2(front, back);
 }
 
-fn key_sides(surface: Surface) -> KeySides {
+// The key light at the angle to the surface's normal, behind what leaves it a visibility of `visibility`.
+fn key_light(surface: Surface, visibility: f32) -> KeyLight {
     let cosines = key_cosines(surface);
-    let full = light.key_illuminance * INVERSE_PI;
-    return KeySides(cosines.x * full, cosines.y * full);
+    let full = light.key_illuminance * (INVERSE_PI * visibility);
+    return KeyLight(cosines.x * full, cosines.y * full, visibility);
 }
 
 // Exitant radiance of a leaf that the key light hits at the angle to its normal. There is no branch for leaves without
 // gloss: their reflectance is a uniform, and a driver in software compiles a shader again for each value of a uniform
 // that decides a branch (docs/decisions/0002-no-branch-on-uniforms-alone.md).
 fn shade(surface: Surface, visibility: f32, sky: vec3<f32>) -> vec3<f32> {
-    let key = key_sides(surface);
-    return exitant(surface, key.near, key.far, visibility, sky);
+    return exitant(surface, key_light(surface, visibility), sky);
 }
 
 // The same of a matt surface: wood and ground.
 fn shade_matt(surface: Surface, visibility: f32, sky: vec3<f32>) -> vec3<f32> {
-    let key = key_sides(surface);
-    return exitant_matt(surface, key.near, key.far, visibility, sky);
+    return exitant_matt(surface, key_light(surface, visibility), sky);
+}
+
+// The key light on a surface whose own plant's shade is known from its transfer: `near` and `far`, irradiance over pi on
+// the two sides, behind the plant alone. `visibility`: that behind other plants. `leaves`: what the shadow maps know more.
+// They add detail that the transfer does not have, and darken what other plants in this one's crown hide.
+fn transferred_key_light(
+    surface: Surface, near: vec3<f32>, far: vec3<f32>, visibility: f32, leaves: LeafSample,
+) -> KeyLight {
+    let cosines = key_cosines(surface);
+    let full = light.key_illuminance * INVERSE_PI;
+    let own = saturate(dot(near + far, LUMINANCE) / max(dot(full, LUMINANCE) * (cosines.x + cosines.y), 1e-6));
+    let both = own * visibility;
+    // A map hides too much rather than too little behind the leaves of a texel.
+    let limit = clamp(1.4 * leaves.mean / max(both, 1e-3), 0.15, 1.0);
+    let mean = visibility * mix(1.0, limit, leaves.weight);
+    let detail = leaves.detail * leaves.weight;
+    var key: KeyLight;
+    key.near = max(near * mean + full * (cosines.x * detail), vec3(0.0));
+    key.far = max(far * mean + full * (cosines.y * detail), vec3(0.0));
+    key.visibility = saturate(own * mean + detail);
+    return key;
 }
 
 // Exitant radiance of leaves whose light by the key light is known as a sum over both of their sides and over all of them:
@@ -150,7 +175,7 @@ fn shade_leaves(surface: Surface, lit: f32, visibility: f32, sky: vec3<f32>) -> 
     let gloss = leaf_gloss(surface, surface.albedo * (1.0 - subsurface), room);
     // The leaves' own shade, for the gloss: what they show over what they would show without it.
     let sides = key_cosines(surface);
-    let through = dot(surface.transmission, vec3(0.2126, 0.7152, 0.0722));
+    let through = dot(surface.transmission, LUMINANCE);
     let own = saturate(lit * (1.0 + through) / max(sides.x + through * sides.y, 0.05));
     let diffuse = surface.albedo * (subsurface + surface.transmission) * lit;
     return full * visibility * (diffuse + gloss * own) + surface.albedo * sky;

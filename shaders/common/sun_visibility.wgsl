@@ -33,8 +33,9 @@ fn terrain_visibility(ground: GroundSample, height_above_ground: f32) -> f32 {
 // Metres.
 const MOST_LEAF_BIAS: f32 = 0.3;
 
-// `bias` is 1 for solid surfaces; less if the position is known to be off the caster, more among leaves.
-fn cascade_visibility(index: i32, relative: vec3<f32>, normal: vec3<f32>, bias: f32) -> f32 {
+// Place in a cascade's map, and depth, of a position that is moved off the surfaces that cast there. `bias` is 1 for solid
+// surfaces; less if the position is known to be off the caster, more among leaves.
+fn map_position(index: i32, relative: vec3<f32>, normal: vec3<f32>, bias: f32) -> vec3<f32> {
     let texel = shadow.cascades[index].texel;
     let slope = 1.0 - abs(dot(normal, light.key_direction));
     // Offset along the normal by the radius of the filter, and along the ray by one texel.
@@ -42,14 +43,23 @@ fn cascade_visibility(index: i32, relative: vec3<f32>, normal: vec3<f32>, bias: 
     // The part of a bias above 1 depends on the leaves, not on the map: in coarse maps it would be metres.
     let position = relative + offset * min(texel * bias, max(texel, MOST_LEAF_BIAS));
     let map = shadow.cascades[index].map_from_relative * vec4(position, 1.0);
-    let uv = map.xy * vec2(0.5, -0.5) + 0.5;
-    let step = shadow.inverse_map_size;
-    // Four bilinear comparisons on a rotated cross: a soft edge about three texels wide.
-    var sum = textureSampleCompareLevel(shadow_map, shadow_sampler, uv + vec2(0.9, 0.35) * step, index, map.z);
-    sum += textureSampleCompareLevel(shadow_map, shadow_sampler, uv + vec2(-0.35, 0.9) * step, index, map.z);
-    sum += textureSampleCompareLevel(shadow_map, shadow_sampler, uv + vec2(-0.9, -0.35) * step, index, map.z);
-    sum += textureSampleCompareLevel(shadow_map, shadow_sampler, uv + vec2(0.35, -0.9) * step, index, map.z);
+    return vec3(map.xy * vec2(0.5, -0.5) + 0.5, map.z);
+}
+
+// Mean of four bilinear comparisons on a square that is rotated by 21 degrees and whose corners are `radius` from the
+// centre, in the map's coordinates.
+fn compare_around(index: i32, map: vec3<f32>, radius: f32) -> f32 {
+    let corner = vec2(0.932, 0.362) * radius;
+    var sum = textureSampleCompareLevel(shadow_map, shadow_sampler, map.xy + corner, index, map.z);
+    sum += textureSampleCompareLevel(shadow_map, shadow_sampler, map.xy + vec2(-corner.y, corner.x), index, map.z);
+    sum += textureSampleCompareLevel(shadow_map, shadow_sampler, map.xy - corner, index, map.z);
+    sum += textureSampleCompareLevel(shadow_map, shadow_sampler, map.xy + vec2(corner.y, -corner.x), index, map.z);
     return 0.25 * sum;
+}
+
+// A soft edge about three texels wide.
+fn cascade_visibility(index: i32, relative: vec3<f32>, normal: vec3<f32>, bias: f32) -> f32 {
+    return compare_around(index, map_position(index, relative, normal, bias), 0.966 * shadow.inverse_map_size);
 }
 
 // Interleaved gradient noise [Jimenez 2014], 0..1, fixed to the pixel.
@@ -66,15 +76,48 @@ struct CascadeSample {
 
 // Each pixel reads one cascade: where two meet, noise decides which, over the last 7 % of the finer one's radius. The
 // choice is arithmetic, because software rasterisers run both sides of every branch.
-fn cascaded_visibility(relative: vec3<f32>, normal: vec3<f32>, bias: f32, pixel: vec2<f32>) -> CascadeSample {
+fn cascade_at(distance: f32, pixel: vec2<f32>) -> i32 {
     let last = shadow.cascade_count - 1;
-    let distance = length(relative);
     let jittered = distance / mix(0.93, 1.0, pixel_noise(pixel));
     var index = 0;
     for (var i = 0; i < MAX_CASCADES - 1; i += 1) {
         index += i32((i < last) & (jittered >= shadow.cascades[i].radius));
     }
+    return index;
+}
+
+fn cascade_weight(distance: f32) -> f32 {
+    let last = shadow.cascade_count - 1;
     let radius = shadow.cascades[max(last, 0)].radius;
-    let weight = select(0.0, 1.0 - smoothstep(0.85 * radius, radius, distance), last >= 0);
-    return CascadeSample(cascade_visibility(index, relative, normal, bias), weight);
+    return select(0.0, 1.0 - smoothstep(0.85 * radius, radius, distance), last >= 0);
+}
+
+fn cascaded_visibility(relative: vec3<f32>, normal: vec3<f32>, bias: f32, pixel: vec2<f32>) -> CascadeSample {
+    let distance = length(relative);
+    let index = cascade_at(distance, pixel);
+    return CascadeSample(cascade_visibility(index, relative, normal, bias), cascade_weight(distance));
+}
+
+// Metres: what is smaller than this between the leaves is detail that a plant's transfer does not have.
+const DETAIL_RADIUS: f32 = 0.6;
+
+// What maps that are fine enough to show leaves know of the visibility of the key light around a position.
+struct LeafSample {
+    // Mean within the radius of the detail.
+    mean: f32,
+    // The visibility less the mean.
+    detail: f32,
+    // 1 where the maps are fine enough, else 0.
+    weight: f32,
+}
+
+fn cascaded_leaf_visibility(relative: vec3<f32>, normal: vec3<f32>, bias: f32, pixel: vec2<f32>) -> LeafSample {
+    let distance = length(relative);
+    let index = cascade_at(distance, pixel);
+    let map = map_position(index, relative, normal, bias);
+    let step = shadow.inverse_map_size;
+    let texels = DETAIL_RADIUS / shadow.cascades[index].texel;
+    let sharp = compare_around(index, map, 0.966 * step);
+    let wide = 0.5 * (compare_around(index, map, texels * step) + compare_around(index, map, 0.5 * texels * step));
+    return LeafSample(wide, sharp - wide, saturate(0.5 * texels - 0.5) * cascade_weight(distance));
 }

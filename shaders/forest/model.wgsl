@@ -2,10 +2,10 @@
 #import canopy::constants::{NORMAL_STEPS, NORMAL_LEAST_LENGTH, WHOLE, AMBIENT_FITTED}
 #import canopy::frame::{frame, light}
 #import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, leaf_visibility, crown_of, depth_in_crown}
-#import canopy::lighting::{Surface, shade, shade_matt, exitant, exitant_matt, even_sky, leaf_transmission}
+#import canopy::lighting::{Surface, shade, shade_matt, exitant, exitant_matt, transferred_key_light, even_sky, leaf_transmission}
 #import canopy::output::finish
 #import canopy::stand::stand_light
-#import canopy::sun_visibility::{sample_ground, terrain_visibility, cascaded_visibility}
+#import canopy::sun_visibility::{sample_ground, terrain_visibility, cascaded_visibility, LeafSample, cascaded_leaf_visibility}
 
 #ifdef TRANSFER
 #import canopy::transfer::{light_sides, light_in_stand, indirect_sun}
@@ -225,12 +225,17 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let sky = even_sky(surface, stand_light(neighbours, 1.0 - look.relative_height));
 #endif
     var visibility = terrain_visibility(ground, look.height);
+    var leaves = LeafSample(1.0, 0.0, 0.0);
     if visibility > 0.0 {
 #ifdef SUN_HARMONICS
         // The plant's own shade is in the harmonics. What the maps add is that of other plants, which the light meets before it
         // enters the crown.
         let entry = in.relative + light.key_direction * in.entry_distance;
         let cascades = cascaded_visibility(entry, light.key_direction, 0.25, in.clip.xy);
+#ifdef SUN_DETAIL
+        leaves = cascaded_leaf_visibility(in.relative, normal, SHADOW_BIAS, in.clip.xy);
+        leaves.detail *= visibility;
+#endif
 #else
         let cascades = cascaded_visibility(in.relative, normal, SHADOW_BIAS, in.clip.xy);
 #endif
@@ -245,9 +250,9 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
 #ifdef FOLIAGE
     let near_sun = select(in.front_sun, in.back_sun, behind);
     let far_sun = select(in.back_sun, in.front_sun, behind);
-    var color = exitant(surface, near_sun, far_sun, visibility, sky);
+    var color = exitant(surface, transferred_key_light(surface, near_sun, far_sun, visibility, leaves), sky);
 #else
-    var color = exitant_matt(surface, in.front_sun, vec3(0.0), visibility, sky);
+    var color = exitant_matt(surface, transferred_key_light(surface, in.front_sun, vec3(0.0), visibility, leaves), sky);
 #endif
 #else
 #ifdef FOLIAGE

@@ -9,7 +9,10 @@ use bevy::{
     app::{App, PluginGroup, PluginsState, TerminalCtrlCHandlerPlugin},
     asset::{Assets, Handle, RenderAssetUsages},
     camera::{Camera, RenderTarget},
-    ecs::entity::Entity,
+    ecs::{
+        change_detection::{DetectChanges, Tick},
+        entity::Entity,
+    },
     image::Image,
     log::{Level, LogPlugin},
     prelude::DefaultPlugins,
@@ -154,8 +157,9 @@ pub struct Renderer {
     target: Handle<Image>,
     size: (u32, u32),
     warm: bool,
-    /// The device whose errors are heard.
-    device: RenderDevice,
+    /// When the device was made whose errors are heard. Devices do not tell: one of another instance of wgpu may have the number
+    /// of the lost one and be equal to it.
+    device_since: Tick,
     /// First error that the device reported and that was not returned yet.
     fault: Arc<Mutex<Option<String>>>,
 }
@@ -198,8 +202,8 @@ impl Renderer {
         }
         app.finish();
         app.cleanup();
-        let device = app.world().resource::<RenderDevice>().clone();
-        let fault = report_faults(&device);
+        let device = app.world().resource_ref::<RenderDevice>();
+        let (fault, device_since) = (report_faults(&device), device.last_changed());
         let limit = device.limits().max_texture_dimension_2d;
         if size.0 > limit || size.1 > limit || size.0 == 0 || size.1 == 0 {
             return Err(AppError::TooLarge { width: size.0, height: size.1, limit });
@@ -215,16 +219,16 @@ impl Renderer {
             ))
             .id();
         let sun = app.world_mut().spawn(SunShadowSettings::default()).id();
-        Ok(Self { app, camera, sun, target, size, warm: false, device, fault })
+        Ok(Self { app, camera, sun, target, size, warm: false, device_since, fault })
     }
 
     /// Listens to another device, if the app has made one for a lost one
     /// ([`RenderErrorHandler`](bevy::render::error_handler::RenderErrorHandler)). The errors of the lost one are over.
     fn follow_device(&mut self) {
-        let device = self.app.world().resource::<RenderDevice>();
-        if device.wgpu_device() != self.device.wgpu_device() {
-            self.device = device.clone();
-            self.fault = report_faults(&self.device);
+        let device = self.app.world().resource_ref::<RenderDevice>();
+        if device.last_changed() != self.device_since {
+            self.device_since = device.last_changed();
+            self.fault = report_faults(&device);
         }
     }
 

@@ -12,7 +12,7 @@ pub enum ArgumentError {
     #[error("`{0}` is not a size (expected WIDTHxHEIGHT in pixels, each at least 1, as in 1280x720)")]
     Size(String),
     /// Not a kind of light.
-    #[error("`{0}` is not a light (expected local, expressive, transfer or harmonics)")]
+    #[error("`{0}` is not a light (expected local, expressive, transfer, leaf-shader or harmonics)")]
     Lighting(String),
     /// Not an exposure value.
     #[error("`{0}` is not an exposure value (expected EV at ISO 100 from -10 to 25, as in 12.5)")]
@@ -46,8 +46,8 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), ArgumentError> {
     size.filter(|(width, height)| *width > 0 && *height > 0).ok_or_else(|| ArgumentError::Size(text.to_owned()))
 }
 
-/// Reads the name of a light: `local`, `expressive` or `transfer`, with all its default values, or `harmonics`:
-/// transfer with the sun by [`SunLight::Harmonics`].
+/// Reads the name of a light: `local`, `expressive` or `transfer`, with all its default values, or `leaf-shader` or
+/// `harmonics`: transfer with the sun by [`SunLight::LeafShader`] or [`SunLight::Harmonics`].
 ///
 /// # Errors
 /// [`ArgumentError::Lighting`].
@@ -55,6 +55,7 @@ pub fn parse_lighting(text: &str) -> Result<Lighting, ArgumentError> {
     match text.trim() {
         "local" => Ok(Lighting::Local),
         "transfer" => Ok(Lighting::Transfer(Transfer::default())),
+        "leaf-shader" => Ok(Lighting::Transfer(Transfer { sun: SunLight::LeafShader, ..Transfer::default() })),
         "harmonics" => Ok(Lighting::Transfer(Transfer { sun: SunLight::Harmonics, ..Transfer::default() })),
         "expressive" => Ok(Lighting::Expressive(ImplicitSettings::default())),
         _ => Err(ArgumentError::Lighting(text.to_owned())),

@@ -54,7 +54,7 @@ pub struct Common {
     /// Samples per pixel, 1 (rough leaf edges, faster) or 4 [default: the scene's].
     #[arg(long, global = true, value_name = "1|4", value_parser = parse_samples)]
     pub msaa: Option<u32>,
-    /// Lighting of all foliage: local, expressive, transfer or harmonics (transfer for the sun too) [default: each
+    /// Lighting of all foliage: local, expressive, transfer, or transfer with another sun: leaf-shader or harmonics [default: each
     /// species' own].
     #[arg(long, global = true, value_name = "LIGHT", value_parser = parse_lighting)]
     pub lighting: Option<Lighting>,

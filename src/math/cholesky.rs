@@ -1,4 +1,4 @@
-//! Small dense systems of linear equations: the factorisation of Cholesky [1910].
+//! Small dense systems of linear equations: the factorisation of Cholesky (1910).
 
 /// The lower factor of a symmetric positive definite matrix of `n` rows, row by row; `None` where it is not positive definite.
 pub fn cholesky(mut matrix: Vec<f64>, n: usize) -> Option<Vec<f64>> {

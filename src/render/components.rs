@@ -91,7 +91,7 @@ pub struct Forest {
     /// The plants, indexed by the trees' variant; at most 1,024.
     #[reflect(ignore, clone)]
     pub plants: Arc<Vec<BakedPlant>>,
-    /// How the sun lights each plant; [`SunLight::LeafShader`] beyond the end of the list.
+    /// How the sun lights each plant; the default beyond the end of the list.
     #[reflect(ignore, clone)]
     pub suns: Arc<[SunLight]>,
     /// Scene position in metres of the stand's own origin.

@@ -45,14 +45,14 @@ pub struct Transfer {
     /// 48 to 143 of the rays' lines at most: 57 of the 512 lines of 1024 rays.
     #[reflect(@Range::steps(0..=8, 1.0, 1.0), @"How often light is followed from leaf to leaf; 0: straight through leaves only.")]
     pub bounces: u32,
-    /// How the sun lights full models, `LeafShader` or `Harmonics`; costs no bake of its own. Default `LeafShader`.
-    #[reflect(@"How the sun lights full models: each leaf by its normal, or soft, through the plant's transfer.")]
+    /// How the sun lights full models, `Combined`, `LeafShader` or `Harmonics`; costs no bake of its own. Default `Combined`.
+    #[reflect(@"How the sun lights full models: through the plant's transfer with the shadow map's detail, each leaf by its normal and the shadow map, or softly, through the transfer alone.")]
     pub sun: SunLight,
 }
 
 impl Default for Transfer {
     fn default() -> Self {
-        Self { bands: 4, color: false, rays: 1024, bounces: 3, sun: SunLight::LeafShader }
+        Self { bands: 4, color: false, rays: 1024, bounces: 3, sun: SunLight::default() }
     }
 }
 

@@ -125,9 +125,9 @@ fn a_leaf_without_an_ambient_term_has_the_light_of_a_board() {
     }
 }
 
-/// The texel of a normal map that leans to the east and the south, and the same normal in the world.
+/// The texel of a normal map that leans to the east and the north, away from the noon sun, and the same normal in the world.
 fn leaning() -> (RgbaImage, Vec3) {
-    let normal = Vec3::new(0.35, -0.45, 0.82).normalize();
+    let normal = Vec3::new(0.35, 0.45, 0.82).normalize();
     let texel = (normal * 127.5 + 127.5).to_array().map(|value| value.round() as u8);
     let image = RgbaImage::from_pixel(8, 8, Rgba([texel[0], texel[1], texel[2], 255]));
     (image, Vec3::new(normal.x, normal.z, -normal.y))

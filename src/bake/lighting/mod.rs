@@ -25,14 +25,18 @@ use transfer::{
 /// How the key light (sun or moon) lights a plant's full models. It needs no bake of its own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Serialize, bevy::reflect::Reflect)]
 pub enum SunLight {
-    /// Each leaf by the angle between its own normal and the sun, front and back [Franzke 2005, 4.2.2]: sharp and
-    /// accurate.
+    /// The sun projected onto spherical harmonics, through the plant's transfer, as [`Harmonics`](Self::Harmonics), plus what
+    /// the shadow map shows in finer detail: its value less its mean within 0.6 m. The amount of light is that of the transfer,
+    /// the flecks of sun are those of the shadow map, which also lights wood. Only for plants that are lit by transfer; others use the leaf shader.
     #[default]
+    Combined,
+    /// Each leaf by the angle between its own normal and the sun, front and back, times the shadow map [Franzke 2005,
+    /// 4.2.2]. A texel of the map is larger than a leaf: what the map's bias lets through makes crowns up to a third too
+    /// bright, and more the coarser the map.
     LeafShader,
-    /// The sun projected onto spherical harmonics, through the plant's transfer, times the shadow map, as published for
-    /// landscapes [Franzke 2005, 4.3.3]. A few bands cannot represent a disc, and the plant's own shadow counts twice:
-    /// the result is soft and dark, for comparison. Only for plants that are lit by transfer; others, and crosses, use
-    /// the leaf shader.
+    /// The sun projected onto spherical harmonics, through the plant's transfer [Franzke 2005, 4.3.3]. The shadow map adds
+    /// the shade of other plants only, where the light enters the crown. A few bands cannot represent a disc: the result is
+    /// soft. Only for plants that are lit by transfer; others use the leaf shader.
     Harmonics,
 }
 
@@ -43,7 +47,7 @@ pub enum LightingSettings {
     Local,
     /// Normals and ambient term from the crown's implicit surface [Luft 2007].
     Expressive(ImplicitSettings),
-    /// The sky by radiance transfer, the sun by the leaves' own normals and the shadow map [Franzke 2005, 4.2].
+    /// The sky by radiance transfer [Franzke 2005, 4.2], the sun as [`SunLight`] says.
     Transfer(TransferSettings),
 }
 

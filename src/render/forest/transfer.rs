@@ -4,7 +4,7 @@
 //! any band. A vertex then needs only two dot products, four coefficients at a time. If no plant is lit by radiance
 //! transfer, there is no buffer and no binding, and nothing is computed.
 //!
-//! A plant can receive the sun the same way [Franzke 2005, 4.3.3], [`SunLight::Harmonics`]: the sun's light is a second
+//! A plant can receive the sun the same way [Franzke 2005, 4.3.3], unless it has [`SunLight::LeafShader`]: the sun's light is a second
 //! set of 256 rows. It is neither computed nor uploaded while no plant needs it, and costs a vertex two more dot
 //! products.
 
@@ -87,7 +87,7 @@ impl TransferLight {
         gpu: &Gpu,
     ) -> BindGroup {
         self.wanted.bands = self.wanted.bands.max(settings.bands.into());
-        self.wanted.sun |= sun == SunLight::Harmonics;
+        self.wanted.sun |= sun != SunLight::LeafShader;
         let light = self.buffer.get_or_insert_with(|| {
             gpu.device.create_buffer(&BufferDescriptor {
                 label: Some("canopy_rotated_light"),

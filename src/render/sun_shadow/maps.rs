@@ -232,7 +232,7 @@ impl ShadowMaps {
         self.drawn.resize(self.layers.len(), None);
     }
 
-    /// Begins a [`FreshMap`] of `content` for the layer `index`, or goes on with it.
+    /// Begins a `FreshMap` of `content` for the layer `index`, or goes on with it.
     pub fn continue_fresh(&mut self, device: &RenderDevice, index: usize, content: &DrawnCascade) {
         let same = |fresh: &FreshMap| fresh.index == index && fresh.content == *content;
         if self.fresh.as_ref().is_some_and(same) {

@@ -77,10 +77,12 @@ pub enum PartLight {
 
 impl PartLight {
     /// All values.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 7] = [
         Self::Plain,
+        Self::Transfer { color: false, sun: SunLight::Combined },
         Self::Transfer { color: false, sun: SunLight::LeafShader },
         Self::Transfer { color: false, sun: SunLight::Harmonics },
+        Self::Transfer { color: true, sun: SunLight::Combined },
         Self::Transfer { color: true, sun: SunLight::LeafShader },
         Self::Transfer { color: true, sun: SunLight::Harmonics },
     ];
@@ -231,8 +233,13 @@ impl LevelRenderer for ModelRenderer {
             if color {
                 defs.push("TRANSFER_COLOR".into());
             }
-            if sun == SunLight::Harmonics {
+            // Wood is solid: the shadow map is right on it, in the mean too.
+            let combined = sun == SunLight::Combined && foliage;
+            if sun == SunLight::Harmonics || combined {
                 defs.push("SUN_HARMONICS".into());
+            }
+            if combined {
+                defs.push("SUN_DETAIL".into());
             }
         }
         let to_coverage = attachment.samples > 1 && foliage;
