@@ -260,6 +260,7 @@ fn gpu_structs_are_what_the_shaders_think() {
             lobe_gain,
             lobe_limit,
             cover_weight,
+            inverse_height,
         }
     );
     twin!(
@@ -315,6 +316,7 @@ fn gpu_structs_are_what_the_shaders_think() {
             y_scale,
             shift,
             size_factor,
+            height_factor,
             lowest,
             first_level_only,
             whole_levels,
@@ -331,8 +333,8 @@ fn gpu_structs_are_what_the_shaders_think() {
             planes
         }
     );
-    twin!(layouts, "Cluster", Cluster { cell, first, count, low, high, bottom, top });
-    twin!(layouts, "TreeSize", TreeSize { radius, height });
+    twin!(layouts, "Cluster", Cluster { cell, first, count, low, high, bottom, top, factors });
+    twin!(layouts, "TreeSize", TreeSize { radius, height, inverse_height });
     twin!(layouts, "TreeDraw", TreeDrawWords { group, vertices, kind, first_vertex, share, shares });
     twin!(layouts, "ListRoom", ListRoom { capacity, staging, group_count, draw_count });
     twin!(layouts, "Tile", GpuTile { origin, spacing, first, morph_start, morph_end, clearance, camera_height });

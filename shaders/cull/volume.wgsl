@@ -4,9 +4,10 @@
 
 #import canopy::constants::{POSITION_STEPS, CELL_BITS, SCALE_SHIFT, SCALE_BITS, MAX_LEVELS, MAX_PLANES}
 #import canopy::constants::{COORDINATE_LIMIT, PLANE_SLACK, ENDLESS_DROP, SQUARE_LIMIT, CLUSTER_KEYS}
-#import canopy::instance::Tree
+#import canopy::constants::{FACTOR_ONE, FACTOR_LIMIT}
+#import canopy::instance::{Tree, distance_factor}
 
-// A distance on the ground plane: what is nearer has a smaller sum of squares, after the shift.
+// A distance: what is nearer has a smaller sum of squares, after the shift.
 struct Ring {
     shift: u32,
     square: u32,
@@ -33,6 +34,8 @@ struct Volume {
     y_scale: f32,
     shift: u32,
     size_factor: array<u32, 2>,
+    // Units of plane tests per unit of heights, times 1024; 0: heights do not count in the distances of levels.
+    height_factor: u32,
     lowest: i32,
     first_level_only: u32,
     whole_levels: u32,
@@ -58,12 +61,16 @@ struct Cluster {
     high: array<i32, 2>,
     bottom: f32,
     top: f32,
+    // Least and greatest factor on the distances of its trees.
+    factors: array<u32, 2>,
 }
 
 // Size of a plant at scale 1 in 1/16 m.
 struct TreeSize {
     radius: u32,
     height: u32,
+    // The nominal height over that in metres, times FACTOR_ONE.
+    inverse_height: u32,
 }
 
 // A box in the units of plane tests.
@@ -84,9 +91,11 @@ struct ClusterLook {
 
 @group(0) @binding(0) var<storage, read> volume: Volume;
 
-fn is_beyond(ring: Ring, position: vec2<u32>) -> bool {
-    let shifted = min(position >> vec2(ring.shift), vec2(SQUARE_LIMIT));
-    return shifted.x * shifted.x + shifted.y * shifted.y < ring.square;
+// Whether a position (steps from the anchor, absolute values) is nearer than the ring after `factor` over FACTOR_ONE.
+fn is_beyond(ring: Ring, position: vec3<u32>, factor: u32) -> bool {
+    let shifted = min(position >> vec3(ring.shift), vec3(FACTOR_LIMIT));
+    let at = min(shifted * factor / FACTOR_ONE, vec3(SQUARE_LIMIT));
+    return at.x * at.x + at.y * at.y + at.z * at.z < ring.square;
 }
 
 // Column and row of a cell, counted from the anchor's.
@@ -172,12 +181,17 @@ fn sees(bounds: Bounds) -> bool {
     return true;
 }
 
-// The levels in which a tree at `position` (steps from the anchor) is drawn, as bits.
-fn levels_at(position: vec2<i32>) -> u32 {
-    let at = vec2<u32>(abs(position));
+// A difference of heights in steps, if heights count.
+fn height_steps(units: u32) -> u32 {
+    let coarse = (min(units, u32(COORDINATE_LIMIT)) * volume.height_factor) >> 10u;
+    return min(coarse, 0x7fffffffu >> volume.shift) << volume.shift;
+}
+
+// The levels in which a tree at `position` (steps from the anchor, absolute values) is drawn, as bits.
+fn levels_at(position: vec3<u32>, factor: u32) -> u32 {
     var bits = 0u;
     for (var i = 0u; i < volume.level_count; i++) {
-        if !is_beyond(volume.levels[i].begin, at) && is_beyond(volume.levels[i].end, at) {
+        if !is_beyond(volume.levels[i].begin, position, factor) && is_beyond(volume.levels[i].end, position, factor) {
             bits |= 1u << i;
         }
     }
@@ -187,10 +201,12 @@ fn levels_at(position: vec2<i32>) -> u32 {
 // The levels in which a tree of `size` is drawn, as bits; none if it is not seen.
 fn levels_of_tree(tree: Tree, size: TreeSize) -> u32 {
     let position = ground_position(tree);
-    if !is_beyond(volume.limit, vec2<u32>(abs(position))) || !sees(tree_bounds(tree, size, position)) {
+    let at = vec2<u32>(abs(position));
+    if !is_beyond(volume.limit, vec3(at.x, 0u, at.y), FACTOR_ONE) || !sees(tree_bounds(tree, size, position)) {
         return 0u;
     }
-    return levels_at(position);
+    let y = height_steps(u32(abs(height_from_anchor(tree.y))));
+    return levels_at(vec3(at.x, y, at.y), distance_factor(tree, size.inverse_height));
 }
 
 // A cluster's key: less is drawn earlier.
@@ -212,21 +228,27 @@ fn look_at(cluster: Cluster) -> ClusterLook {
     let near = vec2<u32>(max(max(low, -high), vec2(0)));
     let far = vec2<u32>(max(abs(low), abs(high)));
     let bounds = cluster_bounds(cluster, low, high);
-    if !is_beyond(volume.limit, near) || !sees(bounds) {
+    if !is_beyond(volume.limit, vec3(near.x, 0u, near.y), FACTOR_ONE) || !sees(bounds) {
         return ClusterLook(0u, 0u, 0u);
     }
+    let bottom = bounds.low.y;
+    let top = bounds.high.y;
+    let nearest = vec3(near.x, height_steps(u32(max(max(bottom, -top), 0))), near.y);
+    let farthest_point = vec3(far.x, height_steps(max(u32(abs(bottom)), u32(abs(top)))), far.y);
+    let least = cluster.factors[0];
+    let most = cluster.factors[1];
     var possible = 0u;
     var certain = 0u;
     for (var i = 0u; i < volume.level_count; i++) {
         let level = volume.levels[i];
-        if !is_beyond(level.begin, far) && is_beyond(level.end, near) {
+        if !is_beyond(level.begin, farthest_point, most) && is_beyond(level.end, nearest, least) {
             possible |= 1u << i;
         }
-        if !is_beyond(level.begin, near) && is_beyond(level.end, far) {
+        if !is_beyond(level.begin, nearest, least) && is_beyond(level.end, farthest_point, most) {
             certain |= 1u << i;
         }
     }
     let whole = certain & volume.whole_levels;
-    let sole = is_beyond(volume.limit, far) && whole == possible && countOneBits(whole) == 1u;
+    let sole = is_beyond(volume.limit, vec3(far.x, 0u, far.y), FACTOR_ONE) && whole == possible && countOneBits(whole) == 1u;
     return ClusterLook(min(possible, 1u), select(0u, countTrailingZeros(whole) + 1u, sole), cluster_key(bounds, near));
 }

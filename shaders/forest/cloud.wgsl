@@ -2,7 +2,7 @@
 #import canopy::cloud_plane::{CloudVariant, planes, plane_corner, plane_uv}
 #import canopy::constants::{ISOTROPIC_LEVELS, LIGHT_SCALE, AMBIENT_FITTED, WHOLE, FADE_SPAN, GONE}
 #import canopy::frame::{frame, light}
-#import canopy::instance::{trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, leaf_visibility}
+#import canopy::instance::{trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_distance, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, leaf_visibility}
 #import canopy::lighting::{Surface, shade, even_sky, leaf_transmission}
 #import canopy::output::finish
 #import canopy::sky::sky_transfer
@@ -55,7 +55,8 @@ fn unpack_look(packed: vec4<f32>) -> Look {
 
 @vertex
 fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: u32) -> Varying {
-    let tree = unpack_tree(trees[visible[instance]]);
+    let packed = trees[visible[instance]];
+    let tree = unpack_tree(packed);
     let plane = planes[index / 6u];
     let corner = plane_corner(index);
     let position = plant_vertex_position(tree, plane.center + corner.x * plane.u + corner.y * plane.v);
@@ -74,7 +75,7 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     out.front = select(normal, -normal, toward > 0.0);
     // A plane fades out when it is seen edge-on, where its leaves are streaks.
     let edge = WHOLE + FADE_SPAN * (1.0 - smoothstep(0.06, 0.22, abs(toward)));
-    let threshold = max(level_threshold(length(tree.position.xz)), edge);
+    let threshold = max(level_threshold(level_distance(packed, tree)), edge);
     if threshold >= GONE {
         // No texel would pass the alpha test.
         out.clip = vec4(0.0, 0.0, 0.5, 1.0);

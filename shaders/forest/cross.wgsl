@@ -2,7 +2,7 @@
 #import canopy::constants::{CROSS_VERTICES, PLANES, ISOTROPIC_LEVELS, LIGHT_SCALE, SUN_SCALE, WHOLE, FADE_SPAN, GONE}
 #import canopy::cross_variant::cross_variants
 #import canopy::frame::{frame, light}
-#import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, Crown, crown_of, depth_in_crown}
+#import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_distance, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, Crown, crown_of, depth_in_crown}
 #import canopy::lighting::{Surface, shade_leaves, even_sky, leaf_transmission}
 #import canopy::output::finish
 #import canopy::sky::sky_transfer
@@ -67,7 +67,8 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     var corners = array<vec2<f32>, 6>(
         vec2(-1.0, -1.0), vec2(1.0, -1.0), vec2(1.0, 1.0), vec2(-1.0, -1.0), vec2(1.0, 1.0), vec2(-1.0, 1.0),
     );
-    let tree = unpack_tree(trees[visible[index / CROSS_VERTICES]]);
+    let packed = trees[visible[index / CROSS_VERTICES]];
+    let tree = unpack_tree(packed);
     let plane_index = (index % CROSS_VERTICES) / 6u;
     let corner = corners[index % 6u];
     let plane = cross_variants[tree.variant].planes[plane_index];
@@ -80,7 +81,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     // when seen from above; from the side it would look like a shelf in the crown.
     let level = plane_index == 2u;
     let edge = WHOLE + FADE_SPAN * (1.0 - smoothstep(select(0.10, 0.42, level), select(0.34, 0.72, level), abs(toward)));
-    let threshold = max(level_threshold(length(tree.position.xz)), edge);
+    let threshold = max(level_threshold(level_distance(packed, tree)), edge);
 
     var out: Varying;
     let position = plant_vertex_position(tree, plane.center.xyz + corner.x * plane.u.xyz + corner.y * plane.v.xyz);

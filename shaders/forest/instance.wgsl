@@ -5,6 +5,8 @@
 #import canopy::constants::{CELL_BITS, VARIANT_LOW_SHIFT, VARIANT_LOW_BITS, VARIANT_HIGH_SHIFT, VARIANT_HIGH_BITS}
 #import canopy::constants::{TINT_SHIFT, TINT_BITS, TINT_STEPS}
 #import canopy::constants::{WHOLE, FADE_SPAN, AMBIENT_PUBLISHED}
+#import canopy::hash::mix32
+#import canopy::constants::{FACTOR_ONE, LEAST_FACTOR, GREATEST_FACTOR, LEAST_SHIFT}
 
 struct Tree {
     xz: u32,
@@ -53,6 +55,8 @@ struct Variant {
     lobe_limit: f32,
     // Factor on the cover around it: 0 where its ambient visibility holds the shade of the trees around already, else 1.
     cover_weight: f32,
+    // The nominal height over its own, times FACTOR_ONE.
+    inverse_height: u32,
 }
 
 struct Instance {
@@ -142,6 +146,23 @@ fn depth_in_crown(relative: vec3<f32>, crown: Crown, to_light: vec3<f32>) -> f32
     let middle = dot(position, along);
     let inside = middle * middle + square * (1.0 - dot(position, position));
     return max(sqrt(max(inside, 0.0)) - middle, 0.0) / square;
+}
+
+// Factor on the distance of a tree by its size and place, times FACTOR_ONE. CPU twin: src/lod/level_distance.rs.
+fn distance_factor(tree: Tree, inverse_height: u32) -> u32 {
+    let code = extractBits(tree.look, SCALE_SHIFT, SCALE_BITS);
+    let octaves = 8u * (u32(SCALE_STEPS) - code) + 8u;
+    let inverse_scale = ((4096u + (octaves & 4095u)) << (octaves >> 12u)) >> 8u;
+    let place = mix32(tree.xz ^ mix32(extractBits(tree.cell, 0u, 2u * CELL_BITS)));
+    let shift = LEAST_SHIFT + ((3u * (place >> 26u)) >> 1u);
+    let factor = min(inverse_scale * inverse_height / FACTOR_ONE, 2u * GREATEST_FACTOR) * shift / FACTOR_ONE;
+    return clamp(factor, LEAST_FACTOR, GREATEST_FACTOR);
+}
+
+// The distance by which a tree's level is chosen, metres.
+fn level_distance(tree: Tree, instance: Instance) -> f32 {
+    let factor = distance_factor(tree, variants[instance.variant].inverse_height);
+    return length(instance.position) * (f32(factor) / f32(FACTOR_ONE));
 }
 
 // Threshold of the alpha test of this level at a distance: the CPU twin is src/lod.

@@ -1,7 +1,7 @@
 // The full model of a tree, near the camera.
 #import canopy::constants::{NORMAL_STEPS, NORMAL_LEAST_LENGTH, WHOLE, AMBIENT_FITTED}
 #import canopy::frame::{frame, light}
-#import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, leaf_visibility, crown_of, depth_in_crown}
+#import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_distance, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, leaf_visibility, crown_of, depth_in_crown}
 #import canopy::lighting::{Surface, shade, shade_matt, exitant, exitant_matt, transferred_key_light, even_sky, leaf_transmission}
 #import canopy::output::finish
 #import canopy::stand::stand_light
@@ -93,7 +93,8 @@ struct Varying {
 
 @vertex
 fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index) vertex: u32) -> Varying {
-    let tree = unpack_tree(trees[visible[index]]);
+    let packed = trees[visible[index]];
+    let tree = unpack_tree(packed);
     let position = plant_vertex_position(tree, in.position);
     var out: Varying;
     out.relative = position.relative;
@@ -106,7 +107,7 @@ fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index
     let height = max(variants[tree.variant].height * tree.scale, 0.01);
     let look = Look(ambient, position.from_foot.y, position.from_foot.y / height, tree.tint);
     out.look = pack_look(look);
-    out.threshold = level_threshold(length(tree.position.xz));
+    out.threshold = level_threshold(level_distance(packed, tree));
 #ifdef TRANSFER
     let ground = sample_ground(position.relative);
     let stand = stand_light(ground.surrounding_cover, 1.0 - look.relative_height);
@@ -225,7 +226,9 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let sky = even_sky(surface, stand_light(neighbours, 1.0 - look.relative_height));
 #endif
     var visibility = terrain_visibility(ground, look.height);
+#ifdef SUN_HARMONICS
     var leaves = LeafSample(1.0, 0.0, 0.0);
+#endif
     if visibility > 0.0 {
 #ifdef SUN_HARMONICS
         // The plant's own shade is in the harmonics. What the maps add is that of other plants, which the light meets before it

@@ -3,16 +3,8 @@
 #define_import_path canopy::ground_noise
 
 #import canopy::constants::{NOISE_OCTAVE_DEVIATION, NOISE_WEIGHT_RATIO, LEAF_OCTAVE, LEAF_SEED}
+#import canopy::hash::mix32
 #import canopy::frame::frame
-
-// lowbias32 [Wellons 2018]: mix32 of src/math/hash.rs.
-fn mix32(value: u32) -> u32 {
-    var x = value ^ (value >> 16u);
-    x *= 0x7feb352du;
-    x ^= x >> 15u;
-    x *= 0x846ca68bu;
-    return x ^ (x >> 16u);
-}
 
 fn hash_row(z: u32, seed: u32) -> u32 {
     return mix32(z + seed * 0x632be5abu);

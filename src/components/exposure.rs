@@ -15,30 +15,31 @@ use bevy::{
 
 use crate::{
     render::{
-        components::{CanopyCamera, CanopyOrigin, Daylight, Forest, Ground},
+        components::{CanopyCamera, CanopyOrigin, Daylight, Forest, ForestUpdates, Ground},
         exposure::{CameraExposure, StandTotals},
+        forest::{DrawnForest, DrawnForests},
         report::FrameReport,
     },
-    scatter::PackedStand,
 };
 
 /// What the exposure in a stand is computed from, kept while light and forests stay.
 #[derive(Resource, Default)]
 pub struct StandCache {
-    totals: Vec<(Entity, Arc<PackedStand>, StandTotals)>,
+    totals: Vec<(DrawnForest, StandTotals)>,
     exposure: Option<(Daylight, StandTotals, Arc<CameraExposure>)>,
 }
 
 impl StandCache {
     /// The sums over all forests.
-    fn totals<'a>(&mut self, forests: impl Iterator<Item = (Entity, &'a Forest)>) -> StandTotals {
+    fn totals(&mut self, forests: Vec<DrawnForest>) -> StandTotals {
         let mut sum = StandTotals::default();
         let mut known = Vec::new();
-        for (entity, forest) in forests {
-            let kept = self.totals.iter().find(|(of, stand, _)| *of == entity && Arc::ptr_eq(stand, &forest.stand));
-            let own = kept.map_or_else(|| StandTotals::of(&forest.stand, &forest.plants), |(.., totals)| *totals);
+        for forest in forests {
+            let same = |of: &DrawnForest| of.entity == forest.entity && Arc::ptr_eq(&of.stand, &forest.stand);
+            let kept = self.totals.iter().find(|(of, _)| same(of));
+            let own = kept.map_or_else(|| StandTotals::of(&forest.stand, &forest.plants), |(_, totals)| *totals);
             sum = sum.combined(own);
-            known.push((entity, forest.stand.clone(), own));
+            known.push((forest, own));
         }
         self.totals = known;
         sum
@@ -65,15 +66,29 @@ pub(super) fn expose_cameras(
     daylight: Option<Res<Daylight>>,
     origin: Option<Res<CanopyOrigin>>,
     report: Option<Res<FrameReport>>,
+    updates: Res<ForestUpdates>,
+    drawn: Option<Res<DrawnForests>>,
     forests: Query<(Entity, &Forest, &InheritedVisibility)>,
     grounds: Query<(Entity, &Ground, &GlobalTransform, &InheritedVisibility)>,
     cameras: Query<(Entity, &GlobalTransform, Option<&Exposure>), With<CanopyCamera>>,
 ) {
     let Some(daylight) = daylight else { return };
-    let visible = || forests.iter().filter(|(.., visibility)| visibility.get());
-    let mut order: Vec<_> = visible().map(|(entity, forest, _)| (entity, forest)).collect();
-    order.sort_by_key(|(entity, _)| *entity);
-    let totals = cache.totals(order.into_iter());
+    // A forest that arrives over several frames counts once it is drawn, and what it replaces until then.
+    let trees = match drawn.filter(|_| *updates == ForestUpdates::Spread) {
+        Some(drawn) => drawn.get(),
+        None => {
+            let visible = forests.iter().filter(|(.., visibility)| visibility.get());
+            let of = |(entity, forest, _): (Entity, &Forest, _)| DrawnForest {
+                entity,
+                stand: forest.stand.clone(),
+                plants: forest.plants.clone(),
+            };
+            let mut order: Vec<_> = visible.map(of).collect();
+            order.sort_by_key(|forest| forest.entity);
+            order
+        }
+    };
+    let totals = cache.totals(trees);
     let exposure = cache.exposure(&daylight, totals);
     let ground = grounds.iter().filter(|(.., visibility)| visibility.get()).min_by_key(|(entity, ..)| *entity);
     let origin = origin.map_or_else(CanopyOrigin::default, |origin| *origin);

@@ -8,9 +8,12 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
-use crate::scatter::{
-    CellGrid, PackedStand, PackedTree, PlantSize,
-    packed::{CELL_BITS, POSITION_STEPS},
+use crate::{
+    lod::level_distance::{GREATEST_FACTOR, LEAST_FACTOR, distance_factor, inverse_height},
+    scatter::{
+        CellGrid, PackedStand, PackedTree, PlantSize,
+        packed::{CELL_BITS, POSITION_STEPS},
+    },
 };
 
 /// The most trees of a cluster.
@@ -49,6 +52,8 @@ pub struct Cluster {
     pub bottom: f32,
     /// Highest top, metres above the datum.
     pub top: f32,
+    /// Least and greatest [`distance_factor`] of its trees.
+    pub factors: [u32; 2],
 }
 
 /// Size of a plant at scale 1 in steps of 1/[`SIZE_STEPS`] m, rounded up.
@@ -59,12 +64,18 @@ pub struct TreeSize {
     pub radius: u32,
     /// Height above the foot.
     pub height: u32,
+    /// Its [`inverse_height`].
+    pub inverse_height: u32,
 }
 
 impl From<&PlantSize> for TreeSize {
     fn from(size: &PlantSize) -> Self {
         let steps = |metres: f32| (metres * SIZE_STEPS).ceil().clamp(0.0, LARGEST_SIZE) as u32;
-        Self { radius: steps(size.radius), height: steps(size.height) }
+        Self {
+            radius: steps(size.radius),
+            height: steps(size.height),
+            inverse_height: inverse_height(size.height),
+        }
     }
 }
 
@@ -118,6 +129,7 @@ fn cluster(group: &[PackedTree], first: u32, grid: &CellGrid, sizes: &[PlantSize
         high: [i32::MIN; 2],
         bottom: f32::INFINITY,
         top: f32::NEG_INFINITY,
+        factors: [GREATEST_FACTOR, LEAST_FACTOR],
     };
     for tree in group {
         let scale = f64::from(tree.scale());
@@ -128,6 +140,8 @@ fn cluster(group: &[PackedTree], first: u32, grid: &CellGrid, sizes: &[PlantSize
             cluster.low[axis] = cluster.low[axis].min(corner((f64::from(at) - radius).floor()));
             cluster.high[axis] = cluster.high[axis].max(corner((f64::from(at) + radius).ceil()));
         }
+        let factor = distance_factor(tree, inverse_height(size.height));
+        cluster.factors = [cluster.factors[0].min(factor), cluster.factors[1].max(factor)];
         cluster.bottom = cluster.bottom.min(tree.y);
         cluster.top = cluster.top.max(((f64::from(tree.y) + f64::from(size.height) * scale) as f32).next_up());
     }

@@ -22,7 +22,10 @@ use super::{
     lists::Grouping,
 };
 use crate::{
-    lod::{Levels, MAX_LEVELS},
+    lod::{
+        Levels, MAX_LEVELS,
+        level_distance::{FACTOR_ONE, GREATEST_FACTOR, distance_factor},
+    },
     scatter::{
         CellGrid, PackedTree,
         packed::{CELL_BITS, POSITION_STEPS, SCALE_BITS, SCALE_SHIFT},
@@ -42,9 +45,11 @@ const STEEPEST: f64 = 8192.0;
 /// Units of a drop from which on it counts as endless.
 pub const ENDLESS_DROP: i32 = 1 << 15;
 /// Distances are compared after a shift that leaves at most this.
-pub const RING_LIMIT: u32 = 40_000;
-/// Half a side beyond which a coordinate is not squared.
-pub const SQUARE_LIMIT: u32 = 46_340;
+pub const RING_LIMIT: u32 = 32_000;
+/// A coordinate beyond this is not squared: three squares fit into a word.
+pub const SQUARE_LIMIT: u32 = 37_837;
+/// A coordinate beyond this is not multiplied by a factor.
+pub const FACTOR_LIMIT: u32 = 1 << 20;
 /// Keys of clusters lie below this.
 pub const KEYS: u32 = 4096;
 /// The anchor's cell is within ± this of the stand's base.
@@ -52,7 +57,7 @@ const FARTHEST_CELL: i32 = 1 << 14;
 /// Finest unit of plane tests, metres.
 const FINEST_UNIT: f64 = 1.0 / 64.0;
 
-/// A distance on the ground plane. `Ring` of `shaders/cull/volume.wgsl`.
+/// A distance. `Ring` of `shaders/cull/volume.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct Ring {
@@ -82,10 +87,13 @@ impl Ring {
         Self { shift, square: u32::try_from(rounded * rounded).unwrap_or(u32::MAX) }
     }
 
-    /// Whether a position (steps from the anchor, absolute values) is nearer.
-    pub fn is_beyond(self, position: [u32; 2]) -> bool {
-        let [x, z] = position.map(|value| (value >> self.shift).min(SQUARE_LIMIT));
-        x * x + z * z < self.square
+    /// Whether a position (steps from the anchor, absolute values) is nearer after `factor` over [`FACTOR_ONE`].
+    pub fn is_beyond(self, position: [u32; 3], factor: u32) -> bool {
+        let [x, y, z] = position.map(|value| {
+            let shifted = (value >> self.shift).min(FACTOR_LIMIT);
+            (shifted * factor / FACTOR_ONE).min(SQUARE_LIMIT)
+        });
+        x * x + y * y + z * z < self.square
     }
 }
 
@@ -132,6 +140,8 @@ pub struct Volume {
     pub shift: u32,
     /// Units of plane tests per 1/16 m, times 1024: horizontally, and of heights.
     pub size_factor: [u32; 2],
+    /// Units of plane tests per unit of heights, times 1024; 0: heights do not count in the distances of levels.
+    pub height_factor: u32,
     /// Lowest receiver of a shadow, in units of heights from the anchor.
     pub lowest: i32,
     /// 1: a tree belongs to the first level whose range contains it only.
@@ -274,15 +284,17 @@ impl Volume {
         if volume.limit == Ring::NEVER {
             volume.limit = Ring::new(view_distance.into(), step, f64::round);
         }
+        volume.height_factor = (1024.0 * y_unit / unit).round() as u32;
+        // What rounding of heights, and of coordinates before and after the factor, moves a distance at most.
+        let slack = f64::from(GREATEST_FACTOR / FACTOR_ONE) * (unit + y_unit);
         for (index, level) in volume.levels.iter_mut().enumerate().take(drawn.groupings.len()) {
-            // Coordinates are rounded down, by less than a unit each. A tree near the end of a band is listed if in doubt;
-            // its alpha test decides.
+            // A tree near the end of a band is listed if in doubt; its alpha test decides.
             level.begin = levels
                 .fade_in(index)
-                .map_or(Ring::default(), |fade| Ring::new(fade.start.into(), step, |steps| steps.floor() - 2.0));
+                .map_or(Ring::default(), |fade| Ring::new(f64::from(fade.start) - slack, step, |steps| steps.floor() - 4.0));
             level.end = levels
                 .fade_out(index)
-                .map_or(Ring::NEVER, |fade| Ring::new(fade.end.into(), step, |steps| steps.ceil() + 1.0));
+                .map_or(Ring::NEVER, |fade| Ring::new(f64::from(fade.end) + slack, step, |steps| steps.ceil() + 1.0));
             if level.by_variant == 0 {
                 volume.whole_levels |= 1 << index;
             }
@@ -423,12 +435,18 @@ impl Volume {
         !outside && inside
     }
 
-    /// The levels in which a tree at `position` (steps from the anchor) is drawn, as bits.
-    fn levels_at(&self, position: [i32; 2]) -> u32 {
-        let at = position.map(i32::unsigned_abs);
+    /// A difference of heights in steps, if heights count.
+    fn height_steps(&self, units: u32) -> u32 {
+        let coarse = units.min(COORDINATE_LIMIT as u32) * self.height_factor >> 10;
+        coarse.min(i32::MAX as u32 >> self.shift) << self.shift
+    }
+
+    /// The levels in which a tree at `position` (steps from the anchor, absolute values) is drawn, as bits; `factor` is
+    /// its [`distance_factor`].
+    fn levels_at(&self, position: [u32; 3], factor: u32) -> u32 {
         let mut bits = 0u32;
         for (index, level) in self.levels.iter().enumerate().take(self.level_count as usize) {
-            if !level.begin.is_beyond(at) && level.end.is_beyond(at) {
+            if !level.begin.is_beyond(position, factor) && level.end.is_beyond(position, factor) {
                 bits |= 1 << index;
             }
         }
@@ -438,8 +456,12 @@ impl Volume {
     /// The levels in which a tree of `size` is drawn, as bits; none if it is not seen.
     pub fn levels_of_tree(&self, tree: &PackedTree, size: TreeSize) -> u32 {
         let position = self.ground_position(tree);
-        let near = self.limit.is_beyond(position.map(i32::unsigned_abs));
-        if near && self.sees(&self.tree_bounds(tree, size, position)) { self.levels_at(position) } else { 0 }
+        let [x, z] = position.map(i32::unsigned_abs);
+        if !self.limit.is_beyond([x, 0, z], FACTOR_ONE) || !self.sees(&self.tree_bounds(tree, size, position)) {
+            return 0;
+        }
+        let y = self.height_steps(self.height(tree.y).unsigned_abs());
+        self.levels_at([x, y, z], distance_factor(tree, size.inverse_height))
     }
 
     /// What is known of a cluster without a look at its trees.
@@ -448,15 +470,19 @@ impl Volume {
         let near = [0, 1].map(|axis: usize| low[axis].max(-high[axis]).max(0) as u32);
         let far = [0, 1].map(|axis: usize| low[axis].unsigned_abs().max(high[axis].unsigned_abs()));
         let bounds = self.cluster_bounds(cluster);
-        if !self.limit.is_beyond(near) || !self.sees(&bounds) {
+        if !self.limit.is_beyond([near[0], 0, near[1]], FACTOR_ONE) || !self.sees(&bounds) {
             return ClusterLook::Hidden;
         }
+        let (bottom, top) = (bounds.low[1], bounds.high[1]);
+        let nearest = [near[0], self.height_steps(bottom.max(top.wrapping_neg()).max(0) as u32), near[1]];
+        let farthest = [far[0], self.height_steps(bottom.unsigned_abs().max(top.unsigned_abs())), far[1]];
+        let [least, most] = cluster.factors;
         let (mut possible, mut certain) = (0u32, 0u32);
         for (index, level) in self.levels.iter().enumerate().take(self.level_count as usize) {
-            if !level.begin.is_beyond(far) && level.end.is_beyond(near) {
+            if !level.begin.is_beyond(farthest, most) && level.end.is_beyond(nearest, least) {
                 possible |= 1 << index;
             }
-            if !level.begin.is_beyond(near) && level.end.is_beyond(far) {
+            if !level.begin.is_beyond(nearest, least) && level.end.is_beyond(farthest, most) {
                 certain |= 1 << index;
             }
         }
@@ -464,7 +490,7 @@ impl Volume {
         let key = self.key(&bounds, near);
         if possible == 0 {
             ClusterLook::Hidden
-        } else if self.limit.is_beyond(far) && whole == possible && whole.is_power_of_two() {
+        } else if self.limit.is_beyond([far[0], 0, far[1]], FACTOR_ONE) && whole == possible && whole.is_power_of_two() {
             ClusterLook::Whole { key, level: whole.trailing_zeros() }
         } else {
             ClusterLook::Mixed { key }

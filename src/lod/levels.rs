@@ -86,6 +86,18 @@ impl Levels {
         }
     }
 
+    /// The same levels at `factor` times the distances. A factor that is not a positive number changes nothing.
+    #[must_use]
+    pub fn scaled(&self, factor: f32) -> Self {
+        let mut levels = self.clone();
+        if factor.is_finite() && factor > 0.0 {
+            for fade in &mut levels.fades {
+                *fade = FadeBand { start: fade.start * factor, end: fade.end * factor };
+            }
+        }
+        levels
+    }
+
     /// The representations, from near to far.
     pub fn representations(&self) -> &[Representation] {
         &self.representations
@@ -107,7 +119,8 @@ impl Levels {
         self.fades.get(level).copied()
     }
 
-    /// Alpha threshold of `level` at `distance` metres: [`WHOLE`] to above [`GONE`].
+    /// Alpha threshold of `level` at `distance` metres, that of [`level_distance`](super::level_distance): [`WHOLE`] to
+    /// above [`GONE`].
     pub fn threshold(&self, level: usize, distance: f32) -> f32 {
         let coming = self.fade_in(level).map_or(WHOLE, |fade| fade.incoming_threshold(distance));
         let going = self.fade_out(level).map_or(WHOLE, |fade| fade.outgoing_threshold(distance));

@@ -56,6 +56,7 @@ macro_rules! shader_files {
 }
 
 shader_files! {
+    Hash = "common/hash.wgsl",
     Frame = "common/frame.wgsl",
     Sky = "common/sky.wgsl",
     Stand = "common/stand.wgsl",

@@ -34,7 +34,7 @@ use super::{
     extract::ExtractedScene,
     sets::CanopyRenderSystems,
 };
-use crate::cull::Frustum;
+use crate::{cull::Frustum, lod::level_distance::NOMINAL_FIELD_OF_VIEW};
 
 /// The camera's colour attachment, on which the pipelines of all passes depend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -91,6 +91,8 @@ pub struct PreparedView {
     pub attachment: ViewFormat,
     /// Focal length in pixels (vertical).
     pub focal_pixels: f32,
+    /// Factor on the distances of levels of detail: its focal length over that of [`NOMINAL_FIELD_OF_VIEW`].
+    pub zoom: f32,
     /// Factor from radiance to the attachment's values.
     pub exposure: f32,
     /// Options of the camera.
@@ -179,6 +181,7 @@ fn prepare_view(
         frustum: Frustum::new(&clip_from_relative),
         attachment: ViewFormat { color: view.target_format, samples: msaa.samples() },
         focal_pixels: 0.5 * size.y * view.clip_from_view.y_axis.y.abs(),
+        zoom: view.clip_from_view.y_axis.y.abs() * (0.5 * NOMINAL_FIELD_OF_VIEW).tan(),
         exposure: camera.exposure,
         options: options.copied().unwrap_or_default(),
     });

@@ -42,8 +42,9 @@ pub struct Quality {
     pub cascades: u32,
     /// Distance in metres up to which the sun casts shadows, 10 to 20000. Higher: farther, coarser. Default 800.
     pub shadow_distance: f64,
-    /// Distance in metres up to which trees are drawn as full models, 0 to 5000. Higher: truer, slower. Default 60.
-    /// Beyond are crosses.
+    /// Distance in metres up to which trees 20 m high are drawn as full models, 0 to 5000. Higher: truer, slower.
+    /// Default 60. Beyond are crosses. It counts for a field of view of 50°; others change at the same size in the
+    /// picture ([`level_distance`](crate::lod::level_distance)).
     pub near_distance: f64,
     /// Width in metres of the band behind `near_distance` in which models fade into crosses, 0.1 to 1000.
     /// Wider: softer change, more trees drawn twice. Default 20.

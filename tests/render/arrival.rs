@@ -89,9 +89,7 @@ fn until_drawn(renderer: &mut Renderer, before: &RenderedImage) -> Vec<f64> {
 #[test]
 fn a_forest_that_arrives_over_several_frames_ends_in_the_image_of_one_that_is_waited_for() {
     let gpu = gpu();
-    let mut built = grove(1);
-    // The exposure follows a forest when it is spawned, not when it is drawn.
-    built.stage.scene.camera.exposure = Some(14.0);
+    let built = grove(1);
     let stage = &built.stage;
     let from = view(stage, (0.0, 10.0, 60.0), 0.0, -5.0);
     let whole = draw(&mut showing(stage), stage, &from, NOON);
@@ -122,9 +120,7 @@ fn a_forest_that_arrives_over_several_frames_ends_in_the_image_of_one_that_is_wa
 #[test]
 fn a_forest_that_replaces_another_is_drawn_when_all_of_it_is_there() {
     let gpu = gpu();
-    let mut built = grove(1);
-    // The exposure follows a forest when it is spawned, not when it is drawn.
-    built.stage.scene.camera.exposure = Some(14.0);
+    let built = grove(1);
     let stage = &built.stage;
     let from = view(stage, (0.0, 10.0, 60.0), 0.0, -5.0);
     let mut renderer = spread(stage);

@@ -20,6 +20,7 @@ use bevy::{
 };
 
 use super::{
+    drawn_forests::{DrawnForest, DrawnForests},
     leaves::Leaves,
     pipelines::{LevelPipelines, targets},
     representation::{ForestLevel, LevelTarget, Relight, Representations},
@@ -356,6 +357,7 @@ pub fn prepare_forests(
     pipelines: Res<LevelPipelines>,
     gpu: Gpu,
     report: Res<FrameReport>,
+    told: Res<DrawnForests>,
     mut forests: ResMut<GpuForests>,
     mut transfer: ResMut<TransferLight>,
 ) {
@@ -423,6 +425,12 @@ pub fn prepare_forests(
     }
     forests.order = alive;
     forests.order.retain(|entity| forests.forests.contains_key(entity));
+    let to_tell = |(entity, known): (Entity, &GpuForest)| DrawnForest {
+        entity,
+        stand: known.forest.stand.clone(),
+        plants: known.plants.clone(),
+    };
+    told.set(forests.iter().map(to_tell).collect());
     if uploads.is_empty() {
         report.skipped("forest upload", "no forest is new");
     } else {

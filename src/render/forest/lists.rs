@@ -169,6 +169,7 @@ pub fn prepare_view_lists(
     for (entity, forest) in forests.iter() {
         let settings = &forest.forest;
         let camera = view.camera - settings.origin;
+        let levels = settings.levels.scaled(view.zoom);
         // A forest that was replaced on the same entity has other buffers, so group 1 is created again each frame.
         let (mut slots, uniform) = match prepared.0.remove(&entity) {
             Some(old) => (old.slots, old.uniform),
@@ -178,8 +179,8 @@ pub fn prepare_view_lists(
             let tint = representations.get(*representation).map(|renderer| renderer.tint()).unwrap_or_default();
             let amount = if view.options.tint_levels { TINT_AMOUNT } else { 0.0 };
             let look = LevelLook {
-                fade_in: settings.levels.fade_in(index),
-                fade_out: settings.levels.fade_out(index),
+                fade_in: levels.fade_in(index),
+                fade_out: levels.fade_out(index),
                 tint: tint.extend(amount),
             };
             let values = forest_view(forest, view.camera, Some(look));
@@ -189,7 +190,7 @@ pub fn prepare_view_lists(
         let mut pages = Vec::with_capacity(slots.len());
         for (page, slot) in slots.iter_mut().enumerate() {
             let Some(drawn) = forest.drawn(page) else { continue };
-            let volume = Volume::view(&drawn, camera, &view.frustum, &settings.levels, settings.view_distance);
+            let volume = Volume::view(&drawn, camera, &view.frustum, &levels, settings.view_distance);
             slot.collect(&gpu, forest, page, ListTarget::View);
             pages.push(slot.prepare(&mut work, forest, page, ListTarget::View, &volume, &uniform));
         }

@@ -10,6 +10,7 @@
 
 mod cloud_uniforms;
 mod draw;
+mod drawn_forests;
 mod drawn_trees;
 mod gpu_forest;
 mod instance_layout;
@@ -42,6 +43,7 @@ use super::{
 };
 pub use cloud_uniforms::{CloudPlaneUniform, CloudVariantUniform};
 pub use draw::draw_levels;
+pub use drawn_forests::{DrawnForest, DrawnForests};
 pub use drawn_trees::{DrawnTrees, PageTrees};
 pub use gpu_forest::{GpuForest, GpuForests, ListTarget, MAP_SHARES, most_trees};
 pub use instance_layout::instance_layout;
@@ -62,6 +64,8 @@ pub struct ForestPassPlugin;
 impl Plugin for ForestPassPlugin {
     fn build(&self, app: &mut App) {
         let mut known = app.world_mut().remove_resource::<Representations>().unwrap_or_default();
+        let drawn = DrawnForests::default();
+        app.insert_resource(drawn.clone());
         let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
         if let Some(shaders) = render_app.world().get_resource::<CanopyShaders>() {
             for renderer in levels::built_in(shaders) {
@@ -70,6 +74,7 @@ impl Plugin for ForestPassPlugin {
         }
         render_app
             .insert_resource(known)
+            .insert_resource(drawn)
             .init_gpu_resource::<GpuForests>()
             .init_gpu_resource::<lists::PreparedForests>()
             .init_gpu_resource::<LevelPipelines>()

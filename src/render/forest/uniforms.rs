@@ -14,6 +14,7 @@ use crate::{
         },
     },
     light::sh::MAX_BANDS,
+    lod::level_distance::inverse_height,
     math::luminance,
     plant::{LeafColors, PlantMaterial, lobe_gain, lobe_peak},
     scatter::PlantSize,
@@ -93,8 +94,8 @@ pub struct VariantUniform {
     pub lobe_limit: f32,
     /// Factor on the cover around it: 0 where its k_a holds the shade of the trees around already, else 1.
     pub cover_weight: f32,
-    /// WGSL rounds the size up to 16 bytes.
-    pub padding: u32,
+    /// Its [`inverse_height`].
+    pub inverse_height: u32,
 }
 
 /// `CrossVariant` of `shaders/forest/cross_variant.wgsl`.
@@ -217,7 +218,7 @@ fn variant(plant: &BakedPlant, size: &PlantSize) -> VariantUniform {
         lobe_gain: lobe_gain(gloss.roughness),
         lobe_limit: lobe_peak(gloss.roughness).recip(),
         cover_weight: cover_weight(&plant.lighting),
-        padding: 0,
+        inverse_height: inverse_height(size.height),
     }
 }
 

@@ -87,8 +87,13 @@ impl PartLight {
         Self::Transfer { color: true, sun: SunLight::Harmonics },
     ];
 
-    /// The lighting of a part, with the settings of its transfer if it has one.
-    pub fn new(transfer: Option<&TransferSettings>, sun: SunLight) -> Self {
+    /// The lighting of a part of this kind, with the settings of its transfer if it has one.
+    pub fn new(kind: PartKind, transfer: Option<&TransferSettings>, sun: SunLight) -> Self {
+        let sun = match (kind, sun) {
+            // Wood is solid: the shadow map is right on it, in the mean too.
+            (PartKind::Wood, SunLight::Combined) => SunLight::LeafShader,
+            _ => sun,
+        };
         transfer.map_or(Self::Plain, |settings| Self::Transfer { color: settings.channels == Channels::Rgb, sun })
     }
 }
@@ -233,12 +238,10 @@ impl LevelRenderer for ModelRenderer {
             if color {
                 defs.push("TRANSFER_COLOR".into());
             }
-            // Wood is solid: the shadow map is right on it, in the mean too.
-            let combined = sun == SunLight::Combined && foliage;
-            if sun == SunLight::Harmonics || combined {
+            if sun != SunLight::LeafShader {
                 defs.push("SUN_HARMONICS".into());
             }
-            if combined {
+            if sun == SunLight::Combined {
                 defs.push("SUN_DETAIL".into());
             }
         }
@@ -370,7 +373,7 @@ impl GpuLevel for GpuModels {
                 upload.gpu.queue.write_buffer(&gpu_part.model.vertices, 0, bytemuck::cast_slice(&vertices));
                 upload.gpu.queue.write_buffer(&gpu_part.uniform, 0, bytemuck::bytes_of(&uniform));
                 let traced = new.lighting.transfer(number);
-                gpu_part.light = PartLight::new(traced.map(|(settings, _)| settings), sun);
+                gpu_part.light = PartLight::new(part.kind, traced.map(|(settings, _)| settings), sun);
                 gpu_part.transfer = upload.transfer_group(&new.lighting, number, tint, sun);
             }
         }
@@ -423,7 +426,7 @@ fn upload_parts(
             model: upload_mesh(plant, index, model_mesh, &plant.lighting, upload),
             proxy: upload_mesh(plant, index, proxy_mesh, &local, upload),
             bind_group,
-            light: PartLight::new(coefficients.map(|(settings, _)| settings), sun),
+            light: PartLight::new(part.kind, coefficients.map(|(settings, _)| settings), sun),
             transfer: upload.transfer_group(&plant.lighting, index, tint, sun),
         });
     }
