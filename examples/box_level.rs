@@ -1,4 +1,4 @@
-//! A custom level of detail: beyond 40 m a tree is a box of its plant's size. `cargo run --release --example box_level`
+//! A custom level of detail: beyond 80 m a tree 20 m high is a box of its size. `cargo run --release --example box_level`
 //!
 //! A level needs a shader, a [`LevelRenderer`] and a [`GpuLevel`]. Lists and statistics come with [`Forest::levels`].
 
@@ -39,7 +39,7 @@ struct Varying {
 /// The level.
 pub const BOX: Representation = Representation::named("box");
 
-/// Registers the level; all forests show it beyond 40 m.
+/// Registers the level; all forests show it beyond 80 m, trees of half the nominal height beyond 40 m.
 pub struct BoxLevelPlugin;
 
 impl Plugin for BoxLevelPlugin {
@@ -49,7 +49,7 @@ impl Plugin for BoxLevelPlugin {
             Update,
             |mut forests: Query<&mut Forest, Added<Forest>>| {
                 for mut forest in &mut forests {
-                    forest.levels = Levels::only(Representation::MODEL).then(FadeBand::new(40.0, 0.0), BOX);
+                    forest.levels = Levels::only(Representation::MODEL).then(FadeBand::new(80.0, 0.0), BOX);
                 }
             },
         );

@@ -1,6 +1,6 @@
 //! The field that both sides draw: trees, ground, light, and the way of the camera.
 
-use std::{path::Path, sync::Arc};
+use std::{ops::Range, path::Path, sync::Arc};
 
 use canopy::{
     bake::{BakeSettings, BakedPlant, bake_plant, cache::Cache},
@@ -149,7 +149,14 @@ impl Field {
         Self::new(&self.plant, self.stand.trees.len() as u32, self.look.full())
     }
 
-    /// Metres of the camera above the ground, everywhere the same.
+    /// The band in which full models give way to crosses, metres from the camera to a tree's foot in space: the
+    /// camera's height is everywhere the same.
+    pub fn band_in_space(&self) -> Range<f32> {
+        let slant = |distance: f32| distance.hypot(self.camera_height() as f32);
+        slant(self.look.near)..slant(self.look.near + self.look.band)
+    }
+
+    /// Metres of the camera above the ground.
     pub fn camera_height(&self) -> f64 {
         f64::from(self.plant.plant.height()) + ABOVE_CROWNS
     }

@@ -7,7 +7,7 @@ use canopy::{
     app::Renderer,
     bake::{BakedLevel, BakedPlant},
     components::Sun,
-    lod::{FadeBand, Levels},
+    lod::{FadeBand, Levels, level_distance::NOMINAL_HEIGHT},
     render::components::{Forest, Ground, SunShadowSettings, TreeLists, ViewOptions},
     scene::Viewpoint,
 };
@@ -39,11 +39,13 @@ impl Ours {
                 view_distance: GROUND_REACH,
             });
         }
+        // Canopy's distances are those of trees 20 m high.
+        let by_size = NOMINAL_HEIGHT / field.plant.plant.height();
         let mut shadow = SunShadowSettings {
             map_size: look.shadow_size,
             cascades: look.cascades,
             distance: look.shadow_distance,
-            proxy_distance: f64::from(look.near),
+            proxy_distance: f64::from(by_size * look.near),
             ..SunShadowSettings::default()
         };
         let (plant, fade) = if look.is_full() {
@@ -51,7 +53,10 @@ impl Ours {
             shadow.proxy_distance = f64::from(EVERYWHERE);
             (full_casters(&field.plant), FadeBand::new(EVERYWHERE, 1.0))
         } else {
-            ((*field.plant).clone(), FadeBand::new(look.near, look.band))
+            ((*field.plant).clone(), {
+                let band = field.band_in_space();
+                FadeBand::new(by_size * band.start, by_size * (band.end - band.start))
+            })
         };
         if look.trees {
             world.spawn(Forest {

@@ -233,9 +233,7 @@ fn spawn_trees(app: &mut App, field: &Field) {
 
 fn levels(app: &mut App, field: &Field) -> Vec<Level> {
     let look = &field.look;
-    // Bevy measures to the trunk's foot in space, Canopy on the ground: the camera's height is everywhere the same.
-    let slant = |distance: f32| distance.hypot(field.camera_height() as f32);
-    let band = slant(look.near)..slant(look.near + look.band);
+    let band = field.band_in_space();
     let near = VisibilityRange { start_margin: 0.0..0.0, end_margin: band.clone(), use_aabb: false };
     let far = VisibilityRange { start_margin: band, end_margin: f32::MAX..f32::MAX, use_aabb: false };
     let mut levels = Vec::new();

@@ -13,13 +13,11 @@ use bevy::{
     transform::components::GlobalTransform,
 };
 
-use crate::{
-    render::{
-        components::{CanopyCamera, CanopyOrigin, Daylight, Forest, ForestUpdates, Ground},
-        exposure::{CameraExposure, StandTotals},
-        forest::{DrawnForest, DrawnForests},
-        report::FrameReport,
-    },
+use crate::render::{
+    components::{CanopyCamera, CanopyOrigin, Daylight, Forest, ForestUpdates, Ground},
+    exposure::{CameraExposure, StandTotals},
+    forest::{DrawnForest, DrawnForests},
+    report::FrameReport,
 };
 
 /// What the exposure in a stand is computed from, kept while light and forests stay.
@@ -66,7 +64,7 @@ pub(super) fn expose_cameras(
     daylight: Option<Res<Daylight>>,
     origin: Option<Res<CanopyOrigin>>,
     report: Option<Res<FrameReport>>,
-    updates: Res<ForestUpdates>,
+    updates: Option<Res<ForestUpdates>>,
     drawn: Option<Res<DrawnForests>>,
     forests: Query<(Entity, &Forest, &InheritedVisibility)>,
     grounds: Query<(Entity, &Ground, &GlobalTransform, &InheritedVisibility)>,
@@ -74,7 +72,8 @@ pub(super) fn expose_cameras(
 ) {
     let Some(daylight) = daylight else { return };
     // A forest that arrives over several frames counts once it is drawn, and what it replaces until then.
-    let trees = match drawn.filter(|_| *updates == ForestUpdates::Spread) {
+    let spread = updates.is_none_or(|updates| *updates == ForestUpdates::Spread);
+    let trees = match drawn.filter(|_| spread) {
         Some(drawn) => drawn.get(),
         None => {
             let visible = forests.iter().filter(|(.., visibility)| visibility.get());

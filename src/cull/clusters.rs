@@ -71,11 +71,7 @@ pub struct TreeSize {
 impl From<&PlantSize> for TreeSize {
     fn from(size: &PlantSize) -> Self {
         let steps = |metres: f32| (metres * SIZE_STEPS).ceil().clamp(0.0, LARGEST_SIZE) as u32;
-        Self {
-            radius: steps(size.radius),
-            height: steps(size.height),
-            inverse_height: inverse_height(size.height),
-        }
+        Self { radius: steps(size.radius), height: steps(size.height), inverse_height: inverse_height(size.height) }
     }
 }
 

@@ -289,9 +289,9 @@ impl Volume {
         let slack = f64::from(GREATEST_FACTOR / FACTOR_ONE) * (unit + y_unit);
         for (index, level) in volume.levels.iter_mut().enumerate().take(drawn.groupings.len()) {
             // A tree near the end of a band is listed if in doubt; its alpha test decides.
-            level.begin = levels
-                .fade_in(index)
-                .map_or(Ring::default(), |fade| Ring::new(f64::from(fade.start) - slack, step, |steps| steps.floor() - 4.0));
+            level.begin = levels.fade_in(index).map_or(Ring::default(), |fade| {
+                Ring::new(f64::from(fade.start) - slack, step, |steps| steps.floor() - 4.0)
+            });
             level.end = levels
                 .fade_out(index)
                 .map_or(Ring::NEVER, |fade| Ring::new(f64::from(fade.end) + slack, step, |steps| steps.ceil() + 1.0));
@@ -490,7 +490,8 @@ impl Volume {
         let key = self.key(&bounds, near);
         if possible == 0 {
             ClusterLook::Hidden
-        } else if self.limit.is_beyond([far[0], 0, far[1]], FACTOR_ONE) && whole == possible && whole.is_power_of_two() {
+        } else if self.limit.is_beyond([far[0], 0, far[1]], FACTOR_ONE) && whole == possible && whole.is_power_of_two()
+        {
             ClusterLook::Whole { key, level: whole.trailing_zeros() }
         } else {
             ClusterLook::Mixed { key }

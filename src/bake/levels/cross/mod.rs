@@ -31,7 +31,7 @@ use serde::{Deserialize, Serialize};
 
 use self::properties::IsotropicSum;
 use super::rasterize::{Hit, Raster, View};
-use crate::bake::lighting::BakedLighting;
+use crate::bake::lighting::{AmbientTerm, BakedLighting};
 use crate::math::{MipChain, hash::mix32, luminance};
 use crate::plant::{Bounds, PartKind, Plant, PlantMaterial, geometry, texture::AlphaFade};
 
@@ -396,10 +396,10 @@ impl Shader<'_> {
         let normal = normal.try_normalize().unwrap_or(self.toward);
         let uv = weighted().map(|(c, w)| w * mesh.uvs[c]).sum();
         let color = self.raster.surface(hit.part).color(uv);
-        let transmission = match part.kind {
-            PartKind::Foliage => luminance(part.material.transmitted(color)) / luminance(color).max(1e-6),
-            PartKind::Wood => 0.0,
-        };
+        // As [Luft 2007, eq. 1] lights leaves, nothing comes through them.
+        let opaque = part.kind == PartKind::Wood || self.lighting.ambient_term() == AmbientTerm::Published;
+        let transmission =
+            if opaque { 0.0 } else { luminance(part.material.transmitted(color)) / luminance(color).max(1e-6) };
         Seen { part: hit.part as usize, corners, weights, from_behind, normal, color, transmission }
     }
 
