@@ -6,7 +6,7 @@
 #import canopy::frame::{stand_texture, sky_sampler}
 
 struct StandLight {
-    // Transmittance of the neighbouring crowns for the light of the sky, averaged over the upper hemisphere.
+    // Transmittance of the neighbouring crowns for the light of the sky that the own crown leaves.
     sky_transmittance: vec3<f32>,
     // Their transmittance for the key light.
     key_transmittance: f32,
@@ -16,27 +16,33 @@ struct StandLight {
     upwelling: vec3<f32>,
 }
 
-// In the row of a depth; the last row is the ground's.
-fn look_up(cover: f32, row: f32) -> StandLight {
+// In the row of a depth; the last row is the ground's. The table has five blocks, one below the other: transmittances at
+// leaves, downwelling radiance, upwelling radiance at leaves, transmittances and upwelling radiance at trunks.
+fn look_up(cover: f32, row: f32, transmittances: f32, upwelling: f32) -> StandLight {
     let u = (clamp(cover, 0.0, 1.0) * (STAND_COVERS - 1.0) + 0.5) / STAND_COVERS;
-    let v = (row + 0.5) / (3.0 * (STAND_DEPTHS + 1.0));
-    let first = textureSampleLevel(stand_texture, sky_sampler, vec2(u, v), 0.0);
+    let v = (row + 0.5) / (5.0 * (STAND_DEPTHS + 1.0));
+    let first = textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 0.2 * transmittances), 0.0);
     var stand: StandLight;
     stand.sky_transmittance = first.rgb;
     stand.key_transmittance = first.a;
-    stand.downwelling = textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 1.0 / 3.0), 0.0).rgb;
-    stand.upwelling = textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 2.0 / 3.0), 0.0).rgb;
+    stand.downwelling = textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 0.2), 0.0).rgb;
+    stand.upwelling = textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 0.2 * upwelling), 0.0).rgb;
     return stand;
 }
 
-// The light for a canopy cover of `cover`, at a depth of 0 (the tops) to 1 (the ground).
+// The light on leaves for a canopy cover of `cover`, at a depth of 0 (the tops) to 1 (the ground).
 fn stand_light(cover: f32, depth: f32) -> StandLight {
-    return look_up(cover, clamp(depth, 0.0, 1.0) * (STAND_DEPTHS - 1.0));
+    return look_up(cover, clamp(depth, 0.0, 1.0) * (STAND_DEPTHS - 1.0), 0.0, 2.0);
+}
+
+// The same on wood.
+fn trunk_light(cover: f32, depth: f32) -> StandLight {
+    return look_up(cover, clamp(depth, 0.0, 1.0) * (STAND_DEPTHS - 1.0), 3.0, 4.0);
 }
 
 // The light on the ground.
 fn ground_light(cover: f32) -> StandLight {
-    return look_up(cover, STAND_DEPTHS);
+    return look_up(cover, STAND_DEPTHS, 0.0, 2.0);
 }
 
 // Spherical harmonics of the first two bands in a direction, not below zero: the first coefficient, and the second

@@ -4,7 +4,7 @@
 #import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_distance, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, leaf_visibility, crown_of, depth_in_crown}
 #import canopy::lighting::{Surface, shade, shade_matt, exitant, exitant_matt, transferred_key_light, even_sky, leaf_transmission}
 #import canopy::output::finish
-#import canopy::stand::stand_light
+#import canopy::stand::{StandLight, stand_light, trunk_light}
 #import canopy::sun_visibility::{sample_ground, terrain_visibility, cascaded_visibility, LeafSample, cascaded_leaf_visibility}
 
 #ifdef TRANSFER
@@ -91,6 +91,15 @@ struct Varying {
 #endif
 }
 
+// The light in the stand on this part.
+fn light_at(cover: f32, depth: f32) -> StandLight {
+#ifdef FOLIAGE
+    return stand_light(cover, depth);
+#else
+    return trunk_light(cover, depth);
+#endif
+}
+
 @vertex
 fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index) vertex: u32) -> Varying {
     let packed = trees[visible[index]];
@@ -110,7 +119,7 @@ fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index
     out.threshold = level_threshold(level_distance(packed, tree));
 #ifdef TRANSFER
     let ground = sample_ground(position.relative);
-    let stand = stand_light(ground.surrounding_cover, 1.0 - look.relative_height);
+    let stand = light_at(ground.surrounding_cover, 1.0 - look.relative_height);
     let sky = light_in_stand(vertex, tree.yaw_code, stand);
     out.front_sky = sky.front;
     out.back_sky = sky.back;
@@ -223,7 +232,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
 #else
     surface.ambient_visibility = with_indirect_ambient(look.ambient_visibility, part.ambient_term);
     let neighbours = ground.surrounding_cover * part.cover_weight;
-    let sky = even_sky(surface, stand_light(neighbours, 1.0 - look.relative_height));
+    let sky = even_sky(surface, light_at(neighbours, 1.0 - look.relative_height));
 #endif
     var visibility = terrain_visibility(ground, look.height);
 #ifdef SUN_HARMONICS

@@ -437,8 +437,8 @@ impl Volume {
 
     /// A difference of heights in steps, if heights count.
     fn height_steps(&self, units: u32) -> u32 {
-        let coarse = units.min(COORDINATE_LIMIT as u32) * self.height_factor >> 10;
-        coarse.min(i32::MAX as u32 >> self.shift) << self.shift
+        let coarse = (units.min(COORDINATE_LIMIT as u32) * self.height_factor) >> 10;
+        coarse.min((i32::MAX as u32) >> self.shift) << self.shift
     }
 
     /// The levels in which a tree at `position` (steps from the anchor, absolute values) is drawn, as bits; `factor` is

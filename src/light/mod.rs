@@ -15,6 +15,7 @@ mod error;
 pub mod exposure;
 pub mod moon;
 pub mod night;
+pub mod own_crown;
 pub mod sh;
 pub mod stand;
 mod state;

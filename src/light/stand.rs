@@ -9,14 +9,15 @@
 //! ```text
 //!  transmittance(d, e) = exp(-tau (1 / l + 4 / (pi w) cot e) min(d, l))      tau = -ln(1 - 0.92 cover)
 //!
-//!  sky_transmittance  of the sky's radiance through the neighbours, mean over the upper hemisphere
+//!  sky_transmittance  of the sky's radiance through the neighbours, mean over what the own crown leaves of the sky
 //!  sun_transmittance  of the key light through the neighbours
 //!  downwelling        scattered radiance from above    two-stream equations [Dickinson 1983; Sellers 1985, eq. 1, 2]
 //!  upwelling          radiance from below, of leaves and ground
 //! ```
 //!
 //! None of these terms includes the tree's own crown, because the data baked for the tree does. So a ray counts only
-//! from where it leaves the own crown, `w / 2` away, and nothing is in the way at the tops of an even stand. The two
+//! from where it leaves the own crown, and nothing is in the way at the tops of an even stand. Yet what the own crown
+//! hides decides which part of the sky the neighbours may hide too ([`own_crown`](super::own_crown)). The two
 //! streams describe the mean leaf of the stand and count all crowns. With a cover of 0 the result is the open sky, and
 //! the ground as a lone tree sees it.
 //!
@@ -27,6 +28,7 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
+use super::own_crown::{Entry, OwnCrown};
 use super::state::LightState;
 use crate::math::luminance;
 
@@ -66,13 +68,30 @@ impl StandTrees {
     /// Black leaves.
     pub const BLACK: Self =
         Self { reflectance: Vec3::ZERO, transmittance: Vec3::ZERO, crown_width: 0.5, crown_length: 0.7 };
+
+    /// Width and length of a crown within their ranges; those of [`BLACK`](Self::BLACK) for what is no positive number.
+    fn crown(&self) -> (f32, f32) {
+        let within = |value: f32, least: f32, most: f32, other: f32| {
+            if value > 0.0 { value.clamp(least, most) } else { other }
+        };
+        let width = within(self.crown_width, 0.05, 2.0, Self::BLACK.crown_width);
+        (width, within(self.crown_length, 0.1, 1.0, Self::BLACK.crown_length))
+    }
+
+    /// The crown of the mean tree.
+    fn own_crown(&self) -> OwnCrown {
+        let (width, length) = self.crown();
+        OwnCrown { radius: 0.5 * width, length, extinction: -(1.0 - FILLED).ln() / length }
+    }
 }
 
 /// Light at a cover and depth of the stand, the tree's own crown excluded. Radiance in nits per channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StandSample {
-    /// Mean transmittance of the neighbouring crowns for the sky's radiance, per channel, 0..=1.
+    /// Mean transmittance of the neighbouring crowns for the sky's radiance at leaves, per channel, 0..=1.
     pub sky_transmittance: Vec3,
+    /// The same at trunks.
+    pub trunk_sky_transmittance: Vec3,
     /// Mean transmittance of the neighbouring crowns for the key light (sun or moon), 0..=1.
     pub sun_transmittance: f32,
     /// Downwelling radiance: scattered towards the ground by neighbouring crowns.
@@ -95,12 +114,14 @@ pub struct StandLight {
 type Ring = (f32, Vec3);
 
 impl StandLight {
-    /// Computes the table for a light and the stand's trees, with some 34,000 exponentials. Finite and never negative
+    /// Computes the table for a light and the stand's trees, with some 150,000 exponentials. Finite and never negative
     /// for any light.
     pub fn new(light: &LightState, trees: &StandTrees) -> Self {
         let open = albedo(light);
         let rings = rings(light);
         let sun = Sun { sine: light.key_direction.y, illuminance: light.key_illuminance };
+        let own = (0..DEPTHS).map(|row| OwnSky::new(&trees.own_crown(), row as f32 / (DEPTHS - 1) as f32));
+        let own: Vec<OwnSky> = own.collect();
         let mut samples = vec![StandSample::default(); COVERS * (DEPTHS + 1)];
         let mut shares = vec![0.0; COVERS * DEPTHS];
         for column in 0..COVERS {
@@ -110,19 +131,23 @@ impl StandLight {
             for row in 0..=DEPTHS {
                 let depth = (row as f32 / (DEPTHS - 1) as f32).min(1.0);
                 let (downwelling, upwelling) = streams.at((depth / layer.length).min(1.0));
-                let sample = if row == DEPTHS {
-                    StandSample {
-                        sky_transmittance: layer.sky_flux_transmittance(&rings),
-                        sun_transmittance: layer.transmittance(1.0, sun.sine),
-                        downwelling,
-                        upwelling,
-                    }
-                } else {
-                    StandSample {
-                        sky_transmittance: layer.neighbour_sky_transmittance(depth, &rings),
+                let sample = match own.get(row) {
+                    Some(own) => StandSample {
+                        sky_transmittance: own.of_leaves(&layer, &rings),
+                        trunk_sky_transmittance: own.of_trunk(&layer, &rings),
                         sun_transmittance: layer.neighbour_transmittance(depth, sun.sine),
                         downwelling,
                         upwelling,
+                    },
+                    None => {
+                        let sky_transmittance = layer.sky_flux_transmittance(&rings);
+                        StandSample {
+                            sky_transmittance,
+                            trunk_sky_transmittance: sky_transmittance,
+                            sun_transmittance: layer.transmittance(1.0, sun.sine),
+                            downwelling,
+                            upwelling,
+                        }
                     }
                 };
                 samples[row * COVERS + column] = sample;
@@ -177,6 +202,7 @@ fn position(value: f32, count: usize) -> (usize, f32) {
 fn mix(a: &StandSample, b: &StandSample, t: f32) -> StandSample {
     StandSample {
         sky_transmittance: a.sky_transmittance.lerp(b.sky_transmittance, t),
+        trunk_sky_transmittance: a.trunk_sky_transmittance.lerp(b.trunk_sky_transmittance, t),
         sun_transmittance: a.sun_transmittance + (b.sun_transmittance - a.sun_transmittance) * t,
         downwelling: a.downwelling.lerp(b.downwelling, t),
         upwelling: a.upwelling.lerp(b.upwelling, t),
@@ -192,7 +218,7 @@ fn albedo(light: &LightState) -> Vec3 {
 
 fn rings(light: &LightState) -> Vec<Ring> {
     let ring = |index: usize| {
-        let sine = (index as f32 + 0.5) / RINGS as f32;
+        let sine = ring_sine(index);
         let cosine = (1.0 - sine * sine).sqrt();
         let sum: Vec3 = (0..AZIMUTHS)
             .map(|azimuth| {
@@ -203,6 +229,10 @@ fn rings(light: &LightState) -> Vec<Ring> {
         (sine, sum / AZIMUTHS as f32)
     };
     (0..RINGS).map(ring).collect()
+}
+
+fn ring_sine(ring: usize) -> f32 {
+    (ring as f32 + 0.5) / RINGS as f32
 }
 
 /// Ratio of two sums over the sky; 1 where the sky is black.
@@ -224,11 +254,7 @@ struct Layer {
 
 impl Layer {
     fn new(cover: f32, trees: &StandTrees) -> Self {
-        let within = |value: f32, least: f32, most: f32, other: f32| {
-            if value > 0.0 { value.clamp(least, most) } else { other }
-        };
-        let width = within(trees.crown_width, 0.05, 2.0, StandTrees::BLACK.crown_width);
-        let length = within(trees.crown_length, 0.1, 1.0, StandTrees::BLACK.crown_length);
+        let (width, length) = trees.crown();
         Self { tau: -(1.0 - FILLED * cover).ln(), side: 4.0 / (PI * width), own: 0.5 * width, length }
     }
 
@@ -246,9 +272,17 @@ impl Layer {
         self.transmittance((depth - self.own * tangent).max(0.0), sine)
     }
 
-    fn neighbour_sky_transmittance(&self, depth: f32, rings: &[Ring]) -> Vec3 {
-        let part = rings.iter().map(|(sine, radiance)| *radiance * self.neighbour_transmittance(depth, *sine)).sum();
-        ratio(part, rings.iter().map(|(_, radiance)| *radiance).sum())
+    /// The neighbours' transmittance for the sky's radiance that passes the own crown by these entries.
+    fn sky_transmittance_through<'a>(&self, sky: impl Iterator<Item = (&'a Ring, &'a [Entry])>) -> Vec3 {
+        let (mut part, mut whole) = (Vec3::ZERO, Vec3::ZERO);
+        for ((sine, radiance), entries) in sky {
+            for entry in entries {
+                let seen = *radiance * entry.transmittance;
+                whole += seen;
+                part += seen * self.transmittance(entry.depth, *sine);
+            }
+        }
+        ratio(part, whole)
     }
 
     /// Fraction of the sky's irradiance on level ground that the crowns let through.
@@ -261,6 +295,33 @@ impl Layer {
     /// cosine-weighted optical depths.
     fn diffuse_transmittance(&self, depth: f32) -> f32 {
         (-self.tau * (1.0 / self.length + 0.5 * PI * self.side) * depth).exp()
+    }
+}
+
+/// What the own crown leaves of the sky at a depth, ring by ring.
+struct OwnSky {
+    leaves: Vec<Vec<Entry>>,
+    trunk: Vec<Entry>,
+}
+
+impl OwnSky {
+    fn new(crown: &OwnCrown, depth: f32) -> Self {
+        let tangent = |ring: usize| {
+            let sine = ring_sine(ring);
+            sine / (1.0 - sine * sine).max(1e-6).sqrt()
+        };
+        Self {
+            leaves: (0..RINGS).map(|ring| crown.entries_of_leaves(depth, tangent(ring)).collect()).collect(),
+            trunk: (0..RINGS).map(|ring| crown.entry_of_trunk(depth, tangent(ring))).collect(),
+        }
+    }
+
+    fn of_leaves(&self, layer: &Layer, rings: &[Ring]) -> Vec3 {
+        layer.sky_transmittance_through(rings.iter().zip(self.leaves.iter().map(Vec::as_slice)))
+    }
+
+    fn of_trunk(&self, layer: &Layer, rings: &[Ring]) -> Vec3 {
+        layer.sky_transmittance_through(rings.iter().zip(self.trunk.iter().map(std::slice::from_ref)))
     }
 }
 

@@ -46,7 +46,7 @@ pub fn distance_factor(tree: &PackedTree, inverse_height: u32) -> u32 {
     let octaves = 8 * (SCALE_MASK - code) + 8;
     let inverse_scale = ((4096 + (octaves & 4095)) << (octaves >> 12)) >> 8;
     let place = hash::mix32(tree.xz ^ hash::mix32(tree.cell & CELL_MASK));
-    let shift = LEAST_SHIFT + (3 * (place >> 26) >> 1);
+    let shift = LEAST_SHIFT + ((3 * (place >> 26)) >> 1);
     let factor = (inverse_scale * inverse_height / FACTOR_ONE).min(2 * GREATEST_FACTOR) * shift / FACTOR_ONE;
     factor.clamp(LEAST_FACTOR, GREATEST_FACTOR)
 }

@@ -21,7 +21,7 @@ use half::f16;
 use crate::{
     light::{
         LightState, StandLight, StandTrees,
-        stand::{COVERS, DEPTHS},
+        stand::{COVERS, DEPTHS, StandSample},
     },
     render::{
         bindings::SharedTextures,
@@ -36,8 +36,9 @@ use crate::{
     },
 };
 
-/// Blocks of the texture, one below the other: transmittances, downwelling and upwelling radiance.
-const BLOCKS: usize = 3;
+/// Blocks of the texture, one below the other: transmittances at leaves, downwelling radiance, upwelling radiance at leaves,
+/// transmittances and upwelling radiance at trunks.
+const BLOCKS: usize = 5;
 /// The largest value that is written.
 const BRIGHTEST: f32 = 6.0e4;
 
@@ -122,11 +123,17 @@ fn upload_stand_light(
 fn texels(light: &LightState, stand: &StandLight, exposure: f32) -> Vec<[f16; 4]> {
     let samples = stand.samples();
     let lit = |radiance: Vec3| (radiance * exposure).extend(0.0);
-    let mut texels: Vec<Vec4> =
-        samples.iter().map(|sample| sample.sky_transmittance.extend(sample.sun_transmittance)).collect();
+    let through = |sky: fn(&StandSample) -> Vec3| samples.iter().map(move |at| sky(at).extend(at.sun_transmittance));
+    let upwelling = |sky: fn(&StandSample) -> Vec3| {
+        samples.iter().map(move |at| lit(at.upwelling - sky(at) * light.ground_radiance))
+    };
+    let (leaves, trunk): (fn(&StandSample) -> Vec3, fn(&StandSample) -> Vec3) =
+        (|at| at.sky_transmittance, |at| at.trunk_sky_transmittance);
+    let mut texels: Vec<Vec4> = through(leaves).collect();
     texels.extend(samples.iter().map(|sample| lit(sample.downwelling)));
-    texels
-        .extend(samples.iter().map(|sample| lit(sample.upwelling - sample.sky_transmittance * light.ground_radiance)));
+    texels.extend(upwelling(leaves));
+    texels.extend(through(trunk));
+    texels.extend(upwelling(trunk));
     let half = |value: f32| f16::from_f32(value.clamp(-BRIGHTEST, BRIGHTEST));
     texels.iter().map(|texel| texel.to_array().map(half)).collect()
 }
