@@ -538,6 +538,11 @@ fn the_levels_of_detail_are_a_list() -> Outcome {
     // Without a list, models give way to crosses behind the near distance.
     let levels = parse(FULL)?.quality.lod_levels();
     assert_eq!(levels, Levels::model_and_cross(FadeBand::new(40.0, 10.0)));
+    // With a tolerance, where crosses are that much worse.
+    let tolerant = |text: &str| parse(&FULL.replace("near_distance: 40,", &format!("tolerance: {text},")));
+    assert_eq!(tolerant("0.1")?.quality.lod_levels(), Levels::by_error(0.1));
+    let message = tolerant("-1").err().ok_or("accepted")?.to_string();
+    assert!(message.contains("quality.tolerance"), "{message}");
     let quality = parse(&listed(r#"[(draw: "model", until: 90, fade: 5), (draw: "cross")]"#))?.quality;
     assert_eq!(quality.lod_levels(), Levels::model_and_cross(FadeBand::new(90.0, 5.0)));
     assert_eq!(quality.nearest_level_end(), 95.0);

@@ -2,10 +2,13 @@
 
 use serde::Serialize;
 
-use super::{FadeBand, GONE, WHOLE};
+use super::{FadeBand, GONE, WHOLE, error_curve};
 
 /// The most levels that a forest has.
 pub const MAX_LEVELS: usize = 8;
+
+/// Width of the fade between levels that are chosen by error, as a fraction of their distance.
+const BAND: f32 = 0.3;
 
 /// A way to draw a plant, by its name. The renderer has an implementation for each name that it knows
 /// (`render::forest::Representations`); a program can add its own.
@@ -42,17 +45,41 @@ pub struct Levels {
     representations: Vec<Representation>,
     /// One less than the representations: `fades[i]` lies between `i` and `i + 1`.
     fades: Vec<FadeBand>,
+    /// Whether distances grow with the number of pixels too.
+    by_pixels: bool,
 }
 
 impl Levels {
     /// One representation at every distance.
     pub fn only(representation: Representation) -> Self {
-        Self { representations: vec![representation], fades: Vec::new() }
+        Self { representations: vec![representation], fades: Vec::new(), by_pixels: false }
     }
 
     /// Full models that give way to crossed billboards over `fade`.
     pub fn model_and_cross(fade: FadeBand) -> Self {
         Self::only(Representation::MODEL).then(fade, Representation::CROSS)
+    }
+
+    /// Full models, and crosses where these have at most `tolerance` more error, in whatever size of image: see
+    /// [`error_curve`](super::error_curve). 0: where they have none. The bands of these levels are those of an image with
+    /// 1080 rows.
+    pub fn by_error(tolerance: f32) -> Self {
+        let distance = error_curve::cross_distance(tolerance);
+        // The band's middle is where the error is what is tolerated.
+        let band = FadeBand::new(distance * (1.0 - 0.5 * BAND), distance * BAND);
+        Self { by_pixels: true, ..Self::model_and_cross(band) }
+    }
+
+    /// The levels in a view: `zoom` is its focal length over that of the nominal field of view, `focal_pixels` its focal
+    /// length in pixels.
+    #[must_use]
+    pub fn in_view(&self, zoom: f32, focal_pixels: f32) -> Self {
+        self.scaled(self.view_factor(zoom, focal_pixels))
+    }
+
+    /// The factor on the distances in such a view.
+    pub fn view_factor(&self, zoom: f32, focal_pixels: f32) -> f32 {
+        if self.by_pixels { focal_pixels / error_curve::nominal_focal_length() } else { zoom }
     }
 
     /// Beyond `fade`, `representation`. A band that begins before the one in front of it ends is moved behind it, so
@@ -87,8 +114,7 @@ impl Levels {
     }
 
     /// The same levels at `factor` times the distances. A factor that is not a positive number changes nothing.
-    #[must_use]
-    pub fn scaled(&self, factor: f32) -> Self {
+    fn scaled(&self, factor: f32) -> Self {
         let mut levels = self.clone();
         if factor.is_finite() && factor > 0.0 {
             for fade in &mut levels.fades {
@@ -207,19 +233,31 @@ mod tests {
     #[test]
     fn lists_that_were_edited_are_repaired() {
         let at = |start, end| FadeBand { start, end };
-        let mut levels = Levels { representations: vec![CLOUD; 20], fades: vec![at(1.0, 2.0); 19] };
+        let edited = |representations, fades| Levels { representations, fades, by_pixels: false };
+        let mut levels = edited(vec![CLOUD; 20], vec![at(1.0, 2.0); 19]);
         levels.sanitize();
         assert_eq!((levels.len(), levels.fades.len()), (MAX_LEVELS, MAX_LEVELS - 1));
-        let mut levels = Levels { representations: Vec::new(), fades: vec![at(1.0, 2.0)] };
+        let mut levels = edited(Vec::new(), vec![at(1.0, 2.0)]);
         levels.sanitize();
         assert_eq!(levels, Levels::only(Representation::MODEL));
-        let mut levels = Levels {
-            representations: vec![Representation::MODEL, CLOUD, Representation::CROSS, CLOUD],
-            fades: vec![at(f32::NAN, -5.0), at(-1.0, f32::NAN)],
-        };
+        let four = vec![Representation::MODEL, CLOUD, Representation::CROSS, CLOUD];
+        let mut levels = edited(four, vec![at(f32::NAN, -5.0), at(-1.0, f32::NAN)]);
         levels.sanitize();
         let expected = Levels::only(Representation::MODEL).then(at(0.0, 0.0), CLOUD);
         assert_eq!(levels, expected.then(at(0.0, 0.0), Representation::CROSS));
+    }
+
+    #[test]
+    fn levels_by_error_follow_the_pixels_and_others_do_not() {
+        let nominal = error_curve::nominal_focal_length();
+        let start = |levels: &Levels, zoom: f32, pixels: f32| {
+            levels.in_view(zoom, pixels).fade_out(0).expect("two levels").start
+        };
+        let (by_error, by_distance) = (Levels::by_error(0.1), Levels::model_and_cross(FadeBand::new(60.0, 20.0)));
+        assert_eq!(start(&by_error, 2.0, 0.5 * nominal), 0.5 * start(&by_error, 1.0, nominal));
+        assert_eq!(start(&by_distance, 2.0, 0.5 * nominal), 120.0);
+        assert!(start(&Levels::by_error(1000.0), 1.0, nominal) < 1.0);
+        assert!((300.0..400.0).contains(&start(&Levels::by_error(0.0), 1.0, nominal)));
     }
 
     #[test]

@@ -9,6 +9,7 @@
 //!
 //! The functions here are the CPU twin of `shaders/forest/instance.wgsl`.
 
+pub mod error_curve;
 mod fade_band;
 pub mod level_distance;
 mod levels;

@@ -46,6 +46,10 @@ pub struct Quality {
     /// Default 60. Beyond are crosses. It counts for a field of view of 50°; others change at the same size in the
     /// picture ([`level_distance`](crate::lod::level_distance)).
     pub near_distance: f64,
+    /// Instead of `near_distance`, 0 to 1000: how much more error crosses may have than full models, in any size of image
+    /// ([`error_curve`](crate::lod::error_curve)). 0: none; 0.15: about as `near_distance: 80` at 1080 rows. Lower: truer,
+    /// slower. Default: not used.
+    pub tolerance: Option<f64>,
     /// Width in metres of the band behind `near_distance` in which models fade into crosses, 0.1 to 1000.
     /// Wider: softer change, more trees drawn twice. Default 20.
     pub fade_band: f64,
@@ -70,6 +74,7 @@ impl Default for Quality {
             cascades: 4,
             shadow_distance: 800.0,
             near_distance: 60.0,
+            tolerance: None,
             fade_band: 20.0,
             levels: Vec::new(),
             msaa: 4,
@@ -96,7 +101,10 @@ impl Quality {
             });
         }
         levels.map_or_else(
-            || Levels::model_and_cross(FadeBand::new(self.near_distance as f32, self.fade_band as f32)),
+            || match self.tolerance {
+                Some(tolerance) => Levels::by_error(tolerance as f32),
+                None => Levels::model_and_cross(FadeBand::new(self.near_distance as f32, self.fade_band as f32)),
+            },
             |(levels, _)| levels,
         )
     }
@@ -117,6 +125,7 @@ impl Quality {
         check.count("quality.cascades", self.cascades, 1..=4);
         check.number("quality.shadow_distance", self.shadow_distance, 10.0..=20_000.0, "m");
         check.number("quality.near_distance", self.near_distance, 0.0..=5_000.0, "m");
+        check.number("quality.tolerance", self.tolerance.unwrap_or_default(), 0.0..=1_000.0, "");
         check.number("quality.fade_band", self.fade_band, 0.1..=1_000.0, "m");
         if self.levels.len() > MAX_LEVELS {
             let count = self.levels.len();

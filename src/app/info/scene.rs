@@ -251,8 +251,9 @@ fn describe_quality(page: &mut Page, scene: &Scene) {
     page.row(
         "quality",
         format!(
-            "full models to {}, billboards from there to {}; {} cascades of {} texels to {}; {} samples per pixel",
-            length(quality.near_distance + quality.fade_band),
+            "full models to {}{}, billboards from there to {}; {} cascades of {} texels to {}; {} samples per pixel",
+            length(quality.nearest_level_end()),
+            if quality.tolerance.is_some() { " (in images of 1080 rows)" } else { "" },
             length(quality.view_distance),
             quality.cascades,
             quality.shadow_map_size,

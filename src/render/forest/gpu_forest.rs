@@ -38,7 +38,7 @@ use crate::{
         extract::ExtractedScene,
         gpu::{self, Gpu},
         report::FrameReport,
-        view::{PreparedFrame, ViewFormat},
+        view::{PreparedFrame, PreparedView, ViewFormat},
     },
     scatter::{PackedStand, PackedTree, PlantSize},
 };
@@ -166,12 +166,13 @@ impl GpuForest {
     }
 
     /// Distances in metres from the centre of a shadow map at which each level casts into a map of `texel` metres per
-    /// texel; `near` are those of the first level.
+    /// texel; `near` are those of the first level. What is drawn nearer in `view` casts nearer too.
     ///
     /// A tree casts in the first level whose range contains it. That is the level in which the view draws it, except
     /// for levels that are too fine for the map: the farthest level casts instead of them.
-    pub fn casting_distances(&self, near: Range<f64>, texel: f64) -> Vec<Range<f64>> {
-        let levels = &self.forest.levels;
+    pub fn casting_distances(&self, near: Range<f64>, texel: f64, view: &PreparedView) -> Vec<Range<f64>> {
+        let levels = &self.forest.levels.in_view(view.zoom, view.focal_pixels);
+        let near = near.start..near.end * f64::from(self.forest.levels.view_factor(view.zoom, view.focal_pixels));
         let mut casting = vec![0.0..0.0; levels.len()];
         let mut ends = near.end;
         for (index, level) in self.levels() {

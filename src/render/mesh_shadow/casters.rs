@@ -125,7 +125,7 @@ pub fn prepare_mesh_shadows(
         let frustum = Frustum::new(&clip_from_anchor);
         let mut cast = CastView { entity, forests: Vec::new() };
         for (entity, forest) in forests.iter() {
-            let casting = forest.casting_distances(0.0..scene.shadow.proxy_distance, texel);
+            let casting = forest.casting_distances(0.0..scene.shadow.proxy_distance, texel, view);
             let buffers = shadows.buffers.entry((slot, entity)).or_insert_with(|| CastBuffers {
                 uniform: gpu::uniform_slots(&gpu.device, "canopy_mesh_shadow_forest", 1),
                 lists: Vec::new(),

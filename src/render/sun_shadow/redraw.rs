@@ -86,7 +86,7 @@ pub fn prepare_shadows(
         // Near the camera, a finer map already contains the trees' shadows.
         let served = index.checked_sub(1).map_or(0.0, |finer| 0.7 * maps.cascades[finer].radius);
         let content = forests.iter().map(|(entity, forest)| {
-            let casting = forest.casting_distances(served..settings.proxy_distance, place.texel);
+            let casting = forest.casting_distances(served..settings.proxy_distance, place.texel, view);
             (entity, forest.generation, forest.forest.origin, casting)
         });
         let mut key = CascadeKey { place, forests: content.collect(), meshes: meshes.state() };
