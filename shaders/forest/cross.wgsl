@@ -2,7 +2,7 @@
 #import canopy::constants::{CROSS_VERTICES, PLANES, ISOTROPIC_LEVELS, LIGHT_SCALE, SUN_SCALE, WHOLE, FADE_SPAN, GONE}
 #import canopy::cross_variant::cross_variants
 #import canopy::frame::{frame, light}
-#import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_distance, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, Crown, crown_of, depth_in_crown}
+#import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, rotated_vertex_position, level_distance, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, Crown, crown_of, depth_in_crown}
 #import canopy::lighting::{Surface, shade_leaves, even_sky, leaf_transmission}
 #import canopy::output::finish
 #import canopy::sky::sky_transfer
@@ -81,10 +81,12 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     // when seen from above; from the side it would look like a shelf in the crown.
     let level = plane_index == 2u;
     let edge = WHOLE + FADE_SPAN * (1.0 - smoothstep(select(0.10, 0.42, level), select(0.34, 0.72, level), abs(toward)));
-    let threshold = max(level_threshold(level_distance(packed, tree)), edge);
+    let turned = turn(rotate(plane.u.xyz, tree.yaw), normal, center.xz, level);
+    let threshold = max(max(level_threshold(level_distance(packed, tree)), edge), turned.threshold);
 
     var out: Varying;
-    let position = plant_vertex_position(tree, plane.center.xyz + corner.x * plane.u.xyz + corner.y * plane.v.xyz);
+    let from_center = corner.x * turned.u + corner.y * rotate(plane.v.xyz, tree.yaw);
+    let position = rotated_vertex_position(tree, rotate(plane.center.xyz, tree.yaw) + from_center);
     out.relative = position.relative;
     out.clip = frame.clip_from_relative * vec4(out.relative, 1.0);
     if threshold >= GONE {
@@ -106,6 +108,34 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     let sun = vec3(dot(to_light, out.right), dot(to_light, out.up), dot(to_light, out.front));
     set_sun_basis(select(sun, sun.xzy, level), &out);
     return out;
+}
+
+// How far an upright plane turns towards the viewer, as a fraction of the way.
+const TURN: f32 = 0.85;
+
+struct Turned {
+    // The plane's axis across, world axes, metres at scale 1.
+    u: vec3<f32>,
+    // Of the alpha test.
+    threshold: f32,
+}
+
+// Turns an upright plane about its middle towards the viewer. A plane that is seen at an angle shows its leaves as upright
+// streaks. So the one that the viewer is in front of is drawn, and between two, around 45 degrees, both. What they show stays as it was
+// baked: its light does not turn with it. `center`: from the viewer to the plane's middle, on the ground.
+fn turn(u: vec3<f32>, normal: vec3<f32>, center: vec2<f32>, level: bool) -> Turned {
+    let far = length(center);
+    if level || far < 1e-3 {
+        return Turned(u, WHOLE);
+    }
+    let view = center / far;
+    let toward = dot(normal.xz, view);
+    let front = normal.xz * select(-1.0, 1.0, toward > 0.0);
+    // Not all of the way: two planes that face the viewer would lie in each other.
+    let wanted = normalize(mix(front, view, TURN));
+    let rotation = vec2(dot(front, wanted), front.x * wanted.y - front.y * wanted.x);
+    let across = vec2(u.x * rotation.x - u.z * rotation.y, u.x * rotation.y + u.z * rotation.x);
+    return Turned(vec3(across.x, u.y, across.y), WHOLE + FADE_SPAN * (1.0 - smoothstep(0.58, 0.72, abs(toward))));
 }
 
 // The twin of `basis` in src/bake/levels/cross/sun.rs. `sun`: right, zenith, front; there are no suns below the horizon.
