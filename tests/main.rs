@@ -10,6 +10,7 @@ mod fuzz;
 mod grow;
 mod implicit;
 mod interrupts;
+mod inventory;
 mod layering;
 mod library;
 mod light;

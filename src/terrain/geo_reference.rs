@@ -113,6 +113,12 @@ impl CoordinateSystem {
             _ => return None,
         })
     }
+
+    /// Latitude and longitude in degrees of a point (easting, northing in metres) of a UTM zone; `None` for points that no
+    /// zone contains.
+    pub fn utm_place(point: DVec2, zone: u8, south: bool) -> Option<(f64, f64)> {
+        utm_to_geographic(point, zone, south)
+    }
 }
 
 /// Ties the local frame of a terrain (metres, x east, z south, origin at the centre) to the coordinates of its file.
@@ -210,6 +216,24 @@ impl GeoReference {
         if file.is_finite() { file } else { self.centre }
     }
 
+    /// Local metres (x: east, y: south) of a place on earth, in degrees of WGS84; `None` where the coordinate system does not
+    /// say where it lies, or the place is far outside it. Longitudes may be given in either convention (-84 or 276).
+    pub fn local_of(&self, longitude: f64, latitude: f64) -> Option<DVec2> {
+        if !(longitude.is_finite() && latitude.abs() <= 90.0) {
+            return None;
+        }
+        let file = match self.system {
+            CoordinateSystem::Geographic => DVec2::new(longitude, latitude),
+            CoordinateSystem::WebMercator => {
+                let east = wrapped(longitude).to_radians() * WGS84_A;
+                DVec2::new(east, latitude.to_radians().tan().asinh() * WGS84_A)
+            }
+            CoordinateSystem::Utm { zone, south } => geographic_to_utm(longitude, latitude, zone, south)?,
+            CoordinateSystem::Projected { .. } | CoordinateSystem::Local => return None,
+        };
+        file.is_finite().then(|| self.to_local(file.x, file.y))
+    }
+
     /// Latitude and longitude of the centre in degrees (north and east positive, longitude in -180..180), where the
     /// coordinate system tells.
     pub fn latitude_longitude(&self) -> Option<(f64, f64)> {
@@ -221,9 +245,14 @@ impl GeoReference {
             CoordinateSystem::Utm { zone, south } => utm_to_geographic(self.centre, zone, south)?,
             CoordinateSystem::Projected { .. } | CoordinateSystem::Local => return None,
         };
-        let wrapped = longitude - 360.0 * ((longitude + 180.0) / 360.0).floor();
+        let wrapped = wrapped(longitude);
         (latitude.abs() <= 90.0 && wrapped.is_finite()).then_some((latitude, wrapped))
     }
+}
+
+/// A longitude between -180 and 180 degrees.
+fn wrapped(longitude: f64) -> f64 {
+    longitude - 360.0 * ((longitude + 180.0) / 360.0).floor()
 }
 
 /// Metres per degree of longitude (x) and of latitude (y) on the WGS84 ellipsoid: the radii of curvature in the prime
@@ -283,6 +312,39 @@ fn utm_to_geographic(point: DVec2, zone: u8, south: bool) -> Option<(f64, f64)> 
     Some((latitude.to_degrees(), longitude))
 }
 
+/// Easting and northing of a place in a UTM zone, the inverse of [`utm_to_geographic`] [Karney 2011, eq. 7 to 10, 35].
+/// `None` for places more than 40 degrees from the zone's meridian.
+pub(super) fn geographic_to_utm(longitude: f64, latitude: f64, zone: u8, south: bool) -> Option<DVec2> {
+    let from_meridian = wrapped(longitude - (6.0 * f64::from(zone) - 183.0));
+    if from_meridian.abs() > 40.0 {
+        return None;
+    }
+    let n = WGS84_F / (2.0 - WGS84_F);
+    let (n2, n3, n4) = (n * n, n * n * n, n * n * n * n);
+    let rectifying_radius = WGS84_A / (1.0 + n) * (1.0 + n2 / 4.0 + n4 / 64.0);
+    let alpha = [
+        n / 2.0 - 2.0 / 3.0 * n2 + 5.0 / 16.0 * n3 + 41.0 / 180.0 * n4,
+        13.0 / 48.0 * n2 - 3.0 / 5.0 * n3 + 557.0 / 1440.0 * n4,
+        61.0 / 240.0 * n3 - 103.0 / 140.0 * n4,
+        49_561.0 / 161_280.0 * n4,
+    ];
+    let eccentricity = (WGS84_F * (2.0 - WGS84_F)).sqrt();
+    let tan = latitude.to_radians().tan();
+    let sigma = (eccentricity * (eccentricity * tan / (1.0 + tan * tan).sqrt()).atanh()).sinh();
+    let conformal = tan * (1.0 + sigma * sigma).sqrt() - sigma * (1.0 + tan * tan).sqrt();
+    let (sin, cos) = from_meridian.to_radians().sin_cos();
+    let xi_prime = conformal.atan2(cos);
+    let eta_prime = (sin / (conformal * conformal + cos * cos).sqrt()).asinh();
+    let (mut xi, mut eta) = (xi_prime, eta_prime);
+    for (j, alpha) in (1..).zip(alpha) {
+        let twice = 2.0 * f64::from(j);
+        xi += alpha * (twice * xi_prime).sin() * (twice * eta_prime).cosh();
+        eta += alpha * (twice * xi_prime).cos() * (twice * eta_prime).sinh();
+    }
+    let scale = UTM_SCALE * rectifying_radius;
+    Some(DVec2::new(500_000.0 + scale * eta, scale * xi + if south { 10_000_000.0 } else { 0.0 }))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -328,6 +390,34 @@ mod tests {
         let equator = GeoReference::new(CoordinateSystem::Utm { zone: 31, south: true }, DVec2::new(500_000.0, 1.0e7));
         let (latitude, longitude) = equator.unwrap().latitude_longitude().unwrap();
         assert!(latitude.abs() < 1e-12 && (longitude - 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn places_on_earth_are_found_in_every_system() {
+        let tower = (-79.387_139, 43.642_567);
+        let utm = geographic_to_utm(tower.0, tower.1, 17, false).unwrap();
+        assert!((utm - DVec2::new(630_084.0, 4_833_438.0)).length() < 2.0, "{utm}");
+        for (zone, south) in [(17, false), (33, true)] {
+            for (east, north) in [(420_000.0, 5_100_000.0), (500_000.0, 8_000_000.0), (720_000.0, 9_900_000.0)] {
+                let (latitude, longitude) = utm_to_geographic(DVec2::new(east, north), zone, south).unwrap();
+                let back = geographic_to_utm(longitude, latitude, zone, south).unwrap();
+                assert!((back - DVec2::new(east, north)).length() < 1e-3, "{back}");
+            }
+        }
+        for (system, centre) in [
+            (CoordinateSystem::Geographic, DVec2::new(tower.0, tower.1)),
+            (CoordinateSystem::Utm { zone: 17, south: false }, utm),
+            (CoordinateSystem::WebMercator, DVec2::new(-8_837_335.9, 5_410_875.9)),
+        ] {
+            let reference = GeoReference::new(system, centre).unwrap();
+            let (latitude, longitude) = reference.latitude_longitude().unwrap();
+            assert!(reference.local_of(longitude, latitude).unwrap().length() < 1e-3, "{system:?}");
+            let north = reference.local_of(longitude, latitude + 0.001).unwrap();
+            assert!((north.y + 111.1).abs() < 0.2 && north.x.abs() < 3.0, "{system:?}: {north}");
+            assert_eq!(reference.local_of(f64::NAN, 0.0), None);
+        }
+        let local = GeoReference::new(CoordinateSystem::Local, DVec2::ZERO).unwrap();
+        assert_eq!(local.local_of(8.0, 47.0), None);
     }
 
     #[test]
