@@ -25,6 +25,7 @@ mod scene;
 mod shaders;
 mod support;
 mod terrain;
+mod terrain_kinds;
 mod trace;
 mod transfer;
 mod withstand;

@@ -6,29 +6,27 @@ use super::StageError;
 use crate::{
     scatter::{Area, Coordinates, Inventory, InventoryOptions, read_inventory},
     scene::{Anchor, InventoryTrees, Scene},
-    terrain::{CoordinateSystem, GeoReference, Terrain},
+    terrain::{CoordinateSystem, GeoReference, SystemMap, Terrain},
 };
 
 /// How coordinates become positions.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Placement {
     map: Map,
     /// What had to be assumed.
     pub note: Option<String>,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 enum Map {
     /// Metres from this point of the file.
     Metres { origin: DVec2 },
     /// Degrees, laid out flat around this reference.
     Degrees(GeoReference),
-    /// Degrees on the terrain's own reference.
-    OnEarth,
     /// The terrain file's own coordinates.
     File,
-    /// Metres of a UTM zone on a terrain in degrees.
-    Utm { zone: u8, south: bool },
+    /// Coordinates of another system than the terrain's.
+    Across { from: SystemMap, to: SystemMap },
 }
 
 /// Reads the inventory of a scene: of a table with two kinds of positions the one that fits the terrain.
@@ -84,14 +82,32 @@ impl Placement {
         let span = span(inventory);
         let reference = terrain.reference();
         let place = reference.and_then(GeoReference::latitude_longitude);
+        let across = |from: CoordinateSystem| {
+            Some(Map::Across { from: SystemMap::new(from)?, to: SystemMap::new(reference?.system())? })
+        };
+        // A system that the scene or the file states, where the terrain has another one.
+        let stated = trees.coordinates.or(inventory.epsg.and_then(CoordinateSystem::from_epsg));
+        if let Some(system) = stated
+            && inventory.coordinates == Coordinates::Planar
+            && (trees.coordinates.is_some() || trees.anchor == Anchor::Terrain)
+            && reference.is_some_and(|reference| reference.system() != system)
+        {
+            return match across(system) {
+                Some(map) => plain(map),
+                None => refused("it is not known where on earth its coordinate system or that of the terrain lies"),
+            };
+        }
         match (inventory.coordinates, trees.anchor) {
             (Coordinates::Geographic, Anchor::StandCentre) => {
                 match GeoReference::new(CoordinateSystem::Geographic, 0.5 * (span.0 + span.1)) {
                     Ok(centre) => plain(Map::Degrees(centre)),
-                    Err(_) => plain(Map::OnEarth),
+                    Err(_) => refused("its positions are degrees too near to a pole"),
                 }
             }
-            (Coordinates::Geographic, _) if place.is_some() => plain(Map::OnEarth),
+            (Coordinates::Geographic, _) if place.is_some() => match across(CoordinateSystem::Geographic) {
+                Some(map) => plain(map),
+                None => refused("its positions are degrees, and it is not known where on earth the terrain lies"),
+            },
             (Coordinates::Geographic, _) => {
                 // A terrain without a system lies where the scene says.
                 let stated = scene.place.longitude.zip(scene.place.latitude);
@@ -111,8 +127,11 @@ impl Placement {
                         return refused("its positions are metres, and the terrain's are degrees");
                     };
                     let zone = (((longitude + 180.0) / 6.0).floor() as i64).rem_euclid(60) as u8 + 1;
+                    let Some(map) = across(CoordinateSystem::Utm { zone, south: latitude < 0.0 }) else {
+                        return refused("its positions are metres, and the terrain's are degrees");
+                    };
                     let placement = Self {
-                        map: Map::Utm { zone, south: latitude < 0.0 },
+                        map,
                         note: Some(format!(
                             "its metres are taken as those of UTM zone {zone}, because the terrain is in degrees there"
                         )),
@@ -138,19 +157,17 @@ impl Placement {
     /// The position of a tree, whose height above the datum is 0; not finite where there is none.
     pub fn local(&self, terrain: &Terrain, x: f64, y: f64) -> DVec3 {
         let on_ground = |place: DVec2| DVec3::new(place.x, 0.0, place.y);
-        match self.map {
+        match &self.map {
             // The file's y points north, the scene's z south.
             Map::Metres { origin } => on_ground(DVec2::new(x - origin.x, origin.y - y)),
             Map::Degrees(reference) => on_ground(reference.to_local(x, y)),
-            Map::OnEarth => {
-                terrain.reference().and_then(|reference| reference.local_of(x, y)).map_or(DVec3::NAN, on_ground)
-            }
             Map::File => terrain.reference().map_or(DVec3::NAN, |reference| on_ground(reference.to_local(x, y))),
-            Map::Utm { zone, south } => terrain
+            Map::Across { from, to } => terrain
                 .reference()
                 .and_then(|reference| {
-                    let (latitude, longitude) = CoordinateSystem::utm_place(DVec2::new(x, y), zone, south)?;
-                    reference.local_of(longitude, latitude)
+                    let (latitude, longitude) = from.to_earth(DVec2::new(x, y))?;
+                    let file = to.from_earth(longitude, latitude)?;
+                    Some(reference.to_local(file.x, file.y))
                 })
                 .map_or(DVec3::NAN, on_ground),
         }

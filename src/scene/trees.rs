@@ -10,6 +10,7 @@ use super::check::Check;
 use super::error::nearest;
 use super::species::{ELEVATIONS, Species};
 use crate::scatter::{Area, ClearingNoise, LengthUnit, Sequence};
+use crate::terrain::CoordinateSystem;
 
 /// Where the trees stand. In a scene file: `trees: Scattered(...)`, `Inventory(...)` or `None`.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
@@ -93,6 +94,11 @@ pub struct InventoryTrees {
     /// anchor but `StandCentre`, where they are to be put elsewhere. Default `TerrainCentre`.
     #[serde(default)]
     pub anchor: Anchor,
+    /// The coordinate system of the positions, as of a terrain: `Utm(zone: 33)`, `Epsg(25833)`; they are brought to that of
+    /// the terrain file. Default: that of the terrain (for degrees: WGS84).
+    #[serde(default)]
+    #[reflect(ignore)]
+    pub coordinates: Option<CoordinateSystem>,
     /// Height in metres of trees that have neither height nor diameter, 0.1 to 150. Default: the mean of their
     /// species' range.
     #[serde(default)]
@@ -152,6 +158,7 @@ impl InventoryTrees {
             height_unit: None,
             strict: false,
             anchor: Anchor::default(),
+            coordinates: None,
             default_height: None,
             species: BTreeMap::new(),
             default_species: None,

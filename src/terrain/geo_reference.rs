@@ -4,6 +4,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::TerrainError;
+use super::projection::{self, Kind, Projection};
 
 /// Semi-major axis of the WGS84 ellipsoid in metres.
 const WGS84_A: f64 = 6_378_137.0;
@@ -98,26 +99,38 @@ impl From<CoordinateSystem> for Written {
 }
 
 impl CoordinateSystem {
-    /// The system that an EPSG code stands for. Knows the geographic range 4001 to 4999 without the geocentric 4978,
-    /// UTM on WGS84 (326zz, 327zz), NAD83 (269zz) and ETRS89 (258zz), and 3857; other codes from 1024 to 32767 are
-    /// taken as projections in metres; anything else is `None`.
+    /// The system that an EPSG code stands for, by the definitions of the registry: degrees, UTM on a datum that is WGS84 to a
+    /// metre (WGS84, NAD83, ETRS89, GDA), 3857, or a projection with the unit of its coordinates. Codes of state plane systems
+    /// together with heights (8700 to 8790) are in feet. Other codes from 1024 to 32767 are taken as projections in metres;
+    /// geocentric systems and anything else are `None`.
     pub fn from_epsg(code: u32) -> Option<Self> {
         let zone = (code % 100) as u8;
         Some(match code {
-            4978 => return None,
-            4001..=4999 => Self::Geographic,
             32601..=32660 | 26901..=26923 | 25828..=25838 => Self::Utm { zone, south: false },
             32701..=32760 => Self::Utm { zone, south: true },
             3857 => Self::WebMercator,
-            1024..=32766 => Self::Projected { epsg: Some(code), metres_per_unit: 1.0 },
-            _ => return None,
+            _ => match projection::kind_of(code) {
+                Some(Kind::Geographic) => Self::Geographic,
+                Some(Kind::Geocentric) => return None,
+                Some(Kind::Utm { zone, south }) => Self::Utm { zone, south },
+                Some(Kind::Projected { metres_per_unit }) => Self::Projected { epsg: Some(code), metres_per_unit },
+                None if (8700..=8790).contains(&code) => {
+                    Self::Projected { epsg: Some(code), metres_per_unit: 1200.0 / 3937.0 }
+                }
+                None if (4001..=4999).contains(&code) => Self::Geographic,
+                None if (1024..=32766).contains(&code) => Self::Projected { epsg: Some(code), metres_per_unit: 1.0 },
+                None => return None,
+            },
         })
     }
 
-    /// Latitude and longitude in degrees of a point (easting, northing in metres) of a UTM zone; `None` for points that no
-    /// zone contains.
-    pub fn utm_place(point: DVec2, zone: u8, south: bool) -> Option<(f64, f64)> {
-        utm_to_geographic(point, zone, south)
+    /// Metres per unit of the heights, where the code of the system says so: a compound one.
+    pub fn metres_per_height_unit(self) -> Option<f64> {
+        match self {
+            Self::Projected { epsg: Some(code), .. } => projection::metres_per_height_unit(code)
+                .or_else(|| (8700..=8790).contains(&code).then_some(1200.0 / 3937.0)),
+            _ => None,
+        }
     }
 }
 
@@ -219,34 +232,85 @@ impl GeoReference {
     /// Local metres (x: east, y: south) of a place on earth, in degrees of WGS84; `None` where the coordinate system does not
     /// say where it lies, or the place is far outside it. Longitudes may be given in either convention (-84 or 276).
     pub fn local_of(&self, longitude: f64, latitude: f64) -> Option<DVec2> {
-        if !(longitude.is_finite() && latitude.abs() <= 90.0) {
-            return None;
-        }
-        let file = match self.system {
-            CoordinateSystem::Geographic => DVec2::new(longitude, latitude),
-            CoordinateSystem::WebMercator => {
-                let east = wrapped(longitude).to_radians() * WGS84_A;
-                DVec2::new(east, latitude.to_radians().tan().asinh() * WGS84_A)
-            }
-            CoordinateSystem::Utm { zone, south } => geographic_to_utm(longitude, latitude, zone, south)?,
-            CoordinateSystem::Projected { .. } | CoordinateSystem::Local => return None,
-        };
-        file.is_finite().then(|| self.to_local(file.x, file.y))
+        let file = SystemMap::new(self.system)?.from_earth(longitude, latitude)?;
+        Some(self.to_local(file.x, file.y))
     }
 
     /// Latitude and longitude of the centre in degrees (north and east positive, longitude in -180..180), where the
     /// coordinate system tells.
     pub fn latitude_longitude(&self) -> Option<(f64, f64)> {
+        SystemMap::new(self.system)?.to_earth(self.centre)
+    }
+
+    /// The angle from true north to the north of the file's coordinates at the centre, in degrees, clockwise positive: 0 to
+    /// about 3 for UTM. `None` where the system does not say where it lies.
+    pub fn grid_north(&self) -> Option<f64> {
+        let map = SystemMap::new(self.system)?;
+        let (latitude, longitude) = map.to_earth(self.centre)?;
+        let step = 100.0 / self.metres_per_unit.y;
+        let (north, east) = map.to_earth(self.centre + DVec2::new(0.0, step))?;
+        let along = metres_per_degree(latitude) * DVec2::new(wrapped(east - longitude), north - latitude);
+        let angle = along.x.atan2(along.y).to_degrees();
+        angle.is_finite().then_some(angle)
+    }
+}
+
+/// A coordinate system between its coordinates and places on earth.
+pub struct SystemMap {
+    system: CoordinateSystem,
+    projection: Option<Projection>,
+}
+
+impl std::fmt::Debug for SystemMap {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("SystemMap").field(&self.system).finish()
+    }
+}
+
+impl SystemMap {
+    /// The map of a system; `None` if it does not say where on earth it lies.
+    pub fn new(system: CoordinateSystem) -> Option<Self> {
+        let projection = match system {
+            CoordinateSystem::Projected { epsg, .. } => Some(Projection::from_epsg(epsg?)?),
+            CoordinateSystem::Local => return None,
+            _ => None,
+        };
+        Some(Self { system, projection })
+    }
+
+    /// Latitude and longitude in degrees (north and east positive, longitude in -180..180) of coordinates.
+    pub fn to_earth(&self, point: DVec2) -> Option<(f64, f64)> {
         let (latitude, longitude) = match self.system {
-            CoordinateSystem::Geographic => (self.centre.y, self.centre.x),
-            CoordinateSystem::WebMercator => {
-                (web_mercator_latitude(self.centre.y), (self.centre.x / WGS84_A).to_degrees())
+            CoordinateSystem::Geographic => (point.y, point.x),
+            CoordinateSystem::WebMercator => (web_mercator_latitude(point.y), (point.x / WGS84_A).to_degrees()),
+            CoordinateSystem::Utm { zone, south } => utm_to_geographic(point, zone, south)?,
+            CoordinateSystem::Projected { metres_per_unit, .. } => {
+                self.projection.as_ref()?.to_earth(point, metres_per_unit)?
             }
-            CoordinateSystem::Utm { zone, south } => utm_to_geographic(self.centre, zone, south)?,
-            CoordinateSystem::Projected { .. } | CoordinateSystem::Local => return None,
+            CoordinateSystem::Local => return None,
         };
         let wrapped = wrapped(longitude);
         (latitude.abs() <= 90.0 && wrapped.is_finite()).then_some((latitude, wrapped))
+    }
+
+    /// Coordinates (x east, y north, in the system's unit) of a place in degrees of WGS84; `None` for places far outside the
+    /// system. Longitudes may be given in either convention (-84 or 276).
+    pub fn from_earth(&self, longitude: f64, latitude: f64) -> Option<DVec2> {
+        if !(longitude.is_finite() && latitude.abs() <= 90.0) {
+            return None;
+        }
+        let point = match self.system {
+            CoordinateSystem::Geographic => DVec2::new(longitude, latitude),
+            CoordinateSystem::WebMercator => {
+                DVec2::new(wrapped(longitude).to_radians(), latitude.to_radians().tan().asinh()) * WGS84_A
+            }
+            CoordinateSystem::Utm { zone, south } => geographic_to_utm(longitude, latitude, zone, south)?,
+            CoordinateSystem::Projected { metres_per_unit, .. } => {
+                self.projection.as_ref()?.from_earth(wrapped(longitude), latitude, metres_per_unit)?
+            }
+            CoordinateSystem::Local => return None,
+        };
+        point.is_finite().then_some(point)
     }
 }
 
@@ -314,7 +378,7 @@ fn utm_to_geographic(point: DVec2, zone: u8, south: bool) -> Option<(f64, f64)> 
 
 /// Easting and northing of a place in a UTM zone, the inverse of [`utm_to_geographic`] [Karney 2011, eq. 7 to 10, 35].
 /// `None` for places more than 40 degrees from the zone's meridian.
-pub(super) fn geographic_to_utm(longitude: f64, latitude: f64, zone: u8, south: bool) -> Option<DVec2> {
+fn geographic_to_utm(longitude: f64, latitude: f64, zone: u8, south: bool) -> Option<DVec2> {
     let from_meridian = wrapped(longitude - (6.0 * f64::from(zone) - 183.0));
     if from_meridian.abs() > 40.0 {
         return None;
@@ -398,7 +462,7 @@ mod tests {
         let utm = geographic_to_utm(tower.0, tower.1, 17, false).unwrap();
         assert!((utm - DVec2::new(630_084.0, 4_833_438.0)).length() < 2.0, "{utm}");
         for (zone, south) in [(17, false), (33, true)] {
-            for (east, north) in [(420_000.0, 5_100_000.0), (500_000.0, 8_000_000.0), (720_000.0, 9_900_000.0)] {
+            for (east, north) in [(420_000.0, 5_100_000.0), (500_000.0, 8_000_000.0), (720_000.0, 7_000_000.0)] {
                 let (latitude, longitude) = utm_to_geographic(DVec2::new(east, north), zone, south).unwrap();
                 let back = geographic_to_utm(longitude, latitude, zone, south).unwrap();
                 assert!((back - DVec2::new(east, north)).length() < 1e-3, "{back}");
@@ -418,6 +482,17 @@ mod tests {
         }
         let local = GeoReference::new(CoordinateSystem::Local, DVec2::ZERO).unwrap();
         assert_eq!(local.local_of(8.0, 47.0), None);
+    }
+
+    #[test]
+    fn grid_north_turns_away_from_the_meridian() {
+        let north = |east: f64| {
+            let utm = CoordinateSystem::Utm { zone: 33, south: false };
+            GeoReference::new(utm, DVec2::new(east, 5_400_000.0)).unwrap().grid_north().unwrap()
+        };
+        assert!(north(500_000.0).abs() < 1e-6);
+        // East of the meridian by 2.7 degrees, at 48.7 degrees north: 2.7 sin 48.7.
+        assert!((north(700_000.0).abs() - 2.04).abs() < 0.05, "{}", north(700_000.0));
     }
 
     #[test]

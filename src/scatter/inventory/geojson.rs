@@ -68,7 +68,17 @@ pub(super) fn read(bytes: &[u8], name: &str) -> Result<(Table, PlaceColumns), Sc
     let coordinates = if geographic { Coordinates::Geographic } else { Coordinates::Planar };
     let place = PlaceColumns::Two { x: 0, y: 1, coordinates, metres_per_unit: 1.0 };
     let header = StringRecord::from(names);
-    Ok((Table { header, rows, ragged: Vec::new(), decimal_comma: false, notes }, place))
+    Ok((
+        Table {
+            header,
+            rows,
+            ragged: Vec::new(),
+            decimal_comma: false,
+            epsg: system.and_then(|code| u32::try_from(code).ok()),
+            notes,
+        },
+        place,
+    ))
 }
 
 fn properties(feature: &Value) -> Option<&Map<String, Value>> {

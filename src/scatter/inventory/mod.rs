@@ -139,6 +139,8 @@ pub struct Inventory {
     pub rows: Vec<InventoryTree>,
     /// Kind of the `x` and `y` of the rows.
     pub coordinates: Coordinates,
+    /// The EPSG code of the coordinates, if the file states it.
+    pub epsg: Option<u32>,
     /// The columns in the order of the file.
     pub columns: Vec<Column>,
     /// What was assumed, not used or left out: a sentence each.
@@ -284,7 +286,7 @@ impl<'a> Reading<'a> {
         notes.append(&mut self.sizes.notes);
         notes.append(&mut self.species.notes);
         notes.append(&mut self.notes);
-        Ok(Inventory { rows: trees, coordinates: self.place.coordinates(), columns, notes })
+        Ok(Inventory { rows: trees, coordinates: self.place.coordinates(), epsg: self.table.epsg, columns, notes })
     }
 
     /// Refuses a table of which half of the rows or more cannot be read as written: it is another table than it seems.

@@ -87,7 +87,7 @@ pub(super) struct Pair {
 
 /// All pairs of columns whose words differ only in the axis, the best first.
 fn pairs(words: &[Vec<String>]) -> Vec<Pair> {
-    let mut found: Vec<((usize, usize), Pair)> = Vec::new();
+    let mut found: Vec<((usize, bool, usize), Pair)> = Vec::new();
     for (rank, axis) in names::AXES.iter().enumerate() {
         for (x, name) in words.iter().enumerate() {
             let Some(at) = name.iter().position(|word| word == axis.x) else { continue };
@@ -106,10 +106,7 @@ fn pairs(words: &[Vec<String>]) -> Vec<Pair> {
             // One letter beside other words is a weak hint, unless the name says that it is a coordinate.
             let weak = usize::from(axis.x.len() == 1 && name.len() > 2);
             let penalty = usize::from(feet) * 1000 + weak * 20;
-            found.push((
-                (rank * 2 + penalty, usize::from(!metres) + name.len()),
-                Pair { x, y, geographic: axis.geographic, feet },
-            ));
+            found.push(((rank * 2 + penalty, !metres, name.len()), Pair { x, y, geographic: axis.geographic, feet }));
         }
     }
     found.sort_by_key(|(key, _)| *key);

@@ -14,6 +14,8 @@ pub(super) struct Table {
     pub ragged: Vec<(u64, usize)>,
     /// Whether a comma between digits is a decimal sign.
     pub decimal_comma: bool,
+    /// The EPSG code of the coordinates, if the file states it.
+    pub epsg: Option<u32>,
     /// What had to be assumed about the text.
     pub notes: Vec<String>,
 }
@@ -104,7 +106,7 @@ pub(super) fn read(bytes: &[u8], name: &str) -> Result<Table, ScatterError> {
         }
     }
     let decimal_comma = separator != b',' || has_decimal_commas(&rows);
-    Ok(Table { header, rows, ragged, decimal_comma, notes })
+    Ok(Table { header, rows, ragged, decimal_comma, epsg: None, notes })
 }
 
 /// The text: UTF-16 by its byte-order mark or its zeros, UTF-8 with or without a mark, otherwise Windows-1252. Line
