@@ -2,5 +2,7 @@
 
 #[path = "plant/gltf.rs"]
 mod gltf;
+#[path = "plant/kinds.rs"]
+mod kinds;
 #[path = "plant/texture.rs"]
 mod texture;

@@ -228,7 +228,7 @@ fn inventories_state_units_and_species() -> Outcome {
     let end = FULL.find("place:").ok_or("no place")?;
     let text = format!("{}{trees},\n    {}", &FULL[..start], &FULL[end..]);
     let Trees::Inventory(inventory) = parse(&text)?.trees else { return Err("no inventory".into()) };
-    assert_eq!((inventory.dbh_unit, inventory.height_unit), (LengthUnit::Millimetres, LengthUnit::Metres));
+    assert_eq!((inventory.dbh_unit, inventory.height_unit), (Some(LengthUnit::Millimetres), None));
     assert_eq!(inventory.path, FilePath::new("folder/stand.csv"));
     assert_eq!(inventory.species.get("Pinus").map(String::as_str), Some("pine"));
 

@@ -28,10 +28,7 @@ const AFTER: usize = 24;
 /// Times the frames around the appearance of a forest.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let name = |path: &PathBuf| path.file_stem().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let species = |path: &PathBuf| {
-        let plants = GltfPlants { files: vec![path.clone()], foliage: Vec::new(), wood: Vec::new() };
-        Species::new(name(path), plants)
-    };
+    let species = |path: &PathBuf| Species::new(name(path), GltfPlants::new([path]));
     let scene = Scene {
         species: arguments.appear.iter().map(species).collect(),
         trees: ScatteredTrees { stems_per_hectare: arguments.stems, ..ScatteredTrees::default() }.into(),

@@ -104,7 +104,8 @@ pub enum AppError {
     },
     /// A file of unknown kind.
     #[error(
-        "{}: this is not a plant (.glb, .gltf), terrain (.tif, .asc, .hgt, .png), inventory (.csv) or scene (.ron) file",
+        "{}: this is not a plant (.glb, .gltf), terrain (.tif, .asc, .hgt, .png), inventory (.csv, .tsv, .geojson, .json) or \
+         scene (.ron) file",
         path.display()
     )]
     UnknownKind {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::background::BackgroundError;
+use crate::scene::Anchor;
 
 /// Why a scene cannot be built or shown.
 #[derive(Debug, thiserror::Error)]
@@ -46,20 +47,22 @@ pub enum StageError {
     },
     /// An inventory whose coordinates cannot be related to the terrain.
     #[error(
-        "{}: the terrain does not have the coordinate system of these positions; use a terrain file with the \
-         same system, or metres and `anchor: StandCentre`",
+        "{}: {problem}; use a terrain file with the same system, state the system of the terrain or the `place` of a \
+         terrain without one, or put the stand on the terrain's centre with `anchor: StandCentre`",
         path.display()
     )]
     NoReference {
         /// The inventory.
         path: PathBuf,
+        /// Why its positions cannot be related to the terrain.
+        problem: &'static str,
     },
     /// An inventory without any tree on the terrain.
     #[error(
         "{}: none of its {count} trees stands on the terrain: they are at {:.0} to {:.0} m east and {:.0} to {:.0} m \
-         north of the terrain's centre, and the terrain is {:.0} m x {:.0} m; correct the inventory's `anchor` or its \
-         coordinates (see `canopy info`), or take the terrain of this place",
-        path.display(), east.0, east.1, north.0, north.1, terrain[0], terrain[1]
+         north of the terrain's centre, and the terrain is {:.0} m x {:.0} m{}; {}, or correct the inventory's coordinates (see \
+         `canopy info`), or take the terrain of this place",
+        path.display(), east.0, east.1, north.0, north.1, terrain[0], terrain[1], covers.as_deref().unwrap_or(""), anchors(fits)
     )]
     InventoryOutside {
         /// The inventory.
@@ -72,6 +75,10 @@ pub enum StageError {
         north: (f64, f64),
         /// Size of the terrain from west to east and from north to south, metres.
         terrain: [f64; 2],
+        /// Both extents in the coordinates of their files, where these are of one kind.
+        covers: Option<String>,
+        /// Anchors with which the trees would stand on the terrain.
+        fits: Vec<Anchor>,
     },
     /// Too many plants for one forest.
     #[error(
@@ -111,6 +118,17 @@ pub enum StageError {
     /// A scene that could not be built in the background.
     #[error("the scene could not be built: {0}")]
     Background(String),
+}
+
+/// Which anchors would fit, for messages.
+pub(super) fn anchors(fits: &[Anchor]) -> String {
+    match fits {
+        [] => "no other `anchor` would put them there: correct the inventory's `anchor`".to_owned(),
+        fits => {
+            let names: Vec<String> = fits.iter().map(|anchor| format!("`anchor: {anchor:?}`")).collect();
+            format!("they would stand on it with {}", names.join(" or "))
+        }
+    }
 }
 
 impl From<BackgroundError> for StageError {

@@ -15,6 +15,7 @@
 pub(crate) mod background;
 mod error;
 pub(crate) mod ground;
+mod inventory_place;
 pub(crate) mod load_error;
 mod plant;
 pub(crate) mod plants;

@@ -146,6 +146,9 @@ fn sources(species: &Species, gloss: Gloss) -> Result<Vec<IndividualSource>, Sta
                 height: Some(species.mean_height() as f32),
                 foliage_materials: files.foliage.clone(),
                 wood_materials: files.wood.clone(),
+                up: files.up,
+                node: files.node.clone(),
+                ignore: files.ignore.clone(),
                 leaf: species.leaf.unwrap_or_default(),
                 gloss: Some(gloss),
                 ..GltfOptions::default()

@@ -5,18 +5,22 @@
 
 use std::ops::Range;
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
-use super::{StageError, plants::PlantPlan};
+use super::{
+    StageError,
+    error::anchors,
+    inventory_place::{self, Placement, read_and_place},
+    plants::PlantPlan,
+};
 use crate::{
     progress::Progress,
     scatter::{
-        Allometry, Area, Coordinates, Ground, Inventory, InventoryOptions, InventorySpecies, PlacementRules, PlantSize,
-        SizeRule, SpeciesRule, Stand, place_surroundings, place_trees, read_inventory, rules::MAX_TREES,
-        stand_from_inventory,
+        Allometry, Area, Ground, Inventory, InventorySpecies, PlacementRules, PlantSize, SizeRule, SpeciesRule, Stand,
+        place_surroundings, place_trees, rules::MAX_TREES, stand_from_inventory,
     },
-    scene::{Anchor, InventoryTrees, ScatteredTrees, Scene, Species, Trees},
-    terrain::{CoordinateSystem, GeoReference, Terrain},
+    scene::{InventoryTrees, ScatteredTrees, Scene, Species, Trees},
+    terrain::Terrain,
 };
 
 /// Trees stand on the terrain's own samples only, not on its mirrored surroundings.
@@ -65,7 +69,7 @@ pub enum WoodBeyond {
 enum Source<'a> {
     None,
     Rules(&'a ScatteredTrees),
-    Inventory(&'a InventoryTrees, Inventory),
+    Inventory(&'a InventoryTrees, Inventory, Placement),
 }
 
 impl<'a> StandPlan<'a> {
@@ -79,10 +83,9 @@ impl<'a> StandPlan<'a> {
             Trees::None => (Source::None, 0.0),
             Trees::Scattered(rules) => (Source::Rules(rules), estimate(scene, rules, terrain)?),
             Trees::Inventory(trees) => {
-                let options = InventoryOptions { dbh_unit: trees.dbh_unit, height_unit: trees.height_unit };
-                let inventory = read_inventory(&trees.path, options)?;
-                let count = count_inside(trees, &inventory, terrain)? as f64;
-                (Source::Inventory(trees, inventory), count)
+                let (inventory, placement) = read_and_place(scene, trees, terrain)?;
+                let count = count_inside(scene, trees, &inventory, &placement, terrain)? as f64;
+                (Source::Inventory(trees, inventory, placement), count)
             }
         };
         let surroundings = match &source {
@@ -90,6 +93,14 @@ impl<'a> StandPlan<'a> {
             Source::None | Source::Inventory(..) => 0.0,
         };
         Ok(Self { scene, terrain, source, count, surroundings })
+    }
+
+    /// The inventory that was read, if the scene has one.
+    pub fn inventory(&self) -> Option<&Inventory> {
+        match &self.source {
+            Source::Inventory(_, inventory, _) => Some(inventory),
+            Source::None | Source::Rules(_) => None,
+        }
     }
 
     /// Refuses a scene that asks for more than `most` trees; `None` is no limit.
@@ -138,8 +149,8 @@ impl<'a> StandPlan<'a> {
         match &self.source {
             Source::None => Ok(Stand::default()),
             Source::Rules(rules) => scatter(self.scene, rules, plan, sizes, self.terrain, self.surroundings, progress),
-            Source::Inventory(trees, inventory) => {
-                from_inventory(self.scene, (trees, inventory), plan, sizes, self.terrain, progress)
+            Source::Inventory(trees, inventory, placement) => {
+                from_inventory(self.scene, (trees, inventory, placement), plan, sizes, self.terrain, progress)
             }
         }
     }
@@ -161,25 +172,24 @@ fn estimate(scene: &Scene, trees: &ScatteredTrees, terrain: &Terrain) -> Result<
 }
 
 /// The number of an inventory's trees that stand on `terrain`.
-fn count_inside(trees: &InventoryTrees, inventory: &Inventory, terrain: &Terrain) -> Result<usize, StageError> {
-    let to_local = placement(trees, inventory, terrain)?;
-    let (mut low, mut high, mut count) = (DVec2::INFINITY, DVec2::NEG_INFINITY, 0);
-    for row in &inventory.rows {
-        let place = to_local(row.x, row.y);
-        let place = DVec2::new(place.x, place.z);
-        if place.is_finite() {
-            (low, high) = (low.min(place), high.max(place));
-            count += usize::from(terrain.contains(place.x, place.y));
-        }
-    }
+fn count_inside(
+    scene: &Scene,
+    trees: &InventoryTrees,
+    inventory: &Inventory,
+    placement: &Placement,
+    terrain: &Terrain,
+) -> Result<usize, StageError> {
+    let (area, count) = placement.extent(inventory, terrain);
     if count == 0 && !inventory.rows.is_empty() {
-        let [west, south, east, north] = Area { min: low, max: high }.sides();
+        let [west, south, east, north] = area.sides();
         return Err(StageError::InventoryOutside {
             path: trees.path.clone(),
             count: inventory.rows.len(),
             east: (west, east),
             north: (south, north),
             terrain: terrain.extent().to_array(),
+            covers: inventory_place::file_extents(inventory, terrain),
+            fits: inventory_place::fitting_anchors(scene, trees, inventory, terrain),
         });
     }
     Ok(count)
@@ -295,49 +305,41 @@ fn rules(
 
 fn from_inventory(
     scene: &Scene,
-    (trees, inventory): (&InventoryTrees, &Inventory),
+    (trees, inventory, placement): (&InventoryTrees, &Inventory, &Placement),
     plan: &PlantPlan,
     sizes: &[PlantSize],
     terrain: &Terrain,
     progress: &mut dyn Progress,
 ) -> Result<Stand, StageError> {
     let table = species_table(scene, trees, plan, sizes);
-    let to_local = placement(trees, inventory, terrain)?;
+    let to_local = |x: f64, y: f64| placement.local(terrain, x, y);
     let result = stand_from_inventory(&inventory.rows, to_local, terrain, &table, scene.seed)?;
+    let warn = |line: &str, progress: &mut dyn Progress| progress.warn(&format!("{}: {line}", trees.path.display()));
+    for note in inventory.notes.iter().chain(&placement.note) {
+        warn(note, progress);
+    }
     for line in result.warnings.to_string().lines() {
-        progress.warn(&format!("{}: {line}", trees.path.display()));
+        warn(line, progress);
+    }
+    let outside = result.warnings.outside.len();
+    if 2 * outside >= inventory.rows.len().max(1) {
+        let (area, _) = placement.extent(inventory, terrain);
+        let [west, south, east, north] = area.sides();
+        let size = terrain.extent();
+        let fits = inventory_place::fitting_anchors(scene, trees, inventory, terrain);
+        warn(
+            &format!(
+                "the trees are at {west:.0} to {east:.0} m east and {south:.0} to {north:.0} m north of the terrain's \
+                 centre, and the terrain is {:.0} m x {:.0} m{}; {}",
+                size.x,
+                size.y,
+                inventory_place::file_extents(inventory, terrain).unwrap_or_default(),
+                anchors(&fits)
+            ),
+            progress,
+        );
     }
     Ok(result.stand)
-}
-
-/// Converts the coordinates of an inventory to positions on the terrain.
-fn placement<'a>(
-    trees: &InventoryTrees,
-    inventory: &Inventory,
-    terrain: &'a Terrain,
-) -> Result<Box<dyn Fn(f64, f64) -> DVec3 + 'a>, StageError> {
-    let on_ground = |place: DVec2| DVec3::new(place.x, 0.0, place.y);
-    let reference = terrain.reference();
-    let unknown = || StageError::NoReference { path: trees.path.clone() };
-    let geographic = |reference: &GeoReference| reference.system() == CoordinateSystem::Geographic;
-    if inventory.coordinates == Coordinates::Geographic {
-        let reference = reference.filter(|reference| geographic(reference)).ok_or_else(unknown)?;
-        return Ok(Box::new(move |x, y| on_ground(reference.to_local(x, y))));
-    }
-    if trees.anchor == Anchor::Terrain {
-        let reference = reference.filter(|reference| !geographic(reference)).ok_or_else(unknown)?;
-        return Ok(Box::new(move |x, y| on_ground(reference.to_local(x, y))));
-    }
-    let all = |start: f64, fold: fn(f64, f64) -> f64| {
-        DVec2::new(
-            inventory.rows.iter().map(|row| row.x).fold(start, fold),
-            inventory.rows.iter().map(|row| row.y).fold(start, fold),
-        )
-    };
-    let span = (all(f64::INFINITY, f64::min), all(f64::NEG_INFINITY, f64::max));
-    let origin = trees.anchor.origin(span, terrain.extent()).ok_or_else(unknown)?;
-    // The file's y points north, the scene's z south.
-    Ok(Box::new(move |x, y| on_ground(DVec2::new(x - origin.x, origin.y - y))))
 }
 
 /// The default species first: the table's first takes trees of unknown species.

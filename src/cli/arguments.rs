@@ -62,6 +62,9 @@ pub struct Common {
     /// else it follows the light at the camera].
     #[arg(long, global = true, value_name = "EV", value_parser = parse_exposure, allow_hyphen_values = true)]
     pub exposure: Option<f64>,
+    /// Refuse an inventory with rows that cannot be used, instead of leaving them out with a warning.
+    #[arg(long, global = true)]
+    pub strict: bool,
     /// Print which passes ran, which were skipped, and why.
     #[arg(long, global = true)]
     pub explain: bool,

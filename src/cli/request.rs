@@ -15,7 +15,13 @@ use super::arguments::{Arguments, Bake, CameraArguments, Common, Fly, LightChoic
 const DEMO: &str = "scenes/demo.ron";
 
 fn overrides(common: &Common) -> Overrides {
-    Overrides { seed: common.seed, msaa: common.msaa, exposure: common.exposure, lighting: common.lighting.clone() }
+    Overrides {
+        seed: common.seed,
+        msaa: common.msaa,
+        exposure: common.exposure,
+        strict: common.strict,
+        lighting: common.lighting.clone(),
+    }
 }
 
 /// The options of a flight.

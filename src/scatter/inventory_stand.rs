@@ -16,6 +16,8 @@ const SAME_PLACE_M: f64 = 0.01;
 
 /// Lines that a message of the warnings lists.
 const LISTED: usize = 5;
+/// Names of species that a message of the warnings lists.
+const NAMES_LISTED: usize = 12;
 
 /// The plants and sizes of a species of an inventory.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,10 +65,14 @@ impl InventorySpecies {
 pub struct InventoryWarnings {
     /// Lines of trees outside the ground; they are left out.
     pub outside: Vec<u64>,
-    /// Lines of trees within 1 cm of an earlier one, with that one's line; they are left out.
+    /// Lines of trees within 1 cm of an earlier one, with that one's line; they are left out. The thickest of them gives
+    /// the size of the tree: they are stems of one.
     pub duplicates: Vec<(u64, u64)>,
     /// Species that the table lacks, with the number of their trees; drawn as the table's first.
     pub unknown_species: BTreeMap<String, usize>,
+    /// Species that the table has under a shorter name (without cultivar, without epithet), with that name and the number
+    /// of their trees.
+    pub shortened_species: BTreeMap<String, (String, usize)>,
     /// Lines of trees so much smaller or larger than their plant that they are drawn at the limit of the scale.
     pub rescaled: Vec<u64>,
 }
@@ -77,6 +83,7 @@ impl InventoryWarnings {
         self.outside.is_empty()
             && self.duplicates.is_empty()
             && self.unknown_species.is_empty()
+            && self.shortened_species.is_empty()
             && self.rescaled.is_empty()
     }
 }
@@ -95,13 +102,18 @@ impl fmt::Display for InventoryWarnings {
             let (count, first) = (self.duplicates.len(), lines(&mut self.duplicates.iter().map(|pair| pair.0)));
             writeln!(
                 f,
-                "{count} tree(s) at the position of an earlier one are left out; the first in line(s) {first}"
+                "{count} tree(s) at the position of an earlier one are left out, the thickest stem counts; the first in \
+                 line(s) {first}"
             )?;
         }
         if !self.unknown_species.is_empty() {
-            let names: Vec<String> =
-                self.unknown_species.iter().map(|(name, count)| format!("{name} ({count})")).collect();
-            writeln!(f, "species without an entry are drawn as the first one: {}", names.join(", "))?;
+            let names = most_frequent(self.unknown_species.iter().map(|(name, count)| (name.clone(), *count)));
+            writeln!(f, "species without an entry are drawn as the first one: {names}")?;
+        }
+        if !self.shortened_species.is_empty() {
+            let names = self.shortened_species.iter();
+            let names = most_frequent(names.map(|(name, (short, count))| (format!("{name} as {short}"), *count)));
+            writeln!(f, "species are drawn by the entry of a shorter name: {names}")?;
         }
         if !self.rescaled.is_empty() {
             let (count, first) = (self.rescaled.len(), lines(&mut self.rescaled.iter().copied()));
@@ -113,6 +125,21 @@ impl fmt::Display for InventoryWarnings {
         }
         Ok(())
     }
+}
+
+/// Names with their counts for a message: all of a few, the most frequent of many.
+fn most_frequent(names: impl Iterator<Item = (String, usize)>) -> String {
+    let mut names: Vec<(String, usize)> = names.collect();
+    let more = names.len().saturating_sub(NAMES_LISTED);
+    if more > 0 {
+        names.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+        names.truncate(NAMES_LISTED);
+    }
+    let mut text = names.iter().map(|(name, count)| format!("{name} ({count})")).collect::<Vec<_>>().join(", ");
+    if more > 0 {
+        text.push_str(&format!(" and {more} more"));
+    }
+    text
 }
 
 /// A stand from an inventory, and what to tell the user.
@@ -127,8 +154,8 @@ pub struct InventoryStand {
 /// Puts the trees of an inventory on `ground`.
 ///
 /// `to_local` maps x and y of the file to scene-local metres (X and Z of the result count). `species` is the table of
-/// what is drawn; its first entry serves trees without a species or of one that is not in the table. The height is the
-/// row's, else from its dbh by the species' [`Allometry`], else the species' default; the tree's scale is that height
+/// what is drawn; a name that it lacks is looked up without cultivar, then without epithet; its first entry serves trees
+/// without a species or of one that is not in the table. Of rows at one place the thickest counts. The height is the row's, else from its dbh by the species' [`Allometry`], else the species' default; the tree's scale is that height
 /// over its plant's. Yaw, tint and the variant come from `seed` and the row's index.
 ///
 /// # Errors
@@ -150,6 +177,7 @@ pub fn stand_from_inventory<G: Ground + ?Sized>(
         species.iter().rev().map(|entry| (key(&entry.name), entry)).collect();
     let mut result = InventoryStand::default();
     let mut taken = Places::default();
+    let thickest = thickest_stems(rows, &to_local);
     for (row, index) in rows.iter().zip(0u32..) {
         let point = to_local(row.x, row.y);
         let known = point.x.is_finite() && point.z.is_finite() && ground.contains(point.x, point.z);
@@ -164,16 +192,25 @@ pub fn stand_from_inventory<G: Ground + ?Sized>(
         }
         let entry = match &row.species {
             None => default,
-            Some(name) => table.get(&key(name)).copied().unwrap_or_else(|| {
-                *result.warnings.unknown_species.entry(name.trim().to_owned()).or_default() += 1;
-                default
-            }),
+            Some(name) => match lookup(&table, name) {
+                Some((entry, None)) => entry,
+                Some((entry, Some(short))) => {
+                    let found = result.warnings.shortened_species.entry(name.trim().to_owned());
+                    found.or_insert((short, 0)).1 += 1;
+                    entry
+                }
+                None => {
+                    *result.warnings.unknown_species.entry(name.trim().to_owned()).or_default() += 1;
+                    default
+                }
+            },
         };
         let n = u64::from(index);
         let variant = hash::below(seed, n, Stream::Variant, entry.variants.len() as u32) as u16;
-        let tree_height = row
+        let stem = thickest.get(&row.line).and_then(|at| rows.get(*at)).unwrap_or(row);
+        let tree_height = stem
             .height_m
-            .or_else(|| entry.allometry.height_m(row.dbh_m?))
+            .or_else(|| entry.allometry.height_m(stem.dbh_m?))
             .map_or(entry.default_height_m, |metres| metres as f32);
         let plant_height = entry.plant_heights_m.get(usize::from(variant)).copied().unwrap_or(entry.default_height_m);
         let wanted = tree_height / plant_height;
@@ -195,8 +232,65 @@ pub fn stand_from_inventory<G: Ground + ?Sized>(
     Ok(result)
 }
 
+/// Rows of several stems at one place: for the line of the first row of a place the index of the row with the thickest
+/// stem, where that is another one.
+fn thickest_stems(rows: &[InventoryTree], to_local: &impl Fn(f64, f64) -> DVec3) -> HashMap<u64, usize> {
+    let mut places = Places::default();
+    let mut thickest: HashMap<u64, usize> = HashMap::new();
+    let mut first_row: HashMap<u64, usize> = HashMap::new();
+    let size = |row: &InventoryTree| (row.dbh_m.unwrap_or(0.0), row.height_m.unwrap_or(0.0));
+    for (at, row) in rows.iter().enumerate() {
+        let point = to_local(row.x, row.y);
+        if !(point.x.is_finite() && point.z.is_finite()) {
+            continue;
+        }
+        match places.earlier(point.x, point.z, row.line) {
+            None => {
+                first_row.insert(row.line, at);
+            }
+            Some(first) => {
+                let best = thickest.get(&first).or(first_row.get(&first)).and_then(|best| rows.get(*best));
+                if best.is_some_and(|best| size(row) > size(best)) {
+                    thickest.insert(first, at);
+                }
+            }
+        }
+    }
+    thickest
+}
+
+/// The name in lower case, with single blanks, and the sign of a hybrid as the letter x.
 fn key(name: &str) -> String {
-    name.trim().to_lowercase()
+    let plain = name.to_lowercase().replace('×', " x ");
+    plain.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// The entry of a species: of its name, of the name without what follows it (cultivar, author, common name), of its first
+/// two words, of its genus; with the shorter name that was found.
+fn lookup<'a>(
+    table: &HashMap<String, &'a InventorySpecies>,
+    name: &str,
+) -> Option<(&'a InventorySpecies, Option<String>)> {
+    let whole = key(name);
+    if let Some(entry) = table.get(&whole) {
+        return Some((*entry, None));
+    }
+    let end = whole.find(['(', '\'', '‘', '’', '"', '„', '“', ',', ';', ':', '/', '[', '\u{b4}', '`']);
+    let bare = whole.get(..end.unwrap_or(whole.len())).unwrap_or(&whole).trim();
+    let bare = bare.split(" - ").next().unwrap_or(bare).trim();
+    let words: Vec<&str> = bare.split(' ').collect();
+    let hybrid = words.get(1) == Some(&"x");
+    let two = words.iter().take(if hybrid { 3 } else { 2 }).copied().collect::<Vec<_>>().join(" ");
+    let genus = words.first().copied().unwrap_or("");
+    let shorter = [
+        bare.to_owned(),
+        two,
+        genus.to_owned(),
+        format!("{genus} sp."),
+        format!("{genus} spp."),
+        format!("{genus} sp"),
+    ];
+    shorter.into_iter().find_map(|short| Some((*table.get(&short)?, Some(short))))
 }
 
 /// Positions of earlier trees, in squares of the distance below which two are the same.

@@ -4,7 +4,7 @@
 //! sequence (Halton, Hammersley, random) ─┐
 //! rules (density, slope, height, ...)  ──┼─ place_trees() ────┐
 //! ground (anything that is a Ground)   ──┤                    ├─ Stand ─┬─ PackedStand (GPU: trees by cell)
-//! inventory (CSV) ───────────────────────┴─ stand_from_inventory()       └─ cover_map() (shade of the far floor)
+//! inventory (CSV, GeoJSON) ──────────────┴─ stand_from_inventory()       └─ cover_map() (shade of the far floor)
 //! ```
 //!
 //! Franzke 2005 (section 4.4, figure 4.17) scatters its plants by the Halton and Hammersley points of
@@ -33,7 +33,7 @@ pub use allometry::Allometry;
 pub use cover::{CoverMap, bounded_cover_map, cover_map};
 pub use error::{BadValue, ScatterError};
 pub use inventory::{
-    Coordinates, Inventory, InventoryOptions, InventoryTree, LengthUnit, parse_inventory, read_inventory,
+    Column, Coordinates, Inventory, InventoryOptions, InventoryTree, LengthUnit, parse_inventory, read_inventory,
 };
 pub use inventory_stand::{InventorySpecies, InventoryStand, InventoryWarnings, stand_from_inventory};
 pub use packed::{Cell, CellGrid, PackedStand, PackedTree, PlantSize};

@@ -1,6 +1,6 @@
 //! Values of a request that replace those of a scene file.
 
-use super::{Lighting, Scene};
+use super::{Lighting, Scene, Trees};
 
 /// Values that replace a scene's own. The default replaces nothing.
 #[derive(Clone, Debug, Default, PartialEq, bevy::reflect::Reflect)]
@@ -11,6 +11,8 @@ pub struct Overrides {
     pub msaa: Option<u32>,
     /// Exposure value at ISO 100 to keep, -10 to 25.
     pub exposure: Option<f64>,
+    /// Refuses inventories with rows that cannot be used, where the scene would leave them out.
+    pub strict: bool,
     /// The lighting of all species. A species that already has this kind of lighting keeps its own values, except for
     /// how the sun lights it.
     #[reflect(ignore)]
@@ -29,6 +31,9 @@ impl Overrides {
         scene.seed = self.seed.unwrap_or(scene.seed);
         scene.quality.msaa = self.msaa.unwrap_or(scene.quality.msaa);
         scene.camera.exposure = self.exposure.or(scene.camera.exposure);
+        if let Trees::Inventory(inventory) = &mut scene.trees {
+            inventory.strict |= self.strict;
+        }
         let Some(lighting) = &self.lighting else { return };
         for species in &mut scene.species {
             let kind = |lighting: &Lighting| std::mem::discriminant(lighting);

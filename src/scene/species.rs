@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::check::Check;
 use super::lighting::Lighting;
-use crate::plant::{Gloss, LeafKind};
+use crate::plant::{Gloss, LeafKind, gltf::UpAxis};
 
 /// One species.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -98,6 +98,17 @@ pub struct GltfPlants {
     /// Names of materials that are wood, whatever their alpha mode says. Default: none named.
     #[serde(default)]
     pub wood: Vec<String>,
+    /// The axis of the files that points up, `Y` or `Z`. Default: y, as glTF demands, unless a tree clearly stands along z;
+    /// that is told.
+    #[serde(default)]
+    pub up: Option<UpAxis>,
+    /// Names of the nodes or meshes of the files that are the plant. Default: all but coarser levels of detail, collision hulls
+    /// and ground planes.
+    #[serde(default)]
+    pub node: Vec<String>,
+    /// Names of nodes, meshes or materials of the files that are left out. Default: none named.
+    #[serde(default)]
+    pub ignore: Vec<String>,
 }
 
 fn one() -> f64 {
@@ -130,7 +141,14 @@ impl From<GltfPlants> for PlantSource {
 impl GltfPlants {
     /// One individual per glTF or GLB file; what is foliage follows from the materials' alpha modes.
     pub fn new(files: impl IntoIterator<Item = impl Into<PathBuf>>) -> Self {
-        Self { files: files.into_iter().map(Into::into).collect(), foliage: Vec::new(), wood: Vec::new() }
+        Self {
+            files: files.into_iter().map(Into::into).collect(),
+            foliage: Vec::new(),
+            wood: Vec::new(),
+            up: None,
+            node: Vec::new(),
+            ignore: Vec::new(),
+        }
     }
 }
 

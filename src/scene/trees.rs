@@ -10,6 +10,7 @@ use super::check::Check;
 use super::error::nearest;
 use super::species::{ELEVATIONS, Species};
 use crate::scatter::{Area, ClearingNoise, LengthUnit, Sequence};
+use crate::terrain::CoordinateSystem;
 
 /// Where the trees stand. In a scene file: `trees: Scattered(...)`, `Inventory(...)` or `None`.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
@@ -19,7 +20,7 @@ pub enum Trees {
     None,
     /// Placed by rule.
     Scattered(ScatteredTrees),
-    /// Read from a CSV file.
+    /// Read from a table of text or GeoJSON.
     Inventory(InventoryTrees),
 }
 
@@ -69,24 +70,35 @@ impl Default for ScatteredTrees {
     }
 }
 
-/// Trees from a CSV file with a header line. Columns are found by name: `x` and `y` in metres (required), `dbh`,
-/// `height` and `species`; a unit in a column's name (`dbh_cm`, `height_m`) overrides the one stated here.
+/// Trees from a table of text (CSV) with a header line, or from GeoJSON. Columns are found by name in the words of the large
+/// public tables ([`scatter::inventory`](crate::scatter::inventory)): `x` and `y` in metres or `lon` and `lat` (required),
+/// `dbh` or a girth, `height`, `species`; a unit in a column's name or a cell (`dbh_cm`, `12 m`) overrides the one stated
+/// here.
 #[derive(Clone, Debug, PartialEq, Deserialize, bevy::reflect::Reflect)]
 #[serde(deny_unknown_fields)]
 pub struct InventoryTrees {
     /// The file, relative to the scene file. Required.
     pub path: PathBuf,
-    /// Unit of `dbh` (trunk diameter at breast height) where the column does not say: `Metres`, `Centimetres` or
-    /// `Millimetres`. Default `Centimetres`.
-    #[serde(default = "centimetres")]
-    pub dbh_unit: LengthUnit,
-    /// Unit of `height` where the column does not say. Default `Metres`.
+    /// Unit of `dbh` (trunk diameter at breast height) where neither the column nor its cells say: `Metres`,
+    /// `Centimetres`, `Millimetres`, `Inches`. Default: guessed from the values with a warning, mostly `Centimetres`.
     #[serde(default)]
-    pub height_unit: LengthUnit,
-    /// What the coordinates are measured from; x grows eastward, y northward. Default
-    /// `TerrainCentre`.
+    pub dbh_unit: Option<LengthUnit>,
+    /// Unit of `height` where neither the column nor its cells say: the same, or `Feet`. Default: guessed from the values
+    /// with a warning, mostly `Metres`.
+    #[serde(default)]
+    pub height_unit: Option<LengthUnit>,
+    /// Refuses a table with any row or size that cannot be used, instead of leaving it out with a warning. Default false.
+    #[serde(default)]
+    pub strict: bool,
+    /// What the coordinates are measured from; x grows eastward, y northward. Degrees of longitude and latitude need no
+    /// anchor but `StandCentre`, where they are to be put elsewhere. Default `TerrainCentre`.
     #[serde(default)]
     pub anchor: Anchor,
+    /// The coordinate system of the positions, as of a terrain: `Utm(zone: 33)`, `Epsg(25833)`; they are brought to that of
+    /// the terrain file. Default: that of the terrain (for degrees: WGS84).
+    #[serde(default)]
+    #[reflect(ignore)]
+    pub coordinates: Option<CoordinateSystem>,
     /// Height in metres of trees that have neither height nor diameter, 0.1 to 150. Default: the mean of their
     /// species' range.
     #[serde(default)]
@@ -119,6 +131,9 @@ pub enum Anchor {
 }
 
 impl Anchor {
+    /// All anchors.
+    pub const ALL: [Self; 4] = [Self::TerrainCentre, Self::SouthWest, Self::StandCentre, Self::Terrain];
+
     /// The inventory coordinates (east, north, in metres) of the terrain's centre: a tree at `(x, y)` stands
     /// `x - origin.x` east and `y - origin.y` north of it.
     ///
@@ -134,18 +149,16 @@ impl Anchor {
     }
 }
 
-fn centimetres() -> LengthUnit {
-    LengthUnit::Centimetres
-}
-
 impl InventoryTrees {
-    /// The trees of the CSV file `path`, with the defaults of a scene file.
+    /// The trees of the file `path`, with the defaults of a scene file.
     pub fn new(path: impl Into<PathBuf>) -> Self {
         Self {
             path: path.into(),
-            dbh_unit: centimetres(),
-            height_unit: LengthUnit::default(),
+            dbh_unit: None,
+            height_unit: None,
+            strict: false,
             anchor: Anchor::default(),
+            coordinates: None,
             default_height: None,
             species: BTreeMap::new(),
             default_species: None,

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use super::{CoordinateSystem, SystemMap};
+
 /// Why a terrain could not be made. Every message says what is wrong, where, and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum TerrainError {
@@ -16,7 +18,7 @@ pub enum TerrainError {
     },
     /// The file's content has no known format.
     #[error(
-        "{path}: not a known height format; readable are GeoTIFF, ESRI ASCII grid, SRTM .hgt (1201x1201 or 3601x3601) \
+        "{path}: not a known height format; readable are GeoTIFF, ESRI ASCII grid, SRTM .hgt (1201x1201, 3601x3601 or 7201x7201) \
          and 16-bit greyscale PNG; convert with `gdal_translate -of GTiff IN OUT.tif`", path = .path.display()
     )]
     UnknownFormat {
@@ -161,6 +163,52 @@ pub enum Warning {
         /// Samples concerned.
         count: usize,
     },
+    /// Samples of a number that marks missing data elsewhere were taken as holes, although the file does not mark them.
+    AssumedMissing {
+        /// The number, in the file's own unit.
+        value: f64,
+        /// Samples concerned.
+        count: usize,
+        /// Lowest of the other samples.
+        low: f64,
+        /// Highest of the other samples.
+        high: f64,
+    },
+    /// Samples of a number that may mark missing data were read as heights.
+    DoubtfulHeights {
+        /// The number, in the file's own unit.
+        value: f64,
+        /// Samples concerned.
+        count: usize,
+        /// Lowest of the other samples.
+        low: f64,
+        /// Highest of the other samples.
+        high: f64,
+    },
+    /// The file says what its numbers mean, and they were converted: height in metres = `factor` * sample + `offset`.
+    HeightsConverted {
+        /// Metres per unit of a sample.
+        factor: f64,
+        /// Metres of a sample of 0.
+        offset: f64,
+        /// The unit that the file states, if any.
+        unit: Option<String>,
+    },
+    /// The file states a unit of heights that is not known; metres were assumed.
+    UnknownHeightUnit {
+        /// The unit as the file writes it.
+        unit: String,
+    },
+    /// Samples that a mask or an alpha band of the file hides were taken as holes.
+    Masked {
+        /// Samples concerned.
+        count: usize,
+    },
+    /// A mask of the file could not be read; all samples count.
+    MaskUnread {
+        /// Why.
+        problem: String,
+    },
     /// The file names no coordinate system; its coordinates were taken as degrees or as local metres.
     AssumedCoordinates {
         /// True: degrees of longitude and latitude. False: local metres.
@@ -176,6 +224,18 @@ pub enum Warning {
     AssumedMetres,
 }
 
+impl Warning {
+    /// The warning that a projected system does not tell where it lies, if it does not.
+    pub(super) fn place_unknown(system: CoordinateSystem) -> Option<Self> {
+        match system {
+            CoordinateSystem::Projected { epsg, .. } if SystemMap::new(system).is_none() => {
+                Some(Self::PlaceUnknown { epsg })
+            }
+            _ => None,
+        }
+    }
+}
+
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -188,6 +248,32 @@ impl fmt::Display for Warning {
                 f,
                 "{count} samples lie outside -12000 m to 30000 m and were taken as missing; set the file's no-data value"
             ),
+            Warning::AssumedMissing { value, count, low, high } => write!(
+                f,
+                "{count} samples of exactly {value} can be no heights beside the others ({low} to {high}) and were taken as \
+                 missing; set the file's no-data value (`gdal_edit.py -a_nodata {value} FILE`)"
+            ),
+            Warning::DoubtfulHeights { value, count, low, high } => write!(
+                f,
+                "{count} samples of exactly {value} stand apart from the others ({low} to {high}); they were read as heights: \
+                 if they are missing data, set the file's no-data value (`gdal_edit.py -a_nodata {value} FILE`)"
+            ),
+            Warning::HeightsConverted { factor, offset, unit } => {
+                let unit = unit.as_ref().map_or(String::new(), |unit| format!(" (unit {unit})"));
+                write!(f, "as the file states{unit}, heights in metres are {factor} x sample")?;
+                if *offset != 0.0 { write!(f, " + {offset}") } else { Ok(()) }
+            }
+            Warning::UnknownHeightUnit { unit } => write!(
+                f,
+                "the file states heights in `{unit}`, which is not known here; metres were assumed: convert them, or correct it \
+                 by the scene's `exaggeration`"
+            ),
+            Warning::Masked { count } => {
+                write!(f, "{count} samples are hidden by the file's mask or alpha band and were taken as missing")
+            }
+            Warning::MaskUnread { problem } => {
+                write!(f, "the file's mask cannot be read ({problem}); all of its samples are taken as heights")
+            }
             Warning::AssumedCoordinates { degrees: true } => {
                 write!(f, "the file names no coordinate system; its coordinates look like degrees and were taken so")
             }
@@ -196,7 +282,7 @@ impl fmt::Display for Warning {
             }
             Warning::PlaceUnknown { epsg: Some(code) } => write!(
                 f,
-                "EPSG:{code} is read as plain metres: latitude and longitude of the terrain are unknown, state them for the sun"
+                "EPSG:{code} is not known here and read as plain metres: latitude and longitude of the terrain are unknown, state them for the sun"
             ),
             Warning::PlaceUnknown { epsg: None } => write!(
                 f,

@@ -4,6 +4,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::TerrainError;
+use super::projection::{self, Kind, Projection};
 
 /// Semi-major axis of the WGS84 ellipsoid in metres.
 const WGS84_A: f64 = 6_378_137.0;
@@ -98,20 +99,38 @@ impl From<CoordinateSystem> for Written {
 }
 
 impl CoordinateSystem {
-    /// The system that an EPSG code stands for. Knows the geographic range 4001 to 4999 without the geocentric 4978,
-    /// UTM on WGS84 (326zz, 327zz), NAD83 (269zz) and ETRS89 (258zz), and 3857; other codes from 1024 to 32767 are
-    /// taken as projections in metres; anything else is `None`.
+    /// The system that an EPSG code stands for, by the definitions of the registry: degrees, UTM on a datum that is WGS84 to a
+    /// metre (WGS84, NAD83, ETRS89, GDA), 3857, or a projection with the unit of its coordinates. Codes of state plane systems
+    /// together with heights (8700 to 8790) are in feet. Other codes from 1024 to 32767 are taken as projections in metres;
+    /// geocentric systems and anything else are `None`.
     pub fn from_epsg(code: u32) -> Option<Self> {
         let zone = (code % 100) as u8;
         Some(match code {
-            4978 => return None,
-            4001..=4999 => Self::Geographic,
             32601..=32660 | 26901..=26923 | 25828..=25838 => Self::Utm { zone, south: false },
             32701..=32760 => Self::Utm { zone, south: true },
             3857 => Self::WebMercator,
-            1024..=32766 => Self::Projected { epsg: Some(code), metres_per_unit: 1.0 },
-            _ => return None,
+            _ => match projection::kind_of(code) {
+                Some(Kind::Geographic) => Self::Geographic,
+                Some(Kind::Geocentric) => return None,
+                Some(Kind::Utm { zone, south }) => Self::Utm { zone, south },
+                Some(Kind::Projected { metres_per_unit }) => Self::Projected { epsg: Some(code), metres_per_unit },
+                None if (8700..=8790).contains(&code) => {
+                    Self::Projected { epsg: Some(code), metres_per_unit: 1200.0 / 3937.0 }
+                }
+                None if (4001..=4999).contains(&code) => Self::Geographic,
+                None if (1024..=32766).contains(&code) => Self::Projected { epsg: Some(code), metres_per_unit: 1.0 },
+                None => return None,
+            },
         })
+    }
+
+    /// Metres per unit of the heights, where the code of the system says so: a compound one.
+    pub fn metres_per_height_unit(self) -> Option<f64> {
+        match self {
+            Self::Projected { epsg: Some(code), .. } => projection::metres_per_height_unit(code)
+                .or_else(|| (8700..=8790).contains(&code).then_some(1200.0 / 3937.0)),
+            _ => None,
+        }
     }
 }
 
@@ -210,20 +229,94 @@ impl GeoReference {
         if file.is_finite() { file } else { self.centre }
     }
 
+    /// Local metres (x: east, y: south) of a place on earth, in degrees of WGS84; `None` where the coordinate system does not
+    /// say where it lies, or the place is far outside it. Longitudes may be given in either convention (-84 or 276).
+    pub fn local_of(&self, longitude: f64, latitude: f64) -> Option<DVec2> {
+        let file = SystemMap::new(self.system)?.from_earth(longitude, latitude)?;
+        Some(self.to_local(file.x, file.y))
+    }
+
     /// Latitude and longitude of the centre in degrees (north and east positive, longitude in -180..180), where the
     /// coordinate system tells.
     pub fn latitude_longitude(&self) -> Option<(f64, f64)> {
-        let (latitude, longitude) = match self.system {
-            CoordinateSystem::Geographic => (self.centre.y, self.centre.x),
-            CoordinateSystem::WebMercator => {
-                (web_mercator_latitude(self.centre.y), (self.centre.x / WGS84_A).to_degrees())
-            }
-            CoordinateSystem::Utm { zone, south } => utm_to_geographic(self.centre, zone, south)?,
-            CoordinateSystem::Projected { .. } | CoordinateSystem::Local => return None,
+        SystemMap::new(self.system)?.to_earth(self.centre)
+    }
+
+    /// The angle from true north to the north of the file's coordinates at the centre, in degrees, clockwise positive: 0 to
+    /// about 3 for UTM. `None` where the system does not say where it lies.
+    pub fn grid_north(&self) -> Option<f64> {
+        let map = SystemMap::new(self.system)?;
+        let (latitude, longitude) = map.to_earth(self.centre)?;
+        let step = 100.0 / self.metres_per_unit.y;
+        let (north, east) = map.to_earth(self.centre + DVec2::new(0.0, step))?;
+        let along = metres_per_degree(latitude) * DVec2::new(wrapped(east - longitude), north - latitude);
+        let angle = along.x.atan2(along.y).to_degrees();
+        angle.is_finite().then_some(angle)
+    }
+}
+
+/// A coordinate system between its coordinates and places on earth.
+pub struct SystemMap {
+    system: CoordinateSystem,
+    projection: Option<Projection>,
+}
+
+impl std::fmt::Debug for SystemMap {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("SystemMap").field(&self.system).finish()
+    }
+}
+
+impl SystemMap {
+    /// The map of a system; `None` if it does not say where on earth it lies.
+    pub fn new(system: CoordinateSystem) -> Option<Self> {
+        let projection = match system {
+            CoordinateSystem::Projected { epsg, .. } => Some(Projection::from_epsg(epsg?)?),
+            CoordinateSystem::Local => return None,
+            _ => None,
         };
-        let wrapped = longitude - 360.0 * ((longitude + 180.0) / 360.0).floor();
+        Some(Self { system, projection })
+    }
+
+    /// Latitude and longitude in degrees (north and east positive, longitude in -180..180) of coordinates.
+    pub fn to_earth(&self, point: DVec2) -> Option<(f64, f64)> {
+        let (latitude, longitude) = match self.system {
+            CoordinateSystem::Geographic => (point.y, point.x),
+            CoordinateSystem::WebMercator => (web_mercator_latitude(point.y), (point.x / WGS84_A).to_degrees()),
+            CoordinateSystem::Utm { zone, south } => utm_to_geographic(point, zone, south)?,
+            CoordinateSystem::Projected { metres_per_unit, .. } => {
+                self.projection.as_ref()?.to_earth(point, metres_per_unit)?
+            }
+            CoordinateSystem::Local => return None,
+        };
+        let wrapped = wrapped(longitude);
         (latitude.abs() <= 90.0 && wrapped.is_finite()).then_some((latitude, wrapped))
     }
+
+    /// Coordinates (x east, y north, in the system's unit) of a place in degrees of WGS84; `None` for places far outside the
+    /// system. Longitudes may be given in either convention (-84 or 276).
+    pub fn from_earth(&self, longitude: f64, latitude: f64) -> Option<DVec2> {
+        if !(longitude.is_finite() && latitude.abs() <= 90.0) {
+            return None;
+        }
+        let point = match self.system {
+            CoordinateSystem::Geographic => DVec2::new(longitude, latitude),
+            CoordinateSystem::WebMercator => {
+                DVec2::new(wrapped(longitude).to_radians(), latitude.to_radians().tan().asinh()) * WGS84_A
+            }
+            CoordinateSystem::Utm { zone, south } => geographic_to_utm(longitude, latitude, zone, south)?,
+            CoordinateSystem::Projected { metres_per_unit, .. } => {
+                self.projection.as_ref()?.from_earth(wrapped(longitude), latitude, metres_per_unit)?
+            }
+            CoordinateSystem::Local => return None,
+        };
+        point.is_finite().then_some(point)
+    }
+}
+
+/// A longitude between -180 and 180 degrees.
+fn wrapped(longitude: f64) -> f64 {
+    longitude - 360.0 * ((longitude + 180.0) / 360.0).floor()
 }
 
 /// Metres per degree of longitude (x) and of latitude (y) on the WGS84 ellipsoid: the radii of curvature in the prime
@@ -283,6 +376,39 @@ fn utm_to_geographic(point: DVec2, zone: u8, south: bool) -> Option<(f64, f64)> 
     Some((latitude.to_degrees(), longitude))
 }
 
+/// Easting and northing of a place in a UTM zone, the inverse of [`utm_to_geographic`] [Karney 2011, eq. 7 to 10, 35].
+/// `None` for places more than 40 degrees from the zone's meridian.
+fn geographic_to_utm(longitude: f64, latitude: f64, zone: u8, south: bool) -> Option<DVec2> {
+    let from_meridian = wrapped(longitude - (6.0 * f64::from(zone) - 183.0));
+    if from_meridian.abs() > 40.0 {
+        return None;
+    }
+    let n = WGS84_F / (2.0 - WGS84_F);
+    let (n2, n3, n4) = (n * n, n * n * n, n * n * n * n);
+    let rectifying_radius = WGS84_A / (1.0 + n) * (1.0 + n2 / 4.0 + n4 / 64.0);
+    let alpha = [
+        n / 2.0 - 2.0 / 3.0 * n2 + 5.0 / 16.0 * n3 + 41.0 / 180.0 * n4,
+        13.0 / 48.0 * n2 - 3.0 / 5.0 * n3 + 557.0 / 1440.0 * n4,
+        61.0 / 240.0 * n3 - 103.0 / 140.0 * n4,
+        49_561.0 / 161_280.0 * n4,
+    ];
+    let eccentricity = (WGS84_F * (2.0 - WGS84_F)).sqrt();
+    let tan = latitude.to_radians().tan();
+    let sigma = (eccentricity * (eccentricity * tan / (1.0 + tan * tan).sqrt()).atanh()).sinh();
+    let conformal = tan * (1.0 + sigma * sigma).sqrt() - sigma * (1.0 + tan * tan).sqrt();
+    let (sin, cos) = from_meridian.to_radians().sin_cos();
+    let xi_prime = conformal.atan2(cos);
+    let eta_prime = (sin / (conformal * conformal + cos * cos).sqrt()).asinh();
+    let (mut xi, mut eta) = (xi_prime, eta_prime);
+    for (j, alpha) in (1..).zip(alpha) {
+        let twice = 2.0 * f64::from(j);
+        xi += alpha * (twice * xi_prime).sin() * (twice * eta_prime).cosh();
+        eta += alpha * (twice * xi_prime).cos() * (twice * eta_prime).sinh();
+    }
+    let scale = UTM_SCALE * rectifying_radius;
+    Some(DVec2::new(500_000.0 + scale * eta, scale * xi + if south { 10_000_000.0 } else { 0.0 }))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -328,6 +454,45 @@ mod tests {
         let equator = GeoReference::new(CoordinateSystem::Utm { zone: 31, south: true }, DVec2::new(500_000.0, 1.0e7));
         let (latitude, longitude) = equator.unwrap().latitude_longitude().unwrap();
         assert!(latitude.abs() < 1e-12 && (longitude - 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn places_on_earth_are_found_in_every_system() {
+        let tower = (-79.387_139, 43.642_567);
+        let utm = geographic_to_utm(tower.0, tower.1, 17, false).unwrap();
+        assert!((utm - DVec2::new(630_084.0, 4_833_438.0)).length() < 2.0, "{utm}");
+        for (zone, south) in [(17, false), (33, true)] {
+            for (east, north) in [(420_000.0, 5_100_000.0), (500_000.0, 8_000_000.0), (720_000.0, 7_000_000.0)] {
+                let (latitude, longitude) = utm_to_geographic(DVec2::new(east, north), zone, south).unwrap();
+                let back = geographic_to_utm(longitude, latitude, zone, south).unwrap();
+                assert!((back - DVec2::new(east, north)).length() < 1e-3, "{back}");
+            }
+        }
+        for (system, centre) in [
+            (CoordinateSystem::Geographic, DVec2::new(tower.0, tower.1)),
+            (CoordinateSystem::Utm { zone: 17, south: false }, utm),
+            (CoordinateSystem::WebMercator, DVec2::new(-8_837_335.9, 5_410_875.9)),
+        ] {
+            let reference = GeoReference::new(system, centre).unwrap();
+            let (latitude, longitude) = reference.latitude_longitude().unwrap();
+            assert!(reference.local_of(longitude, latitude).unwrap().length() < 1e-3, "{system:?}");
+            let north = reference.local_of(longitude, latitude + 0.001).unwrap();
+            assert!((north.y + 111.1).abs() < 0.2 && north.x.abs() < 3.0, "{system:?}: {north}");
+            assert_eq!(reference.local_of(f64::NAN, 0.0), None);
+        }
+        let local = GeoReference::new(CoordinateSystem::Local, DVec2::ZERO).unwrap();
+        assert_eq!(local.local_of(8.0, 47.0), None);
+    }
+
+    #[test]
+    fn grid_north_turns_away_from_the_meridian() {
+        let north = |east: f64| {
+            let utm = CoordinateSystem::Utm { zone: 33, south: false };
+            GeoReference::new(utm, DVec2::new(east, 5_400_000.0)).unwrap().grid_north().unwrap()
+        };
+        assert!(north(500_000.0).abs() < 1e-6);
+        // East of the meridian by 2.7 degrees, at 48.7 degrees north: 2.7 sin 48.7.
+        assert!((north(700_000.0).abs() - 2.04).abs() < 0.05, "{}", north(700_000.0));
     }
 
     #[test]

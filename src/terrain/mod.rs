@@ -18,6 +18,7 @@ mod height_bounds;
 mod height_field;
 mod holes;
 pub mod noise;
+mod projection;
 pub mod read;
 pub mod sun_horizon;
 mod surface;
@@ -25,7 +26,7 @@ pub mod tiles;
 
 pub use error::{TerrainError, Warning};
 pub use extended_grid::Surroundings;
-pub use geo_reference::{CoordinateSystem, GeoReference};
+pub use geo_reference::{CoordinateSystem, GeoReference, SystemMap};
 pub use height_field::{HeightField, MAX_HEIGHT, MAX_SAMPLES};
 pub use noise::{NoiseKind, NoiseTerrain};
 pub use read::{Crop, ImageScale, ReadOptions, read_terrain, read_terrain_bytes};

@@ -15,16 +15,16 @@ use crate::support::glb::TreeFile;
 
 /// Builds a small GLB file piece by piece.
 #[derive(Default)]
-struct Glb {
-    bin: Vec<u8>,
-    views: Vec<String>,
-    accessors: Vec<String>,
+pub(super) struct Glb {
+    pub bin: Vec<u8>,
+    pub views: Vec<String>,
+    pub accessors: Vec<String>,
     /// Further members of the root, such as `"nodes":[...]`.
-    members: Vec<String>,
+    pub members: Vec<String>,
 }
 
 impl Glb {
-    fn view(&mut self, bytes: &[u8]) -> usize {
+    pub fn view(&mut self, bytes: &[u8]) -> usize {
         let view = format!(r#"{{"buffer":0,"byteOffset":{},"byteLength":{}}}"#, self.bin.len(), bytes.len());
         self.bin.extend_from_slice(bytes);
         self.bin.resize(self.bin.len().next_multiple_of(4), 0);
@@ -32,24 +32,24 @@ impl Glb {
         self.views.len() - 1
     }
 
-    fn accessor(&mut self, component: u32, shape: &str, count: usize, bytes: &[u8]) -> usize {
+    pub fn accessor(&mut self, component: u32, shape: &str, count: usize, bytes: &[u8]) -> usize {
         let view = self.view(bytes);
         self.accessors
             .push(format!(r#"{{"bufferView":{view},"componentType":{component},"type":"{shape}","count":{count}}}"#));
         self.accessors.len() - 1
     }
 
-    fn floats(&mut self, shape: &str, width: usize, values: &[f32]) -> usize {
+    pub fn floats(&mut self, shape: &str, width: usize, values: &[f32]) -> usize {
         let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
         self.accessor(5126, shape, values.len() / width, &bytes)
     }
 
-    fn indices(&mut self, values: &[u16]) -> usize {
+    pub fn indices(&mut self, values: &[u16]) -> usize {
         let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
         self.accessor(5123, "SCALAR", values.len(), &bytes)
     }
 
-    fn with(&mut self, member: &str) -> &mut Self {
+    pub fn with(&mut self, member: &str) -> &mut Self {
         self.members.push(member.to_owned());
         self
     }
@@ -63,7 +63,7 @@ impl Glb {
         format!("{{{}}}", members.join(","))
     }
 
-    fn bytes(&self) -> Vec<u8> {
+    pub fn bytes(&self) -> Vec<u8> {
         let mut json = self.json("").into_bytes();
         json.resize(json.len().next_multiple_of(4), b' ');
         let length = 12 + 8 + json.len() + 8 + self.bin.len();
@@ -83,7 +83,7 @@ impl Glb {
         load_bytes(&self.bytes(), "plant.glb", options)
     }
 
-    fn load(&self) -> Result<(Plant, Vec<Warning>), PlantError> {
+    pub fn load(&self) -> Result<(Plant, Vec<Warning>), PlantError> {
         self.load_with(&GltfOptions::default())
     }
 }
@@ -96,7 +96,7 @@ fn load_bytes(bytes: &[u8], name: &str, options: &GltfOptions) -> Result<(Plant,
 }
 
 /// A square of 2 m x 2 m in the plane z = 0, standing on the ground around the origin, two triangles towards +Z.
-const SQUARE: [f32; 12] = [-1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 2.0, 0.0, -1.0, 2.0, 0.0];
+pub(super) const SQUARE: [f32; 12] = [-1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 2.0, 0.0, -1.0, 2.0, 0.0];
 
 /// The square with an opaque and a masked material.
 fn tree() -> Glb {

@@ -9,7 +9,7 @@ use crate::{
     app::AppError,
     assets::StageError,
     math::digits::grouped,
-    scatter::{Coordinates, Inventory, InventoryOptions, inventory::columns_of, parse_inventory},
+    scatter::{Coordinates, Inventory, InventoryOptions, parse_inventory},
 };
 
 /// Species that are listed by name.
@@ -17,16 +17,18 @@ const LISTED: usize = 12;
 
 pub(super) fn describe_file(page: &mut Page, path: &Path) -> Result<(), AppError> {
     let bytes = std::fs::read(path).map_err(|source| StageError::Read { path: path.to_owned(), source })?;
-    let (name, options) = (path.display().to_string(), InventoryOptions::default());
-    let inventory = parse_inventory(&bytes, &name, options)?;
-    let columns = columns_of(&bytes, &name, options)?;
+    let name = path.display().to_string();
+    let inventory = parse_inventory(&bytes, &name, InventoryOptions::default())?;
     page.title(format!("{name}: an inventory of {} trees", grouped(inventory.rows.len())));
     page.inset(|page| {
-        for column in columns {
-            let meaning = column.meaning.unwrap_or_else(|| "ignored: unknown column name".to_owned());
+        for column in &inventory.columns {
+            let meaning = column.meaning.as_deref().unwrap_or("ignored: unknown column name");
             page.row("column", format!("{}: {meaning}", column.name));
         }
         describe(page, &inventory);
+        for note in &inventory.notes {
+            page.row("note", note);
+        }
     });
     Ok(())
 }

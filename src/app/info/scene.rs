@@ -20,7 +20,7 @@ use crate::{
     math::digits::grouped,
     plant::{PartKind, Plant, grow::GrowParameters},
     progress::Progress,
-    scatter::{FIRST_SURROUNDING_INDEX, InventoryOptions, PlantSize, Stand, read_inventory},
+    scatter::{FIRST_SURROUNDING_INDEX, Inventory, PlantSize, Stand},
     scene::{self, PlantSource, Scene, Species, Trees},
     terrain::Terrain,
 };
@@ -82,7 +82,7 @@ fn describe(page: &mut Page, scene: &Scene, path: &Path) -> Result<(), AppError>
         for (species, variants) in scene.species.iter().zip(&plan.variants) {
             describe_species(page, species, variants, &individuals);
         }
-        describe_trees(page, scene, &plan.variants, (&stand, surroundings), &heard.notes)?;
+        describe_trees(page, scene, &plan.variants, (&stand, surroundings), planned.inventory(), &heard.notes);
         describe_place(page, scene, &observer)?;
         describe_camera(page, scene);
         describe_quality(page, scene);
@@ -167,14 +167,15 @@ fn describe_trees(
     scene: &Scene,
     variants: &[Range<u16>],
     (stand, surroundings): (&Stand, f64),
+    inventory: Option<&Inventory>,
     notes: &[String],
-) -> Result<(), AppError> {
+) {
     let beyond = stand.trees.iter().filter(|tree| tree.index >= FIRST_SURROUNDING_INDEX).count();
     let inside = stand.trees.len() - beyond;
     match &scene.trees {
         Trees::None => {
             page.row("trees", "none");
-            return Ok(());
+            return;
         }
         Trees::Scattered(rules) => page.row(
             "trees",
@@ -204,12 +205,10 @@ fn describe_trees(
             let count = stand.trees.iter().filter(|tree| variants.contains(&tree.variant)).count();
             page.row("of species", format!("{}: {}", species.name, grouped(count)));
         }
-        if let Trees::Inventory(file) = &scene.trees {
-            let options = InventoryOptions { dbh_unit: file.dbh_unit, height_unit: file.height_unit };
-            inventory::describe(page, &read_inventory(&file.path, options)?);
+        if let Some(inventory) = inventory {
+            inventory::describe(page, inventory);
         }
-        Ok(())
-    })
+    });
 }
 
 fn describe_place(page: &mut Page, scene: &Scene, observer: &Observer) -> Result<(), AppError> {

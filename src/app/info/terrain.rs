@@ -110,7 +110,14 @@ fn georeference(page: &mut Page, terrain: &Terrain, reference: &GeoReference) {
         ),
     );
     match reference.latitude_longitude() {
-        Some(centre) => page.row("place", format!("{} (centre)", place(centre))),
+        Some(centre) => {
+            page.row("place", format!("{} (centre)", place(centre)));
+            let grid = reference.grid_north().filter(|angle| angle.abs() >= 0.05);
+            if let Some(angle) = grid {
+                let side = if angle > 0.0 { "east" } else { "west" };
+                page.row("north", format!("of the grid, {:.1}° {side} of true north: taken as north", angle.abs()));
+            }
+        }
         None => page.row("place", "unknown: a scene must state its latitude and longitude"),
     }
 }

@@ -103,6 +103,9 @@ async fn species(
                     height: Some(species.mean_height() as f32),
                     foliage_materials: plants.foliage.clone(),
                     wood_materials: plants.wood.clone(),
+                    up: plants.up,
+                    node: plants.node.clone(),
+                    ignore: plants.ignore.clone(),
                     leaf: species.leaf.unwrap_or(settings.leaf),
                     gloss: Some(species.gloss.sanitized()),
                     ..settings.gltf_options()

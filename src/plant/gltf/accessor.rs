@@ -86,6 +86,22 @@ pub(super) fn read_attribute(
     Ok(Elements { values, width: layout.shape.multiplicity() })
 }
 
+/// Reads an accessor of one of `shapes`, whatever its components are: joints, weights, matrices, colours, displacements.
+pub(super) fn read_any(
+    document: &mut Document,
+    index: usize,
+    shapes: &[Type],
+    warnings: &mut Warnings,
+) -> Result<Elements, Fault> {
+    let layout = layout(document, index, warnings)?;
+    if !shapes.contains(&layout.shape) {
+        let what = format!("{:?} where {shapes:?} is expected", layout.shape);
+        return Err(Fault::new(location(index), what, EXPORT_AGAIN));
+    }
+    let values = read_values(document, index, &layout)?;
+    Ok(Elements { values, width: layout.shape.multiplicity() })
+}
+
 /// Reads the indices of a primitive.
 pub(super) fn read_indices(document: &mut Document, index: usize, warnings: &mut Warnings) -> Result<Vec<u32>, Fault> {
     let layout = layout(document, index, warnings)?;

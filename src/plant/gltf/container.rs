@@ -3,14 +3,16 @@
 //! [glTF 2.0 specification, section 4 "GLB File Format Specification"]. The GLB reader of the `gltf` crate is not used,
 //! because it subtracts the size of the header from an unchecked length.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use gltf::json;
 
 use super::ExternalFiles;
 use super::error::{EXPORT_AGAIN, Fault, PlantError, WarningKind, Warnings};
+use super::meshopt::{self, Filter, Mode};
 
 /// Where external files come from.
 pub(super) enum Beside<'a> {
@@ -27,7 +29,15 @@ pub(super) struct Document<'a> {
     blob: Option<Vec<u8>>,
     /// The buffers that were read so far.
     buffers: Vec<Option<Vec<u8>>>,
+    /// The compressed buffer views that were decoded so far.
+    decoded: BTreeMap<usize, Vec<u8>>,
 }
+
+/// The extension of compressed buffer views.
+pub(super) const MESHOPT: &str = "EXT_meshopt_compression";
+
+/// Most bytes of a decoded buffer view.
+const MOST_DECODED: usize = 1 << 30;
 
 /// Parses `bytes`, the content of the file `path`. The content tells .gltf and .glb apart.
 pub(super) fn open<'a>(
@@ -38,7 +48,7 @@ pub(super) fn open<'a>(
 ) -> Result<Document<'a>, PlantError> {
     let (root, blob) = read_root(bytes, path, warnings)?;
     let buffers = vec![None; root.buffers.len()];
-    Ok(Document { root, beside, blob: blob.map(<[u8]>::to_vec), buffers })
+    Ok(Document { root, beside, blob: blob.map(<[u8]>::to_vec), buffers, decoded: BTreeMap::new() })
 }
 
 /// The JSON part of a file, and the binary chunk of GLB.
@@ -188,8 +198,58 @@ fn integers(value: &mut json::Value) {
 }
 
 impl Document<'_> {
-    /// The bytes of buffer view `index`.
+    /// The bytes of buffer view `index`, decompressed.
     pub fn view(&mut self, index: usize) -> Result<&[u8], Fault> {
+        let compressed =
+            self.root.buffer_views.get(index).and_then(|view| view.extensions.as_ref()?.others.get(MESHOPT).cloned());
+        let Some(extension) = compressed else { return self.plain_view(index) };
+        if !self.decoded.contains_key(&index) {
+            let bytes = self.decode(index, &extension)?;
+            self.decoded.insert(index, bytes);
+        }
+        Ok(self.decoded.get(&index).map(Vec::as_slice).unwrap_or_default())
+    }
+
+    /// Decodes a compressed buffer view.
+    fn decode(&mut self, index: usize, extension: &json::Value) -> Result<Vec<u8>, Fault> {
+        let location = format!("/bufferViews/{index}/extensions/{MESHOPT}");
+        let damaged = |what: &str| Fault::new(location.clone(), what, EXPORT_AGAIN);
+        let number = |name: &str| {
+            extension.get(name).and_then(json::Value::as_u64).and_then(|number| usize::try_from(number).ok())
+        };
+        let text = |name: &str| extension.get(name).and_then(json::Value::as_str);
+        let mode = match text("mode") {
+            Some("ATTRIBUTES") => Mode::Attributes,
+            Some("TRIANGLES") => Mode::Triangles,
+            Some("INDICES") => Mode::Indices,
+            _ => return Err(damaged("has an unknown mode")),
+        };
+        let filter = match text("filter") {
+            None | Some("NONE") => Filter::None,
+            Some("OCTAHEDRAL") => Filter::Octahedral,
+            Some("QUATERNION") => Filter::Quaternion,
+            Some("EXPONENTIAL") => Filter::Exponential,
+            _ => return Err(damaged("has an unknown filter")),
+        };
+        let (Some(buffer), Some(length), Some(stride), Some(count)) =
+            (number("buffer"), number("byteLength"), number("byteStride"), number("count"))
+        else {
+            return Err(damaged("lacks buffer, byteLength, byteStride or count"));
+        };
+        let begin = number("byteOffset").unwrap_or(0);
+        // A compressed byte stands for some hundred at most.
+        let most = length.saturating_mul(1024).min(MOST_DECODED);
+        if count.checked_mul(stride).is_none_or(|bytes| bytes > most) {
+            return Err(damaged("claims more than its bytes can hold"));
+        }
+        let bytes = self.buffer(buffer)?;
+        let data = begin.checked_add(length).and_then(|end| bytes.get(begin..end));
+        let data = data.ok_or_else(|| damaged("leaves its buffer"))?;
+        meshopt::decode(data, mode, filter, count, stride).ok_or_else(|| damaged("cannot be decoded"))
+    }
+
+    /// The bytes of buffer view `index` as they are.
+    fn plain_view(&mut self, index: usize) -> Result<&[u8], Fault> {
         let location = format!("/bufferViews/{index}");
         let views = self.root.buffer_views.len();
         let Some(view) = self.root.buffer_views.get(index) else {
@@ -268,7 +328,7 @@ fn read_uri(uri: &str, beside: &Beside, location: &str, limit: Option<u64>) -> R
         Fault::new(location, what, "copy the data beside the .gltf file and name it by a relative path")
     })?;
     let bytes = match beside {
-        Beside::Folder(folder) => read_file(&folder.join(&relative), limit),
+        Beside::Folder(folder) => read_file(&find(folder, uri, &relative), limit),
         Beside::Memory(files) => match files.get(&relative) {
             Some(Ok(bytes)) => {
                 let end = limit.and_then(|limit| usize::try_from(limit).ok()).unwrap_or(usize::MAX).min(bytes.len());
@@ -287,9 +347,38 @@ fn read_uri(uri: &str, beside: &Beside, location: &str, limit: Option<u64>) -> R
 /// The relative path that `uri` encodes; `Err` with the decoded text if it is not a path but, for instance, a data URI
 /// or a web address.
 fn relative_path(uri: &str) -> Result<String, String> {
-    let path = String::from_utf8_lossy(&decode_percent(uri)).into_owned();
+    // Some programs of Windows write its separators.
+    let path = String::from_utf8_lossy(&decode_percent(uri)).replace('\\', "/");
     let scheme = path.split_once(':').is_some_and(|(scheme, _)| scheme.len() > 1 && !scheme.contains(['/', '\\']));
     if scheme || Path::new(&path).has_root() { Err(path) } else { Ok(path) }
+}
+
+/// The file that `uri`, decoded `relative`, means in `folder`: under that name, under the name without decoding (a percent
+/// sign in a name), in another letter case, or, of a path that leads elsewhere, under its last name. The first name if
+/// there is none.
+fn find(folder: &Path, uri: &str, relative: &str) -> PathBuf {
+    let written = uri.replace('\\', "/");
+    let last = relative.rsplit('/').next().unwrap_or(relative);
+    let names = [relative, written.as_str(), last];
+    let exact = names.iter().map(|name| folder.join(name)).find(|path| path.is_file());
+    let found = exact.or_else(|| names.iter().find_map(|name| in_any_case(folder, name)));
+    found.unwrap_or_else(|| folder.join(relative))
+}
+
+/// A file of this relative path whose names differ only in letter case.
+fn in_any_case(folder: &Path, relative: &str) -> Option<PathBuf> {
+    let mut path = folder.to_owned();
+    for name in relative.split('/').filter(|name| !name.is_empty() && *name != ".") {
+        if name == ".." || path.join(name).exists() {
+            path.push(name);
+            continue;
+        }
+        let wanted = name.to_lowercase();
+        let mut entries: Vec<_> = std::fs::read_dir(&path).ok()?.flatten().map(|entry| entry.file_name()).collect();
+        entries.sort();
+        path.push(entries.into_iter().find(|entry| entry.to_string_lossy().to_lowercase() == wanted)?);
+    }
+    path.is_file().then_some(path)
 }
 
 /// At most `limit` bytes of `file`, or the reason why it cannot be read.

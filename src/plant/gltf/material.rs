@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use glam::{Affine2, Mat2, Vec2, Vec3};
-use gltf::json::material::{AlphaMode, Material};
+use gltf::json::Value;
+use gltf::json::material::{AlphaMode, Material, NormalTexture};
 use gltf::json::texture::Info;
 use gltf::json::validation::Checked;
 use image::{ImageReader, Limits, RgbaImage};
@@ -18,6 +19,7 @@ use crate::plant::{Gloss, PartKind, PlantMaterial};
 const LONGEST_SIDE: u32 = 16_384;
 
 /// A material, and which texture coordinates it uses.
+#[derive(Clone)]
 pub(super) struct Surface {
     pub name: String,
     pub kind: PartKind,
@@ -47,18 +49,40 @@ struct Reference {
 }
 
 impl Reference {
+    /// Of a normal texture, whose extensions have no type of their own.
+    fn of_normal(normal: &NormalTexture) -> Self {
+        let extension =
+            normal.extensions.as_ref().and_then(|extensions| extensions.others.get("KHR_texture_transform"));
+        let numbers = |name: &str, default: [f32; 2]| {
+            let list = extension.and_then(|extension| extension.get(name)).and_then(Value::as_array);
+            let number = |at: usize| list.and_then(|list| list.get(at)).and_then(Value::as_f64).map(|v| v as f32);
+            [number(0).unwrap_or(default[0]), number(1).unwrap_or(default[1])]
+        };
+        let member = |name: &str| extension.and_then(|extension| extension.get(name));
+        let rotation = member("rotation").and_then(Value::as_f64).unwrap_or(0.0) as f32;
+        let uv_set = member("texCoord").and_then(Value::as_u64).and_then(|set| u32::try_from(set).ok());
+        let transform = match extension {
+            Some(_) => transform(numbers("offset", [0.0; 2]), rotation, numbers("scale", [1.0; 2])),
+            None => Affine2::IDENTITY,
+        };
+        Self { texture: normal.index.value(), uv_set: uv_set.unwrap_or(normal.tex_coord), transform }
+    }
+
     fn new(info: &Info) -> Self {
         let extension = info.extensions.as_ref().and_then(|extensions| extensions.texture_transform.as_ref());
-        let transform = extension.map_or(Affine2::IDENTITY, |t| {
-            // Counter-clockwise in a frame whose v axis points down, as in the reference viewers of the extension.
-            let (sine, cosine) = t.rotation.0.sin_cos();
-            let rotation = Mat2::from_cols(Vec2::new(cosine, -sine), Vec2::new(sine, cosine));
-            let matrix = rotation * Mat2::from_diagonal(Vec2::from(t.scale.0));
-            Affine2::from_mat2_translation(matrix, Vec2::from(t.offset.0))
-        });
+        let transform = extension.map_or(Affine2::IDENTITY, |t| transform(t.offset.0, t.rotation.0, t.scale.0));
         let uv_set = extension.and_then(|extension| extension.tex_coord).unwrap_or(info.tex_coord);
         Self { texture: info.index.value(), uv_set, transform }
     }
+}
+
+/// The transform of KHR_texture_transform.
+fn transform(offset: [f32; 2], rotation: f32, scale: [f32; 2]) -> Affine2 {
+    // Counter-clockwise in a frame whose v axis points down, as in the reference viewers of the extension.
+    let (sine, cosine) = rotation.sin_cos();
+    let rotation = Mat2::from_cols(Vec2::new(cosine, -sine), Vec2::new(sine, cosine));
+    let matrix = rotation * Mat2::from_diagonal(Vec2::from(scale));
+    Affine2::from_mat2_translation(matrix, Vec2::from(offset))
 }
 
 /// Reads material `index`; `None` is the default material of glTF.
@@ -93,6 +117,7 @@ pub(super) fn read(
         base.as_ref().and_then(|base| load(document, base.texture, &location, "base colour", images, warnings));
 
     let kind = kind_of(source, &name, options, &location, warnings);
+    mention_cut_out(document, source, (&name, kind), base.as_ref(), texture.as_deref(), &location, warnings);
     let opacity = unit(factor[3]);
     let mut material = PlantMaterial {
         base_color: Vec3::new(unit(factor[0]), unit(factor[1]), unit(factor[2])),
@@ -126,16 +151,86 @@ pub(super) fn read(
         uv_transform: base.as_ref().map_or(Affine2::IDENTITY, |base| base.transform),
     };
     if let Some(normal) = &source.normal_texture {
-        if base.is_some() && (surface.uv_set != normal.tex_coord || surface.uv_transform != Affine2::IDENTITY) {
+        let own = Reference::of_normal(normal);
+        if base.is_some() && (surface.uv_set != own.uv_set || !surface.uv_transform.abs_diff_eq(own.transform, 1e-5)) {
             let message = "its normal map has texture coordinates of its own; a part has one set, the map is left out";
             warnings.push(WarningKind::Ignored, &location, message);
         } else {
-            surface.uv_set = normal.tex_coord;
-            surface.material.normal_texture =
-                load(document, normal.index.value(), &location, "normal", images, warnings);
+            surface.uv_set = own.uv_set;
+            surface.uv_transform = own.transform;
+            surface.material.normal_texture = load(document, own.texture, &location, "normal", images, warnings);
         }
     }
     surface
+}
+
+/// Share of opaque wood's texture from which on holes in it are mentioned.
+const MANY_HOLES: f32 = 0.2;
+
+/// Warns where the cut-out of leaves is missing, so that they would be drawn as rectangles, and where a texture has one that
+/// its material does not use.
+fn mention_cut_out(
+    document: &Document,
+    source: &Material,
+    (name, kind): (&str, PartKind),
+    base: Option<&Reference>,
+    texture: Option<&RgbaImage>,
+    location: &str,
+    warnings: &mut Warnings,
+) {
+    let Some(base) = base else { return };
+    let file = texture_name(document, base.texture);
+    let Some(image) = texture else {
+        if kind == PartKind::Foliage {
+            let message = format!(
+                "'{name}': without its texture {file} its leaves have no outline: they are drawn as full cards"
+            );
+            warnings.push(WarningKind::Missing, location, message);
+        }
+        return;
+    };
+    let holes = image.pixels().filter(|pixel| pixel[3] < 128).count();
+    match kind {
+        PartKind::Foliage if holes == 0 && image.pixels().all(|pixel| pixel[3] > 250) => {
+            let message = format!(
+                "'{name}': its texture {file} has no transparent texels, so its leaves are drawn as full cards; save the \
+                 picture with the cut-out in its alpha channel"
+            );
+            warnings.push(WarningKind::Missing, location, message);
+        }
+        PartKind::Wood
+            if source.alpha_mode == Checked::Valid(AlphaMode::Opaque)
+                && holes as f32 > MANY_HOLES * (image.width() * image.height()) as f32 =>
+        {
+            let message = format!(
+                "'{name}' is opaque, but its texture {file} has transparent texels: if these are leaves, name the material as \
+                 foliage"
+            );
+            warnings.push(WarningKind::Missing, location, message);
+        }
+        _ => {}
+    }
+}
+
+/// What people call a texture: the name or the file of its image.
+fn texture_name(document: &Document, texture: usize) -> String {
+    let image = document.root.textures.get(texture).and_then(|texture| image_of(document, texture));
+    let named = image.and_then(|index| document.root.images.get(index)).and_then(|image| {
+        let uri = image.uri.as_deref().filter(|uri| !uri.starts_with("data:"));
+        image.name.as_deref().filter(|name| !name.is_empty()).or(uri).map(|name| format!("'{name}'"))
+    });
+    named
+        .unwrap_or_else(|| format!("(image {})", image.map_or_else(|| "unknown".to_owned(), |index| index.to_string())))
+}
+
+/// The image of a texture: its PNG or JPEG, otherwise its WebP.
+fn image_of(document: &Document, texture: &gltf::json::Texture) -> Option<usize> {
+    let plain = texture.source.value();
+    if plain < document.root.images.len() {
+        return Some(plain);
+    }
+    let webp = texture.extensions.as_ref()?.others.get("EXT_texture_webp")?.get("source")?.as_u64()?;
+    usize::try_from(webp).ok().filter(|image| *image < document.root.images.len())
 }
 
 /// Sets the transmission of foliage: the caller's, otherwise the file's, otherwise the typical one for the kind of
@@ -198,15 +293,14 @@ fn load(
         warnings.push(WarningKind::Missing, location, message);
         return None;
     };
-    let image = texture.source.value();
-    if image >= document.root.images.len() {
+    let Some(image) = image_of(document, texture) else {
         let message = format!(
-            "its {role} texture {index} has no PNG or JPEG image{}; drawn untextured: save the image as PNG",
+            "its {role} texture {index} has no PNG, JPEG or WebP image{}; drawn untextured: save the image as PNG",
             texture_extensions(document)
         );
         warnings.push(WarningKind::Missing, location, message);
         return None;
-    }
+    };
     if images.0.len() <= image {
         images.0.resize(image + 1, None);
     }
@@ -228,11 +322,11 @@ fn texture_extensions(document: &Document) -> String {
     if used.is_empty() { String::new() } else { format!(" (the file uses {})", used.join(", ")) }
 }
 
-/// Decodes a PNG or JPEG image, whatever its declared type.
+/// Decodes a PNG, JPEG or WebP image, whatever its declared type.
 fn decode(bytes: Vec<u8>) -> Result<RgbaImage, String> {
     let mut reader = ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
     if reader.format().is_none() {
-        return Err("is neither a PNG nor a JPEG".into());
+        return Err("is neither a PNG nor a JPEG nor a WebP".into());
     }
     let mut limits = Limits::default();
     limits.max_image_width = Some(LONGEST_SIDE);

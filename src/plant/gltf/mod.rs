@@ -2,9 +2,12 @@
 //!
 //! The files are glTF 2.0 [Khronos 2021], JSON or GLB, with buffers and images in the file, in data URIs or in external
 //! files. The reader uses the triangles of the default scene with position, normal and one set of texture coordinates;
-//! base colour (factor and texture), normal texture, alpha mode and cutoff; KHR_texture_transform,
-//! KHR_materials_pbrSpecularGlossiness (its diffuse part), KHR_materials_diffuse_transmission (the averages of its
-//! textures over the leaf) and KHR_mesh_quantization. A [`Warning`] names everything else.
+//! base colour (factor and texture), normal texture, alpha mode and cutoff; vertex colours; skins and morph targets as they
+//! stand at rest; KHR_texture_transform, KHR_materials_pbrSpecularGlossiness (its diffuse part),
+//! KHR_materials_diffuse_transmission (the averages of its textures over the leaf), KHR_mesh_quantization,
+//! EXT_meshopt_compression, EXT_mesh_gpu_instancing, EXT_texture_webp and MSFT_lod (its finest level). Coarser levels, collision
+//! hulls and ground planes are told by their names and left out; a tree whose z axis points up is turned upright. A
+//! [`Warning`] names everything else.
 //!
 //! Files come from anywhere, so nothing in them is trusted. Every index, length and count is checked before it is used.
 //! No file makes this module panic, or allocate more than its own size and fixed limits allow. Damaged geometry is a
@@ -14,10 +17,16 @@ mod accessor;
 mod container;
 mod diffuse_transmission;
 mod error;
+mod instancing;
 mod material;
+mod meshopt;
 mod nodes;
 mod primitive;
 mod report;
+mod roles;
+mod skin;
+mod tints;
+mod upright;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -31,6 +40,8 @@ use super::{Gloss, LeafKind, PartKind, Plant, PlantMesh, PlantPart};
 use container::Beside;
 use error::{EXPORT_AGAIN, Fault, Warnings};
 use material::{Images, Surface};
+use primitive::Piece;
+use skin::Deformation;
 
 /// A plant that stands farther from the origin than this fraction of its height is moved there.
 const FAR_OFF: f32 = 0.1;
@@ -58,6 +69,21 @@ pub struct GltfOptions {
     pub gloss: Option<Gloss>,
     /// Name of the plant; `None` takes the file's name without its ending.
     pub name: Option<String>,
+    /// The axis of the file that points up. `None` takes y, as glTF demands, unless the tree clearly stands along z.
+    pub up: Option<UpAxis>,
+    /// Names of the nodes or meshes that are the plant, with what is below them; empty takes all.
+    pub node: Vec<String>,
+    /// Names of nodes, meshes or materials that are left out.
+    pub ignore: Vec<String>,
+}
+
+/// The axis of a file that points up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+pub enum UpAxis {
+    /// As glTF demands.
+    Y,
+    /// As Blender and other programs have it, before they export.
+    Z,
 }
 
 /// Reads the plant in `path` (.gltf or .glb).
@@ -138,25 +164,42 @@ fn read_plant(
     Ok((plant, warnings.finish()))
 }
 
-/// Whether an extension affects only the look of a plant, so that a file that requires it can be read without it.
+/// Whether an extension adds only to what is drawn here anyway, so that a file that requires it can be read without it: the
+/// gloss of materials, lights, notes.
 fn is_harmless(extension: &str) -> bool {
-    const PREFIXES: [&str; 7] =
-        ["KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_", "KHR_xmp", "KHR_animation_"];
-    extension == "KHR_mesh_quantization" || PREFIXES.iter().any(|prefix| extension.starts_with(prefix))
+    const PREFIXES: [&str; 5] = ["KHR_materials_", "EXT_materials_", "KHR_lights_", "KHR_xmp", "KHR_animation_"];
+    PREFIXES.iter().any(|prefix| extension.starts_with(prefix))
 }
 
 /// Whether an extension is supported.
 fn is_understood(extension: &str) -> bool {
-    let others = ["KHR_texture_transform", "KHR_materials_pbrSpecularGlossiness", "KHR_mesh_quantization"];
+    let others = [
+        "KHR_texture_transform",
+        "KHR_materials_pbrSpecularGlossiness",
+        "KHR_mesh_quantization",
+        "EXT_texture_webp",
+        "MSFT_lod",
+        container::MESHOPT,
+        instancing::NAME,
+    ];
     extension == diffuse_transmission::NAME || others.contains(&extension)
 }
 
 fn check_extensions(root: &gltf::json::Root, path: &Path, warnings: &mut Warnings) -> Result<(), PlantError> {
-    if let Some(required) = root.extensions_required.iter().find(|name| !is_harmless(name)) {
+    if let Some(required) = root.extensions_required.iter().find(|name| !is_harmless(name) && !is_understood(name)) {
+        let remedy = match required.as_str() {
+            "KHR_draco_mesh_compression" => {
+                "decompress it (`gltf-transform copy IN.glb OUT.glb`), or export with compression off"
+            }
+            name if name.contains("_texture_") => {
+                "save its textures as PNG or WebP (`gltf-transform png IN.glb OUT.glb`), or export with them"
+            }
+            _ => "export without it",
+        };
         return Err(PlantError::Unsupported {
             path: path.to_path_buf(),
             what: format!("the extension {required}"),
-            remedy: "export without it (compression and instancing off)",
+            remedy,
         });
     }
     for name in root.extensions_used.iter().filter(|name| !is_understood(name)) {
@@ -165,48 +208,153 @@ fn check_extensions(root: &gltf::json::Root, path: &Path, warnings: &mut Warning
     Ok(())
 }
 
-/// Reads all meshes of the scene and merges them by material, in the order of the materials.
+/// A part of a mesh where its node places it.
+struct Placed {
+    /// The placement that it belongs to.
+    placement: usize,
+    material: Option<usize>,
+    piece: Piece,
+}
+
+/// Reads all meshes of the tree and merges them by material and vertex colour, in the order of the materials.
 fn gather(
     document: &mut container::Document,
     options: &GltfOptions,
     warnings: &mut Warnings,
 ) -> Result<Vec<(Surface, PlantMesh)>, Fault> {
-    let mut placements = nodes::placements(&document.root, warnings)?;
+    let (mut placements, globals) = nodes::placements(&document.root, warnings)?;
     if document.root.nodes.is_empty() && !document.root.meshes.is_empty() {
         // The file is a collection of meshes without a scene. Together they are the plant.
         warnings.push(WarningKind::Repaired, "/nodes", "there are no nodes; all meshes are used as they are");
         let meshes = 0..document.root.meshes.len();
-        placements.extend(meshes.map(|mesh| nodes::Placement { node: mesh, mesh, transform: glam::DMat4::IDENTITY }));
+        placements.extend(meshes.map(|mesh| nodes::Placement {
+            node: mesh,
+            mesh,
+            transform: glam::DMat4::IDENTITY,
+            path: Vec::new(),
+        }));
     }
+    let placements = roles::keep_tree(&document.root, placements, options, warnings);
+    let placements = instancing::expand(document, placements, warnings)?;
 
     let mut images = Images::default();
-    let mut parts: BTreeMap<Option<usize>, (Surface, PlantMesh)> = BTreeMap::new();
+    let mut surfaces: BTreeMap<Option<usize>, Surface> = BTreeMap::new();
+    let mut placed = Vec::new();
     let mut total = 0u64;
-    for placement in placements {
+    for (number, placement) in placements.iter().enumerate() {
         let location = format!("/meshes/{}", placement.mesh);
         let Some(mesh) = document.root.meshes.get(placement.mesh).cloned() else {
             return Err(Fault::new(location, format!("does not exist, node {} uses it", placement.node), EXPORT_AGAIN));
         };
+        let deformation = deformation_of(document, placement, &mesh, &globals, warnings)?;
         for (index, primitive) in mesh.primitives.iter().enumerate() {
             let location = format!("{location}/primitives/{index}");
             total = total.saturating_add(primitive::claimed_size(document, primitive));
             primitive::check_budget(total, &location)?;
             let material = primitive.material.map(|material| material.value());
-            let (surface, merged) = parts.entry(material).or_insert_with(|| {
-                (material::read(document, material, options, &mut images, warnings), PlantMesh::default())
-            });
-            let Some(mut mesh) = primitive::read(document, primitive, &location, surface, warnings)? else {
+            let surface = surfaces
+                .entry(material)
+                .or_insert_with(|| material::read(document, material, options, &mut images, warnings));
+            if options.ignore.contains(&surface.name) {
                 continue;
-            };
-            let flattened = nodes::apply(&mut mesh, &placement.transform, &format!("/nodes/{}", placement.node))?;
+            }
+            let piece = primitive::read(document, primitive, &location, surface, &deformation, warnings)?;
+            let Some(mut piece) = piece else { continue };
+            let transform = if piece.skinned { glam::DMat4::IDENTITY } else { placement.transform };
+            let node = format!("/nodes/{}", placement.node);
+            let flattened = nodes::apply(&mut piece.mesh, &transform, &node)?;
             if flattened > 0 {
                 let message = format!("its transform flattens {flattened} triangles; left out");
-                warnings.push(WarningKind::Repaired, format!("/nodes/{}", placement.node), message);
+                warnings.push(WarningKind::Repaired, node, message);
             }
-            append(merged, mesh);
+            placed.push(Placed { placement: number, material, piece });
+        }
+    }
+    let up_is_z = upright::up_is_z(&placed, &surfaces, options, warnings);
+    leave_out_ground(&document.root, &placements, &mut placed, &surfaces, up_is_z, warnings);
+    if up_is_z {
+        placed.iter_mut().for_each(|placed| upright::turn(&mut placed.piece.mesh));
+    }
+
+    let mut parts: BTreeMap<(Option<usize>, [u32; 3]), (Surface, PlantMesh)> = BTreeMap::new();
+    for Placed { material, piece, .. } in placed {
+        let Some(surface) = surfaces.get(&material) else { continue };
+        let plain = piece.colors.is_empty();
+        let tinted = if plain {
+            vec![tints::Tinted { mesh: piece.mesh, color: Vec3::ONE }]
+        } else {
+            tints::divide(piece.mesh, &piece.colors, surface.material.base_color_texture.is_some())
+        };
+        if !plain && (tinted.len() > 1 || tinted.iter().any(|part| part.color != Vec3::ONE)) {
+            let message = match tinted.len() {
+                1 => "its vertex colours are used as their mean".to_owned(),
+                count => format!("its vertex colours are used as {count} colours, each a part of its own"),
+            };
+            warnings.push(
+                WarningKind::Repaired,
+                material.map_or_else(String::new, |n| format!("/materials/{n}")),
+                message,
+            );
+        }
+        for part in tinted {
+            let key = part.color.to_array().map(|channel| (channel * 255.0).round() as u32);
+            let (_, merged) = parts.entry((material, key)).or_insert_with(|| {
+                let mut surface = surface.clone();
+                surface.material.base_color *= part.color;
+                (surface, PlantMesh::default())
+            });
+            append(merged, part.mesh);
         }
     }
     Ok(parts.into_values().collect())
+}
+
+/// What bones and morph targets do to a mesh at rest.
+fn deformation_of(
+    document: &mut container::Document,
+    placement: &nodes::Placement,
+    mesh: &gltf::json::Mesh,
+    globals: &[glam::DMat4],
+    warnings: &mut Warnings,
+) -> Result<Deformation, Fault> {
+    let node = document.root.nodes.get(placement.node).filter(|_| !placement.path.is_empty());
+    let weights = node.and_then(|node| node.weights.clone()).or_else(|| mesh.weights.clone()).unwrap_or_default();
+    let skin = node.and_then(|node| node.skin.map(|skin| skin.value()));
+    let joints = match skin {
+        Some(skin) => skin::joints(document, skin, globals, warnings)?,
+        None => Vec::new(),
+    };
+    Ok(Deformation { weights, joints })
+}
+
+/// Leaves out the meshes that are ground by their name, shape and place.
+fn leave_out_ground(
+    root: &gltf::json::Root,
+    placements: &[nodes::Placement],
+    placed: &mut Vec<Placed>,
+    surfaces: &BTreeMap<Option<usize>, Surface>,
+    up_is_z: bool,
+    warnings: &mut Warnings,
+) {
+    let candidate = |placed: &Placed| {
+        let by_name = placements.get(placed.placement).is_some_and(|p| roles::may_be_ground(&roles::label(root, p)));
+        by_name || surfaces.get(&placed.material).is_some_and(|surface| roles::may_be_ground(&surface.name))
+    };
+    let tree = upright::bounds(placed.iter().filter(|placed| !candidate(placed)));
+    let Some(tree) = tree else { return };
+    let mut names = Vec::new();
+    placed.retain(|placed| {
+        let ground = candidate(placed)
+            && upright::bounds(std::iter::once(placed)).is_some_and(|bounds| roles::is_ground(bounds, tree, up_is_z));
+        if ground && let Some(placement) = placements.get(placed.placement) {
+            names.push(roles::label(root, placement));
+        }
+        !ground
+    });
+    if !names.is_empty() {
+        let message = format!("ground planes, which are not drawn: {}", roles::shortened(&names));
+        warnings.push(WarningKind::Ignored, "/nodes", message);
+    }
 }
 
 /// Appends `mesh` to `merged`.
@@ -220,7 +368,7 @@ fn append(merged: &mut PlantMesh, mesh: PlantMesh) {
 
 /// Warns of parts of the file that a plant does not use, and of options that match nothing.
 fn mention_unused(root: &gltf::json::Root, options: &GltfOptions, warnings: &mut Warnings) {
-    let unused = [("animations", root.animations.len()), ("skins", root.skins.len()), ("cameras", root.cameras.len())];
+    let unused = [("animations", root.animations.len()), ("cameras", root.cameras.len())];
     for (name, count) in unused.into_iter().filter(|(_, count)| *count > 0) {
         warnings.push(WarningKind::Ignored, format!("/{name}"), format!("{count} {name}; the plant stands still"));
     }

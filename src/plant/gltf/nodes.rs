@@ -4,6 +4,7 @@ use glam::{DMat3, DMat4, DQuat, DVec3, Vec3};
 use gltf::json::{Root, scene::Node};
 
 use super::error::{EXPORT_AGAIN, Fault, WarningKind, Warnings};
+use super::roles;
 use crate::plant::PlantMesh;
 
 /// Largest coordinate of a plant in metres: large enough for any unit, small enough that lengths, areas and sums stay
@@ -11,6 +12,7 @@ use crate::plant::PlantMesh;
 const FARTHEST: f32 = 1e9;
 
 /// A mesh, and where a node places it.
+#[derive(Clone, Debug)]
 pub(super) struct Placement {
     /// Index of the node.
     pub node: usize,
@@ -18,16 +20,23 @@ pub(super) struct Placement {
     pub mesh: usize,
     /// Transform from the frame of the mesh to that of the scene.
     pub transform: DMat4,
+    /// The node and the nodes above it, the root first.
+    pub path: Vec<usize>,
 }
 
 /// All meshes of the default scene. That is the first scene if the file names none, and all root nodes if there is no
 /// scene.
-pub(super) fn placements(root: &Root, warnings: &mut Warnings) -> Result<Vec<Placement>, Fault> {
+///
+/// The second result is the transform of every node, for skins.
+pub(super) fn placements(root: &Root, warnings: &mut Warnings) -> Result<(Vec<Placement>, Vec<DMat4>), Fault> {
     let mut visited = vec![false; root.nodes.len()];
+    let mut globals = vec![DMat4::IDENTITY; root.nodes.len()];
     let mut found = Vec::new();
-    let mut stack: Vec<(usize, DMat4)> =
-        roots(root, warnings)?.into_iter().rev().map(|node| (node, DMat4::IDENTITY)).collect();
-    while let Some((index, parent)) = stack.pop() {
+    let coarser = roles::coarser_nodes(root);
+    let mut left_out = 0;
+    let mut stack: Vec<(usize, DMat4, Vec<usize>)> =
+        roots(root, warnings)?.into_iter().rev().map(|node| (node, DMat4::IDENTITY, Vec::new())).collect();
+    while let Some((index, parent, mut path)) = stack.pop() {
         let location = format!("/nodes/{index}");
         let Some(node) = root.nodes.get(index) else {
             return Err(Fault::new(location, format!("does not exist, there are {}", root.nodes.len()), EXPORT_AGAIN));
@@ -36,21 +45,34 @@ pub(super) fn placements(root: &Root, warnings: &mut Warnings) -> Result<Vec<Pla
             let what = "has several parents or is its own ancestor; glTF demands a tree";
             return Err(Fault::new(location, what, EXPORT_AGAIN));
         }
+        if coarser.contains(&index) {
+            left_out += 1;
+            continue;
+        }
+        path.push(index);
         let transform = parent * local_transform(node, &location, warnings)?;
         if !transform.is_finite() {
             return Err(Fault::new(location, "its transform is not finite", EXPORT_AGAIN));
         }
+        globals[index] = transform;
+        // A path is as deep as its file has nodes; deep chains have few meshes.
+        stack.extend(node.children.iter().flatten().rev().map(|child| (child.value(), transform, path.clone())));
         if let Some(mesh) = node.mesh {
-            found.push(Placement { node: index, mesh: mesh.value(), transform });
+            found.push(Placement { node: index, mesh: mesh.value(), transform, path });
         }
-        stack.extend(node.children.iter().flatten().rev().map(|child| (child.value(), transform)));
     }
-    let unused = visited.iter().zip(&root.nodes).filter(|(visited, node)| !**visited && node.mesh.is_some()).count();
+    let outside = |index: usize| !visited[index] && !coarser.contains(&index);
+    let unused = root.nodes.iter().enumerate().filter(|(index, node)| outside(*index) && node.mesh.is_some()).count();
+    let levels = left_out + coarser.iter().filter(|index| visited.get(**index) == Some(&false)).count();
+    if levels > 0 {
+        let message = format!("{levels} coarser levels of detail (MSFT_lod), which are not drawn");
+        warnings.push(WarningKind::Ignored, "/nodes", message);
+    }
     if unused > 0 {
         let message = format!("{unused} nodes with meshes are not in the default scene");
         warnings.push(WarningKind::Ignored, "/nodes", message);
     }
-    Ok(found)
+    Ok((found, globals))
 }
 
 /// The root nodes of the default scene.

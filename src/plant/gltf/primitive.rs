@@ -5,10 +5,11 @@ use gltf::json::accessor::Type;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
-use super::accessor::{Elements, Expected, MOST_ELEMENTS, claimed_count, read_attribute, read_indices};
+use super::accessor::{Elements, Expected, MOST_ELEMENTS, claimed_count, read_any, read_attribute, read_indices};
 use super::container::Document;
 use super::error::{EXPORT_AGAIN, Fault, WarningKind, Warnings};
 use super::material::Surface;
+use super::skin::{self, Deformation};
 use crate::plant::PlantMesh;
 
 /// A triangle whose area is below this fraction of the square of its longest edge is degenerate. Its width is about
@@ -21,6 +22,15 @@ pub(super) fn claimed_size(document: &Document, primitive: &Primitive) -> u64 {
     primitive.indices.or(positions.copied()).map_or(0, |accessor| claimed_count(document, accessor.value()))
 }
 
+/// A primitive as it is read.
+pub(super) struct Piece {
+    pub mesh: PlantMesh,
+    /// Linear colours of the vertices; empty if there are none.
+    pub colors: Vec<Vec3>,
+    /// Whether bones have moved it, so that its node does not count.
+    pub skinned: bool,
+}
+
 /// Reads `primitive`; `None`, with a warning, if it does not consist of triangles.
 ///
 /// Unused vertices and degenerate triangles are dropped.
@@ -29,8 +39,9 @@ pub(super) fn read(
     primitive: &Primitive,
     location: &str,
     surface: &Surface,
+    deformation: &Deformation,
     warnings: &mut Warnings,
-) -> Result<Option<PlantMesh>, Fault> {
+) -> Result<Option<Piece>, Fault> {
     let Some(positions) = primitive.attributes.get(&Checked::Valid(Semantic::Positions)).copied() else {
         warnings.push(WarningKind::Ignored, location, "has no POSITION, so there is nothing to draw");
         return Ok(None);
@@ -43,12 +54,12 @@ pub(super) fn read(
         }
         Checked::Invalid => return Err(Fault::new(location, "unknown mode", EXPORT_AGAIN)),
     };
-    mention_unused(primitive, location, warnings);
+    mention_unused(primitive, location, deformation, warnings);
 
     // Quantised attributes are valid only with the extension, which the caller has accepted if it is required.
     let quantized = document.root.extensions_used.iter().any(|name| name == "KHR_mesh_quantization");
     let vector = |name| Expected { name, shape: Type::Vec3, integers: quantized };
-    let points = read_attribute(document, positions.value(), &vector("POSITION"), warnings)?;
+    let mut points = read_attribute(document, positions.value(), &vector("POSITION"), warnings)?;
     let indices = match primitive.indices {
         Some(indices) => read_indices(document, indices.value(), warnings)?,
         None => (0..points.len() as u32).collect(),
@@ -69,7 +80,7 @@ pub(super) fn read(
         warnings.push(WarningKind::Repaired, location, format!("{problem}; done without"));
         None
     };
-    let normals = lookup(Semantic::Normals, vector("NORMAL"), warnings);
+    let mut normals = lookup(Semantic::Normals, vector("NORMAL"), warnings);
     let uvs = if surface.is_textured() {
         let expected = Expected { name: "TEXCOORD", shape: Type::Vec2, integers: quantized };
         let uvs = lookup(Semantic::TexCoords(surface.uv_set), expected, warnings);
@@ -81,6 +92,10 @@ pub(super) fn read(
     } else {
         None
     };
+
+    let skinned = skin::apply(document, primitive, location, deformation, &mut points, normals.as_mut(), warnings)?;
+    let colors = colors(document, primitive, location, points.len(), warnings);
+    let mut piece_colors = Vec::new();
 
     let mut builder = Builder::new(points.len());
     let (mut broken_uvs, mut slivers) = (0usize, 0usize);
@@ -101,6 +116,9 @@ pub(super) fn read(
                 _ => Vec2::ZERO,
             });
             broken_uvs += usize::from(!uv.is_finite());
+            if let Some(colors) = &colors {
+                piece_colors.push(vec3(colors.get(vertex as usize).get(..3).unwrap_or_default()));
+            }
             Vertex {
                 position: vec3(points.get(vertex as usize)),
                 normal: normal.try_normalize().unwrap_or(Vec3::ZERO),
@@ -116,7 +134,25 @@ pub(super) fn read(
         let message = format!("{broken_uvs} texture coordinates are not finite; set to 0");
         warnings.push(WarningKind::Repaired, location, message);
     }
-    Ok(Some(finish(builder.mesh, location, warnings)))
+    Ok(Some(Piece { mesh: finish(builder.mesh, location, warnings), colors: piece_colors, skinned }))
+}
+
+/// The colours of the vertices, if there are usable ones.
+fn colors(
+    document: &mut Document,
+    primitive: &Primitive,
+    location: &str,
+    vertices: usize,
+    warnings: &mut Warnings,
+) -> Option<Elements> {
+    let accessor = primitive.attributes.get(&Checked::Valid(Semantic::Colors(0))).copied()?;
+    let problem = match read_any(document, accessor.value(), &[Type::Vec3, Type::Vec4], warnings) {
+        Ok(elements) if elements.len() >= vertices => return Some(elements),
+        Ok(elements) => format!("COLOR_0 has {} elements for {vertices} vertices", elements.len()),
+        Err(fault) => format!("COLOR_0: {}: {}", fault.location, fault.what),
+    };
+    warnings.push(WarningKind::Repaired, location, format!("{problem}; done without"));
+    None
 }
 
 /// A vertex. A zero normal means that the normal is missing.
@@ -162,12 +198,14 @@ fn vec3(values: &[f32]) -> Vec3 {
 }
 
 /// Warns of the parts of a primitive that are not used.
-fn mention_unused(primitive: &Primitive, location: &str, warnings: &mut Warnings) {
-    if primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
+fn mention_unused(primitive: &Primitive, location: &str, deformation: &Deformation, warnings: &mut Warnings) {
+    let morphs = primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty());
+    if morphs && deformation.weights.iter().all(|weight| *weight == 0.0) {
         warnings.push(WarningKind::Ignored, location, "its morph targets; the plant stands in its base shape");
     }
-    if primitive.attributes.keys().any(|key| matches!(key, Checked::Valid(Semantic::Colors(_)))) {
-        warnings.push(WarningKind::Ignored, location, "its vertex colours; colour comes from the material");
+    let more = |key: &Checked<Semantic>| matches!(key, Checked::Valid(Semantic::Colors(set)) if *set > 0);
+    if primitive.attributes.keys().any(more) {
+        warnings.push(WarningKind::Ignored, location, "its second set of vertex colours");
     }
 }
 

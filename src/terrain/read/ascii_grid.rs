@@ -3,11 +3,14 @@
 
 use glam::DVec2;
 
-use super::{Grid, Raster, Source, Window};
+use super::{Grid, Raster, Source, Window, sentinels, side_files};
 use crate::terrain::{CoordinateSystem, MAX_SAMPLES, TerrainError, Warning};
 
 const KEYS: [&str; 10] =
     ["ncols", "nrows", "xllcorner", "xllcenter", "yllcorner", "yllcenter", "cellsize", "dx", "dy", "nodata_value"];
+
+/// The mark of missing data of a header without NODATA_value.
+const DEFAULT_MISSING: f64 = -9999.0;
 
 /// Maximum size of a text in bytes. It is held in memory as a whole.
 const MAX_TEXT: u64 = 4 << 30;
@@ -27,10 +30,11 @@ pub(super) fn read(source: &Source) -> Result<Raster, TerrainError> {
     let text = source.all()?;
     let mut words = Words::new(&text);
     let header = Header::read(source, &mut words)?;
-    let (grid, missing) = (header.grid(source)?, header.missing);
+    // The format's page says that the key is optional and its default is -9999.
+    let (grid, missing) = (header.grid(source)?, header.missing.or(Some(DEFAULT_MISSING)));
     let window = source.window(&grid)?;
-    let (system, warning) = match source.options.coordinate_system {
-        Some(system) => (system, None),
+    let (system, warning) = match source.options.coordinate_system.or_else(|| side_files::system(source)) {
+        Some(system) => (system, Warning::place_unknown(system)),
         None => {
             let far = grid.position(grid.columns - 1, grid.rows - 1);
             let degrees = grid.step.max_element() < 0.1
@@ -39,8 +43,13 @@ pub(super) fn read(source: &Source) -> Result<Raster, TerrainError> {
             (system, Some(Warning::AssumedCoordinates { degrees }))
         }
     };
-    let heights = read_heights(source, &mut words, &grid, &window, missing)?;
-    Ok(Raster { grid, window, system, heights, warnings: warning.into_iter().collect() })
+    let mut heights = read_heights(source, &mut words, &grid, &window, missing)?;
+    let mut warnings: Vec<Warning> = warning.into_iter().collect();
+    warnings.extend(sentinels::remove(&mut heights));
+    if let Some(metres) = system.metres_per_height_unit().filter(|metres| *metres != 1.0) {
+        heights.iter_mut().for_each(|height| *height = (f64::from(*height) * metres) as f32);
+    }
+    Ok(Raster { grid, window, system, heights, warnings })
 }
 
 fn read_heights(

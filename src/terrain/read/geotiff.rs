@@ -2,15 +2,23 @@
 
 mod directory;
 mod keys;
+mod metadata;
+mod overlay;
 
 use glam::DVec2;
 use tiff::ColorType;
 use tiff::decoder::{ChunkType, Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
 
-use super::{Grid, Input, Raster, Source, Window};
-use crate::terrain::{MAX_SAMPLES, TerrainError};
+use super::{Grid, Input, Raster, Source, Window, sentinels, side_files};
+use crate::terrain::{MAX_SAMPLES, TerrainError, Warning};
+use directory::Directory;
 use keys::GeoKeys;
+use metadata::BandMetadata;
+use overlay::Overlay;
+
+/// The text in which GDAL keeps scale, offset and unit.
+const GDAL_METADATA: Tag = Tag::Unknown(42112);
 
 /// Maximum decoded size of a strip or tile in bytes.
 const MAX_CHUNK: usize = 1 << 30;
@@ -27,17 +35,22 @@ pub(super) fn recognises(start: &[u8]) -> bool {
 }
 
 pub(super) fn read(source: &Source) -> Result<Raster, TerrainError> {
-    directory::check(source)?;
+    let directory = Directory::read(source)?;
+    let mut plain = source.open()?;
+    let bands = Bands::of(&directory, &mut plain);
+    let mask = mask_of(&directory, &mut plain);
+    let images: Vec<usize> = std::iter::once(0).chain(mask).collect();
+    let overlay = Overlay::new(source, &directory, &images)?;
     let mut limits = Limits::default();
     limits.decoding_buffer_size = MAX_CHUNK;
     limits.intermediate_buffer_size = MAX_CHUNK;
     limits.ifd_value_size = MAX_TAG;
-    let mut decoder = Decoder::new(source.open()?)
-        .map_err(|error| source.malformed("TIFF directory", error, FETCH))?
-        .with_limits(limits);
+    let mut decoder =
+        Decoder::new(overlay).map_err(|error| source.malformed("TIFF directory", error, FETCH))?.with_limits(limits);
     let (columns, rows) = decoder.dimensions().map_err(|error| source.malformed("TIFF directory", error, FETCH))?;
     let colour = decoder.colortype().map_err(|error| source.malformed("TIFF directory", error, FETCH))?;
-    if !matches!(colour, ColorType::Gray(_)) {
+    let with_alpha = bands.alpha && matches!(colour, ColorType::Multiband { num_samples: 2, .. });
+    if !(matches!(colour, ColorType::Gray(_)) || with_alpha) {
         return Err(source.unsupported(
             format!("the samples are {colour:?}, not one band of heights"),
             "pick the band with the heights: `gdal_translate -b 1 IN OUT.tif`",
@@ -48,35 +61,131 @@ pub(super) fn read(source: &Source) -> Result<Raster, TerrainError> {
     let (grid, south_up) = read_grid(source, &mut decoder, columns, rows, keys.point)?;
     let window = source.window(&grid)?;
     let missing = read_missing(&mut decoder);
+    let metadata = read_text(&mut decoder, GDAL_METADATA).map(|text| BandMetadata::parse(&text)).unwrap_or_default();
     // Rows are stored from the north or, rarely, from the south.
     let stored = if south_up { Window { row: rows - window.row - window.rows, ..window } } else { window };
-    let mut heights = read_samples(source, &mut decoder, columns, rows, &stored, missing)?;
+    let band = |band: usize| Plane { columns, rows, window: stored, bands: bands.stored(band) };
+    let mut heights = read_samples(source, &mut decoder, &band(0), missing)?;
+    let mut warnings = keys.warnings;
+    let mut hidden = 0;
+    if with_alpha {
+        let alpha = read_samples(source, &mut decoder, &band(1), None)?;
+        hidden += hide(&mut heights, &alpha);
+    }
+    if let Some(image) = mask {
+        let plane = Plane { bands: Bands::default(), ..band(0) };
+        let read = decoder
+            .seek_to_image(image)
+            .map_err(|error| error.to_string())
+            .and_then(|()| read_samples(source, &mut decoder, &plane, None).map_err(|error| error.to_string()));
+        match read {
+            Ok(shown) => hidden += hide(&mut heights, &shown),
+            Err(problem) => warnings.push(Warning::MaskUnread { problem }),
+        }
+    }
+    if hidden > 0 {
+        warnings.push(Warning::Masked { count: hidden });
+    }
     if south_up {
         let top_down: Vec<f32> = heights.chunks_exact(window.columns).rev().flatten().copied().collect();
         heights = top_down;
     }
-    for height in &mut heights {
-        *height = (f64::from(*height) * keys.metres_per_height_unit) as f32;
+    warnings.extend(sentinels::remove(&mut heights));
+    let stated = metadata.unit.as_deref().map(|unit| (unit, metadata::metres_of(unit)));
+    if let Some((unit, None)) = stated {
+        warnings.push(Warning::UnknownHeightUnit { unit: unit.to_owned() });
     }
-    Ok(Raster { grid, window, system: keys.system, heights, warnings: keys.warnings })
+    let metres = stated.and_then(|(_, metres)| metres).or(keys.metres_per_height_unit).unwrap_or(1.0);
+    let (factor, offset) = (metadata.scale * metres, metadata.offset * metres);
+    for height in &mut heights {
+        *height = (f64::from(*height) * factor + offset) as f32;
+    }
+    if metadata.scale != 1.0
+        || metadata.offset != 0.0
+        || stated.is_some_and(|(_, metres)| metres.is_some_and(|m| m != 1.0))
+    {
+        warnings.push(Warning::HeightsConverted { factor, offset, unit: metadata.unit });
+    }
+    Ok(Raster { grid, window, system: keys.system, heights, warnings })
+}
+
+/// How the bands of a raster are stored.
+#[derive(Clone, Copy, Debug)]
+struct Bands {
+    /// Samples of a pixel.
+    count: usize,
+    /// Which of them is meant.
+    index: usize,
+    /// Whether each band has strips or tiles of its own.
+    apart: bool,
+    /// Whether the second of two is an alpha band.
+    alpha: bool,
+}
+
+impl Default for Bands {
+    /// One band.
+    fn default() -> Self {
+        Self { count: 1, index: 0, apart: false, alpha: false }
+    }
+}
+
+impl Bands {
+    fn of(directory: &Directory, input: &mut Input) -> Self {
+        let count = directory.value(input, 0, 277).unwrap_or(1);
+        let extra = directory.values(input, 0, 338);
+        Self {
+            count: usize::try_from(count).unwrap_or(1).max(1),
+            index: 0,
+            apart: directory.value(input, 0, 284) == Some(2),
+            alpha: count == 2 && matches!(extra.last(), Some(1 | 2)),
+        }
+    }
+
+    /// The band `index`.
+    fn stored(self, index: usize) -> Self {
+        Self { index, ..self }
+    }
+}
+
+/// The image that is the mask of the first one, if there is one: marked as such, and of its size.
+fn mask_of(directory: &Directory, input: &mut Input) -> Option<usize> {
+    let mut value = |image: usize, tag: u16| directory.value(input, image, tag);
+    let size = (value(0, 256)?, value(0, 257)?);
+    (1..directory.images.len()).find(|image| {
+        let kind = value(*image, 254).unwrap_or(0);
+        // Bit 2: a mask; bit 0: of a smaller copy.
+        kind & 4 != 0 && kind & 1 == 0 && (value(*image, 256), value(*image, 257)) == (Some(size.0), Some(size.1))
+    })
+}
+
+/// Makes holes of the heights where `shown` is 0 or missing; the number of those that were none before.
+fn hide(heights: &mut [f32], shown: &[f32]) -> usize {
+    let mut hidden = 0;
+    for (height, shown) in heights.iter_mut().zip(shown) {
+        if !(*shown > 0.0) && !height.is_nan() {
+            *height = f32::NAN;
+            hidden += 1;
+        }
+    }
+    hidden
 }
 
 /// The positions of the samples [OGC 19-008r4, 7.4, "Raster to model coordinate transformation"], and whether the rows
 /// run from south to north.
 fn read_grid(
     source: &Source,
-    decoder: &mut Decoder<Input>,
+    decoder: &mut Decoder<Overlay>,
     columns: usize,
     rows: usize,
     point: bool,
 ) -> Result<(Grid, bool), TerrainError> {
     // A sample lies in the middle of its cell, unless the file says that the raster consists of points.
     let middle = if point { 0.0 } else { 0.5 };
-    let numbers = |decoder: &mut Decoder<Input>, tag| {
+    let numbers = |decoder: &mut Decoder<Overlay>, tag| {
         decoder.find_tag(tag).ok().flatten().and_then(|value| value.into_f64_vec().ok())
     };
     let (origin, step) = if let Some(m) = numbers(decoder, Tag::ModelTransformationTag).filter(|m| m.len() >= 8) {
-        if m[1] != 0.0 || m[4] != 0.0 {
+        if !side_files::is_straight([m[0], m[1], m[4], m[5]]) {
             return Err(source.unsupported(
                 "the raster is rotated against its coordinates",
                 "turn it to the north: `gdalwarp IN OUT.tif`",
@@ -87,17 +196,35 @@ fn read_grid(
         let scale = numbers(decoder, Tag::ModelPixelScaleTag).filter(|scale| scale.len() >= 2);
         let tie = numbers(decoder, Tag::ModelTiepointTag).filter(|tie| tie.len() >= 6);
         let (Some(scale), Some(tie)) = (scale, tie) else {
+            if let Some((first, step)) = side_files::world(source) {
+                // A world file names the middle of the first cell.
+                let step = DVec2::new(step.x, -step.y);
+                let origin = first - DVec2::new(middle, -middle) * step;
+                return placed(source, origin, step, middle, columns, rows);
+            }
             return Err(TerrainError::UnknownCoordinateSystem {
                 path: source.path.to_owned(),
                 problem:
-                    "the TIFF has no ModelPixelScale and ModelTiepoint and no ModelTransformation, so it has no place \
-                          and no spacing; `gdal_edit.py -a_ullr <west> <north> <east> <south> FILE` adds them"
+                    "the TIFF has no ModelPixelScale and ModelTiepoint, no ModelTransformation and no world file \
+                          (.tfw) beside it, so it has no place and no spacing; `gdal_edit.py -a_ullr <west> <north> <east> <south> FILE` adds them"
                         .into(),
             });
         };
         let step = DVec2::new(scale[0], scale[1]);
         (DVec2::new(tie[3], tie[4]) + DVec2::new(-tie[0], tie[1]) * step, step)
     };
+    placed(source, origin, step, middle, columns, rows)
+}
+
+/// The grid of a raster whose first cell begins at `origin`, with `step` to the east and to the south.
+fn placed(
+    source: &Source,
+    origin: DVec2,
+    step: DVec2,
+    middle: f64,
+    columns: usize,
+    rows: usize,
+) -> Result<(Grid, bool), TerrainError> {
     let usable =
         origin.is_finite() && step.is_finite() && step.x > 0.0 && step.y != 0.0 && origin.abs().max_element() < 1e12;
     if !usable {
@@ -115,21 +242,34 @@ fn read_grid(
     Ok((Grid { columns, rows, first, step: step.abs() }, south_up))
 }
 
+/// The text of a tag.
+fn read_text(decoder: &mut Decoder<Overlay>, tag: Tag) -> Option<String> {
+    decoder.find_tag(tag).ok().flatten()?.into_string().ok()
+}
+
 /// The value that marks missing data. GDAL writes it as text.
-fn read_missing(decoder: &mut Decoder<Input>) -> Option<f64> {
-    let text = decoder.find_tag(Tag::GdalNodata).ok().flatten()?.into_string().ok()?;
+fn read_missing(decoder: &mut Decoder<Overlay>) -> Option<f64> {
+    let text = read_text(decoder, Tag::GdalNodata)?;
     text.trim_matches(|c: char| c.is_whitespace() || c == '\0').parse().ok()
+}
+
+/// What is to be read of an image.
+#[derive(Clone, Copy, Debug)]
+struct Plane {
+    columns: usize,
+    rows: usize,
+    window: Window,
+    bands: Bands,
 }
 
 /// Decodes the strips or tiles that overlap a window.
 fn read_samples(
     source: &Source,
-    decoder: &mut Decoder<Input>,
-    columns: usize,
-    rows: usize,
-    window: &Window,
+    decoder: &mut Decoder<Overlay>,
+    plane: &Plane,
     missing: Option<f64>,
 ) -> Result<Vec<f32>, TerrainError> {
+    let Plane { columns, rows, window, bands } = *plane;
     let broken = |error: tiff::TiffError| source.malformed("TIFF directory", error, FETCH);
     let tiled = decoder.get_chunk_type() == ChunkType::Tile;
     // The decoder's own functions for this panic if the directory contradicts itself.
@@ -145,6 +285,9 @@ fn read_samples(
         return Err(source.malformed("TIFF directory", format!("tiles of {chunk_columns} x {chunk_rows}"), FETCH));
     }
     let across = columns.div_ceil(chunk_columns);
+    // Bands apart have their strips or tiles one after the other; otherwise the samples of a pixel stand together.
+    let before = if bands.apart { bands.index * across * rows.div_ceil(chunk_rows) } else { 0 };
+    let (together, band) = if bands.apart { (1, 0) } else { (bands.count, bands.index) };
     let tag = if tiled { Tag::TileByteCounts } else { Tag::StripByteCounts };
     let sizes: Vec<u64> = decoder.find_tag_unsigned_vec(tag).map_err(broken)?.unwrap_or_default();
     let chunk_range = |from: usize, count: usize, size: usize| from / size..(from + count).div_ceil(size);
@@ -152,18 +295,25 @@ fn read_samples(
     let down_range = chunk_range(window.row, window.rows, chunk_rows);
 
     // Before allocating: can the stored bytes hold the requested samples at all?
-    let mut stored = 0_u64;
+    let (mut stored, mut wanted) = (0_u64, 0_u64);
     for down in down_range.clone() {
         for column in across_range.clone() {
-            let index = down * across + column;
+            let index = before + down * across + column;
             let Some(size) = sizes.get(index) else {
                 let problem = format!("strip or tile {index} is missing");
                 return Err(source.malformed("TIFF directory", problem, FETCH));
             };
             stored = stored.saturating_add(*size);
+            // A tile without bytes is empty and takes none.
+            if *size > 0 {
+                let overlap = |from: usize, count: usize, start: usize, size: usize| {
+                    (from + count).min(start + size).saturating_sub(from.max(start)) as u64
+                };
+                wanted += overlap(window.column, window.columns, column * chunk_columns, chunk_columns)
+                    * overlap(window.row, window.rows, down * chunk_rows, chunk_rows);
+            }
         }
     }
-    let wanted = (window.columns * window.rows) as u64;
     if wanted > stored.min(source.length).saturating_mul(MAX_EXPANSION) {
         return Err(source.malformed(
             "TIFF directory",
@@ -175,7 +325,7 @@ fn read_samples(
     let mut heights = vec![f32::NAN; window.columns * window.rows];
     for down in down_range {
         for column in across_range.clone() {
-            let index = down * across + column;
+            let index = before + down * across + column;
             // A tile without bytes: GDAL omits tiles in which all data are missing.
             if sizes[index] == 0 {
                 continue;
@@ -190,14 +340,22 @@ fn read_samples(
             }
             let number = u32::try_from(index).map_err(|error| source.malformed(at(), error, FETCH))?;
             let samples = decoder.read_chunk(number).map_err(|error| {
-                let remedy = format!(
-                    "{FETCH}; if its compression is the trouble: `gdal_translate -co COMPRESS=DEFLATE IN OUT.tif`"
-                );
-                source.malformed(at(), error, remedy)
+                let anew = "write it anew: `gdal_translate -co COMPRESS=DEFLATE -co PREDICTOR=1 IN OUT.tif`";
+                match error {
+                    // A sound file may use what is not read here.
+                    tiff::TiffError::UnsupportedError(what) => {
+                        source.unsupported(format!("{}: {what} (the file may be sound)", at()), anew)
+                    }
+                    error => source.malformed(at(), error, format!("{FETCH}, or {anew}")),
+                }
             })?;
             // The decoder crops strips and tiles at the border of the image.
             let samples = Samples { values: samples, missing };
-            if samples.len() < width * height {
+            // One bit a pixel, each row in whole bytes: a mask.
+            let bits = bits_of(decoder) == Some(1) && together == 1;
+            let row_bytes = width.div_ceil(8);
+            let expected = if bits { row_bytes * height } else { width * height * together };
+            if samples.len() < expected {
                 return Err(source.malformed(
                     at(),
                     format!("{} samples instead of {width} x {height}", samples.len()),
@@ -207,12 +365,26 @@ fn read_samples(
             for y in top.max(window.row)..(top + height).min(window.row + window.rows) {
                 for x in left.max(window.column)..(left + width).min(window.column + window.columns) {
                     let target = (y - window.row) * window.columns + x - window.column;
-                    heights[target] = samples.get((y - top) * width + x - left);
+                    let (row, column) = (y - top, x - left);
+                    heights[target] = if bits {
+                        let byte = samples.get(row * row_bytes + column / 8) as u8;
+                        f32::from(byte >> (7 - column % 8) & 1)
+                    } else {
+                        samples.get((row * width + column) * together + band)
+                    };
                 }
             }
         }
     }
     Ok(heights)
+}
+
+/// Bits of a sample.
+fn bits_of(decoder: &mut Decoder<Overlay>) -> Option<u8> {
+    match decoder.colortype().ok()? {
+        ColorType::Gray(bits) => Some(bits),
+        _ => None,
+    }
 }
 
 /// Decoded samples of any type, read as heights.

@@ -3,21 +3,22 @@
 
 use glam::DVec2;
 
-use super::{Grid, Raster, Source};
+use super::{Grid, Raster, Source, sentinels};
 use crate::terrain::{CoordinateSystem, TerrainError};
 
-/// Samples along a side, for three arc-seconds and for one. Neighbouring files share the samples on their border.
-const SIDES: [usize; 2] = [1201, 3601];
+/// Columns and rows, for three arc-seconds, for one, for half a one, and for one beyond 50 degrees of latitude, where the
+/// columns are two apart. Neighbouring files share the samples on their border.
+const SIZES: [(usize, usize); 4] = [(1201, 1201), (3601, 3601), (7201, 7201), (1801, 3601)];
 /// The value that marks missing data.
 const VOID: i16 = i16::MIN;
 
 /// Whether a file has the size of an `.hgt` file. There is no header.
 pub(super) fn recognises(length: u64) -> bool {
-    side(length).is_some()
+    size(length).is_some()
 }
 
-fn side(length: u64) -> Option<usize> {
-    SIDES.into_iter().find(|side| (side * side * 2) as u64 == length)
+fn size(length: u64) -> Option<(usize, usize)> {
+    SIZES.into_iter().find(|(columns, rows)| (columns * rows * 2) as u64 == length)
 }
 
 pub(super) fn read(source: &Source) -> Result<Raster, TerrainError> {
@@ -29,22 +30,23 @@ pub(super) fn read(source: &Source) -> Result<Raster, TerrainError> {
         });
     };
     let bytes = source.all()?;
-    let Some(side) = side(bytes.len() as u64) else {
+    let Some((columns, rows)) = size(bytes.len() as u64) else {
         return Err(source.malformed("end of file", "the size has changed while reading", "read it again"));
     };
-    let step = 1.0 / (side - 1) as f64;
-    let grid = Grid { columns: side, rows: side, first: DVec2::new(west, south + 1.0), step: DVec2::splat(step) };
+    let step = DVec2::new(1.0 / (columns - 1) as f64, 1.0 / (rows - 1) as f64);
+    let grid = Grid { columns, rows, first: DVec2::new(west, south + 1.0), step };
     let window = source.window(&grid)?;
     let mut heights = Vec::with_capacity(window.columns * window.rows);
     for row in window.row..window.row + window.rows {
-        let line = &bytes[(row * side + window.column) * 2..][..window.columns * 2];
+        let line = &bytes[(row * columns + window.column) * 2..][..window.columns * 2];
         heights.extend(line.chunks_exact(2).map(|pair| match i16::from_be_bytes([pair[0], pair[1]]) {
             VOID => f32::NAN,
             height => f32::from(height),
         }));
     }
     let system = source.options.coordinate_system.unwrap_or(CoordinateSystem::Geographic);
-    Ok(Raster { grid, window, system, heights, warnings: Vec::new() })
+    let warnings = sentinels::remove(&mut heights);
+    Ok(Raster { grid, window, system, heights, warnings })
 }
 
 /// Latitude and longitude of the south-west sample, from a name such as `N36W085.hgt`.

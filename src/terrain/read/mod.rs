@@ -2,15 +2,17 @@
 //!
 //! | format | horizontal system | heights |
 //! |---|---|---|
-//! | GeoTIFF, BigTIFF | from its GeoKeys: degrees, UTM, any projection in metres or feet | 8 to 64 bit integers and floats, one band |
-//! | ESRI ASCII grid | none in the file: local metres, or degrees if the numbers look like it | text |
-//! | SRTM `.hgt` | degrees, from the file's name (`N36W085.hgt`) | 16 bit, 1201² or 3601² |
+//! | GeoTIFF, BigTIFF | from its GeoKeys, or the `.tfw` and `.prj` beside it: degrees, UTM, national systems by EPSG code, any projection in metres or feet | 8 to 64 bit integers and floats, one band and its alpha or mask, scale, offset and unit of GDAL |
+//! | ESRI ASCII grid | from the `.prj` beside it, else local metres, or degrees if the numbers look like it | text |
+//! | SRTM `.hgt` | degrees, from the file's name (`N36W085.hgt`) | 16 bit, 1201², 3601², 7201² or 1801 x 3601 |
 //! | PNG, 16 bit greyscale | metres from [`ReadOptions::image_scale`] | from the same |
 
 mod ascii_grid;
 mod geotiff;
 mod hgt;
 mod image;
+mod sentinels;
+mod side_files;
 
 use std::borrow::Cow;
 use std::fs::File;

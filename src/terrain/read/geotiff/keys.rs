@@ -3,8 +3,9 @@
 use tiff::decoder::Decoder;
 use tiff::tags::Tag;
 
-use super::super::{Input, Source};
-use crate::terrain::{CoordinateSystem, TerrainError, Warning};
+use super::super::{Source, side_files};
+use super::overlay::Overlay;
+use crate::terrain::{CoordinateSystem, SystemMap, TerrainError, Warning};
 
 const MODEL_TYPE: u16 = 1024;
 const RASTER_TYPE: u16 = 1025;
@@ -14,6 +15,7 @@ const PROJECTED_CRS: u16 = 3072;
 const PROJECTION: u16 = 3074;
 const LINEAR_UNITS: u16 = 3076;
 const LINEAR_UNIT_SIZE: u16 = 3077;
+const VERTICAL_CRS: u16 = 4096;
 const VERTICAL_UNITS: u16 = 4099;
 /// The value of a key that is described by other keys.
 const USER_DEFINED: u16 = 32767;
@@ -27,12 +29,13 @@ pub(super) struct GeoKeys {
     pub(super) system: CoordinateSystem,
     /// Whether the raster consists of points, not of cells.
     pub(super) point: bool,
-    pub(super) metres_per_height_unit: f64,
+    /// Metres per unit of the heights, if the keys state one.
+    pub(super) metres_per_height_unit: Option<f64>,
     pub(super) warnings: Vec<Warning>,
 }
 
 impl GeoKeys {
-    pub(super) fn read(source: &Source, decoder: &mut Decoder<Input>) -> Result<Self, TerrainError> {
+    pub(super) fn read(source: &Source, decoder: &mut Decoder<Overlay>) -> Result<Self, TerrainError> {
         let directory: Vec<u16> = decoder
             .find_tag_unsigned_vec(Tag::GeoKeyDirectoryTag)
             .map_err(|error| source.malformed("GeoKeyDirectory", error, super::FETCH))?
@@ -50,7 +53,11 @@ impl GeoKeys {
         let mut warnings = Vec::new();
         let system = match source.options.coordinate_system {
             Some(system) => system,
-            None => system_of(source, keys, &mut warnings)?,
+            None => match system_of(source, keys, &mut warnings) {
+                Ok(system) => system,
+                // The projection file beside it may know more.
+                Err(error) => side_files::system(source).ok_or(error)?,
+            },
         };
         if system == CoordinateSystem::Geographic
             && let Some(unit) = keys.short(ANGULAR_UNITS)
@@ -61,7 +68,14 @@ impl GeoKeys {
                 "bring it to degrees: `gdalwarp -t_srs EPSG:4326 IN OUT.tif`",
             ));
         }
-        let unit_of_heights = keys.short(VERTICAL_UNITS).and_then(metres_of_unit).unwrap_or(1.0);
+        let vertical = keys.short(VERTICAL_UNITS).filter(|unit| ![0, USER_DEFINED].contains(unit));
+        let unit_of_heights = vertical.and_then(metres_of_unit);
+        if let (Some(unit), None) = (vertical, unit_of_heights) {
+            warnings.push(Warning::UnknownHeightUnit { unit: format!("EPSG unit {unit}") });
+        }
+        let unit_of_heights = unit_of_heights
+            .or_else(|| keys.short(VERTICAL_CRS).and_then(metres_of_vertical_system))
+            .or_else(|| system.metres_per_height_unit());
         Ok(Self {
             system,
             point: keys.short(RASTER_TYPE) == Some(2),
@@ -113,19 +127,47 @@ fn projected_system(
         (None, Some(zone @ 16101..=16160)) => Some(CoordinateSystem::Utm { zone: (zone - 16100) as u8, south: true }),
         (None, _) => None,
     };
+    // A system of the file's own may be spelt out beside it.
+    if code.is_none()
+        && known.is_none()
+        && let Some(system @ (CoordinateSystem::Utm { .. } | CoordinateSystem::Projected { epsg: Some(_), .. })) =
+            side_files::system(source)
+    {
+        return Ok(system);
+    }
     match known {
         Some(system @ (CoordinateSystem::Utm { .. } | CoordinateSystem::WebMercator))
             if unit.is_none_or(|u| u == 1.0) =>
         {
             Ok(system)
         }
+        // The code of a system in degrees where one in metres belongs.
+        Some(CoordinateSystem::Geographic) => Ok(CoordinateSystem::Geographic),
         _ => {
-            if unit.is_none() {
+            let known_unit = match known {
+                Some(system @ CoordinateSystem::Projected { metres_per_unit, .. }) => {
+                    (SystemMap::new(system).is_some() || metres_per_unit != 1.0).then_some(metres_per_unit)
+                }
+                _ => None,
+            };
+            if unit.or(known_unit).is_none() {
                 warnings.push(Warning::AssumedMetres);
             }
-            warnings.push(Warning::PlaceUnknown { epsg: code });
-            Ok(CoordinateSystem::Projected { epsg: code, metres_per_unit: unit.unwrap_or(1.0) })
+            let system =
+                CoordinateSystem::Projected { epsg: code, metres_per_unit: unit.or(known_unit).unwrap_or(1.0) };
+            warnings.extend(Warning::place_unknown(system));
+            Ok(system)
         }
+    }
+}
+
+/// Metres per unit of the heights of a vertical system in feet [EPSG registry]; the others are in metres.
+fn metres_of_vertical_system(code: u16) -> Option<f64> {
+    match code {
+        5702 | 6358 | 6359 | 6360 | 8052 | 8053 | 8058 => Some(1200.0 / 3937.0),
+        5754 | 6130 | 6131 | 6132 | 8050 | 8051 | 8054 | 8228 => Some(0.3048),
+        0 | USER_DEFINED => None,
+        _ => Some(1.0),
     }
 }
 

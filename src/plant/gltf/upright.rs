@@ -1,0 +1,94 @@
+//! Which axis of a file points up.
+//!
+//! glTF demands y [glTF 2.0 specification, section 3.4]. Files that a program has written without turning them have z there,
+//! and the tree lies on its side.
+
+use std::collections::BTreeMap;
+
+use glam::Vec3;
+
+use super::error::{WarningKind, Warnings};
+use super::material::Surface;
+use super::{GltfOptions, Placed, UpAxis};
+use crate::plant::{PartKind, PlantMesh};
+
+/// Least and greatest corner of some parts; `None` if they have no vertices.
+pub(super) fn bounds<'a>(placed: impl Iterator<Item = &'a Placed>) -> Option<(Vec3, Vec3)> {
+    let mut positions = placed.flat_map(|placed| &placed.piece.mesh.positions);
+    let first = *positions.next()?;
+    Some(positions.fold((first, first), |(low, high), position| (low.min(*position), high.max(*position))))
+}
+
+/// Whether z is up: as the caller says, or because the tree stands on the plane z = 0 and lies around the plane y = 0.
+pub(super) fn up_is_z(
+    placed: &[Placed],
+    surfaces: &BTreeMap<Option<usize>, Surface>,
+    options: &GltfOptions,
+    warnings: &mut Warnings,
+) -> bool {
+    if let Some(up) = options.up {
+        return up == UpAxis::Z;
+    }
+    let Some((low, high)) = bounds(placed.iter()) else { return false };
+    if stands_along_z(low, high) {
+        let message = "the tree stands along z and is turned upright; the scene's `up: Z` says so without this warning, `up: Y` \
+                       keeps it as it is";
+        warnings.push(WarningKind::Repaired, "", message);
+        return true;
+    }
+    if seems_to_lie(placed, surfaces) {
+        let message = "the trunk lies along z: if the tree is modelled with z up, state `up: Z`";
+        warnings.push(WarningKind::Missing, "", message);
+    }
+    false
+}
+
+/// Whether a tree between these corners stands on the plane z = 0, while a quarter of it and more would be below y = 0.
+fn stands_along_z(low: Vec3, high: Vec3) -> bool {
+    let size = high - low;
+    let around_zero = low.y < -0.25 * size.y && high.y > 0.25 * size.y;
+    around_zero && low.z > -0.06 * size.z && low.z < 0.06 * size.z && size.z > 0.6 * size.y.max(size.x)
+}
+
+/// Whether the end of the wood that is farthest from the leaves lies beside them in z, not below.
+fn seems_to_lie(placed: &[Placed], surfaces: &BTreeMap<Option<usize>, Surface>) -> bool {
+    let of = |kind: PartKind| {
+        let is = move |placed: &&Placed| surfaces.get(&placed.material).is_some_and(|surface| surface.kind == kind);
+        placed.iter().filter(is).flat_map(|placed| &placed.piece.mesh.positions)
+    };
+    let mean = |positions: &mut dyn Iterator<Item = Vec3>| {
+        let (sum, count) = positions.fold((glam::DVec3::ZERO, 0.0), |(sum, n), p| (sum + p.as_dvec3(), n + 1.0));
+        (count > 0.0).then(|| (sum / count).as_vec3())
+    };
+    let Some(leaves) = mean(&mut of(PartKind::Foliage).copied()) else { return false };
+    let farthest = of(PartKind::Wood).map(|position| position.distance(leaves)).fold(0.0, f32::max);
+    let far = |position: &&Vec3| position.distance(leaves) > 0.95 * farthest;
+    let Some(end) = mean(&mut of(PartKind::Wood).filter(far).copied()) else { return false };
+    let spread = of(PartKind::Wood).filter(far).map(|position| position.distance(end)).fold(0.0, f32::max);
+    let along = leaves - end;
+    // One end, not several branches around.
+    spread < 0.3 * farthest && along.z > 3.0 * along.y.abs() && along.z > 3.0 * along.x.abs()
+}
+
+/// Turns a mesh with z up: what was up along z is up along y, to the east stays to the east.
+pub(super) fn turn(mesh: &mut PlantMesh) {
+    for vector in mesh.positions.iter_mut().chain(&mut mesh.normals) {
+        *vector = Vec3::new(vector.x, vector.z, -vector.y);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn trees_along_z_are_known() {
+        assert!(stands_along_z(Vec3::new(-2.7, -2.9, 0.0), Vec3::new(6.4, 2.9, 10.1)));
+        assert!(stands_along_z(Vec3::new(-3.0, -3.0, -0.2), Vec3::new(3.0, 3.0, 5.0)));
+        // Upright, with roots; centred on the origin; a bush; a flat picture.
+        assert!(!stands_along_z(Vec3::new(-3.0, -0.3, -3.0), Vec3::new(3.0, 10.0, 3.0)));
+        assert!(!stands_along_z(Vec3::new(-3.0, -5.0, -3.0), Vec3::new(3.0, 5.0, 3.0)));
+        assert!(!stands_along_z(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 1.0, 1.0)));
+        assert!(!stands_along_z(Vec3::new(-1.0, -1.0, 0.0), Vec3::new(1.0, 1.0, 0.0)));
+    }
+}

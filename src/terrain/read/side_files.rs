@@ -1,0 +1,147 @@
+//! Files beside a raster: the world file (`.tfw`) with its place, and the projection (`.prj`) with its coordinate system.
+
+use std::path::PathBuf;
+
+use glam::DVec2;
+
+use super::Source;
+use crate::terrain::CoordinateSystem;
+use crate::terrain::projection::{self, Kind};
+
+/// Largest side file that is read, in bytes.
+const LARGEST: u64 = 64 << 10;
+
+/// The text of the first of these files that exists beside the raster.
+fn text(source: &Source, endings: &[&str]) -> Option<(PathBuf, String)> {
+    // Bytes in memory have no neighbours.
+    if source.bytes.is_some() {
+        return None;
+    }
+    let whole = source.path.as_os_str().to_owned();
+    endings.iter().find_map(|ending| {
+        let replaced = source.path.with_extension(ending);
+        let mut appended = whole.clone();
+        appended.push(".");
+        appended.push(ending);
+        [replaced, PathBuf::from(appended)].into_iter().filter(|path| path != source.path).find_map(|path| {
+            let small = std::fs::metadata(&path).is_ok_and(|found| found.is_file() && found.len() <= LARGEST);
+            let bytes = small.then(|| std::fs::read(&path).ok()).flatten()?;
+            Some((path, String::from_utf8_lossy(&bytes).into_owned()))
+        })
+    })
+}
+
+/// Position of the north-western sample and the distance between samples (to the east, to the north: mostly negative) from a
+/// world file: six numbers, of which the second and third are rotations.
+pub(super) fn world(source: &Source) -> Option<(DVec2, DVec2)> {
+    let (_, text) = text(source, &["tfw", "TFW", "tifw", "tiffw", "wld", "pgw", "jgw"])?;
+    let numbers: Vec<f64> =
+        text.split_whitespace().map(|word| word.replace(',', ".").parse().ok()).collect::<Option<_>>()?;
+    match *numbers.as_slice() {
+        [width, a, b, height, x, y] if is_straight([width, a, b, height]) => {
+            Some((DVec2::new(x, y), DVec2::new(width, height)))
+        }
+        _ => None,
+    }
+}
+
+/// Whether the rotation terms of a transformation are nothing but rounding.
+pub(super) fn is_straight([width, a, b, height]: [f64; 4]) -> bool {
+    a.abs() <= 1e-6 * width.abs() && b.abs() <= 1e-6 * height.abs()
+}
+
+/// The coordinate system that a `.prj` file states, if it is understood.
+pub(super) fn system(source: &Source) -> Option<CoordinateSystem> {
+    let (_, text) = text(source, &["prj", "PRJ"])?;
+    of_wkt(&text)
+}
+
+/// The system of a text in WKT or in the words of PROJ.4.
+pub(super) fn of_wkt(text: &str) -> Option<CoordinateSystem> {
+    let text = text.trim();
+    if text.starts_with("+proj") {
+        return of_definition(text);
+    }
+    // The code of the system itself is the last authority.
+    if let Some(code) = authority(text)
+        && let Some(system) = CoordinateSystem::from_epsg(code)
+    {
+        return Some(system);
+    }
+    if text.contains("Mercator_Auxiliary_Sphere") || text.contains("Pseudo-Mercator") {
+        return Some(CoordinateSystem::WebMercator);
+    }
+    of_definition(&proj4wkt::wkt_to_projstring(&with_known_methods(text)).ok()?)
+}
+
+/// The text with the names of EPSG for the methods that ArcGIS names otherwise.
+fn with_known_methods(text: &str) -> String {
+    let two = text.to_ascii_lowercase().contains("standard_parallel_2");
+    let conic = if two { "Lambert_Conformal_Conic_2SP\"" } else { "Lambert_Conformal_Conic_1SP\"" };
+    text.replace("Lambert_Conformal_Conic\"", conic)
+        .replace("Gauss_Kruger\"", "Transverse_Mercator\"")
+        .replace("Double_Stereographic\"", "Oblique_Stereographic\"")
+        .replace("\"Albers\"", "\"Albers_Conic_Equal_Area\"")
+}
+
+fn of_definition(text: &str) -> Option<CoordinateSystem> {
+    Some(match projection::kind_of_definition(text)? {
+        Kind::Geographic => CoordinateSystem::Geographic,
+        Kind::Geocentric => return None,
+        Kind::Utm { zone, south } => CoordinateSystem::Utm { zone, south },
+        Kind::Projected { metres_per_unit } => {
+            CoordinateSystem::Projected { epsg: projection::code_of(text), metres_per_unit }
+        }
+    })
+}
+
+/// The EPSG code at the end of a WKT: `AUTHORITY["EPSG","2154"]]` or `ID["EPSG",2154]]`.
+fn authority(text: &str) -> Option<u32> {
+    let end = text.trim_end_matches(|c: char| c == ']' || c.is_whitespace());
+    let start = end.rfind("AUTHORITY[").max(end.rfind("ID["))?;
+    let inside = end.get(start..)?;
+    // Nothing but the code may follow.
+    let code = inside.to_ascii_uppercase();
+    if !code.contains("\"EPSG\"") || inside.matches('[').count() != 1 {
+        return None;
+    }
+    code.rsplit(',').next()?.trim().trim_matches('"').parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn systems_are_read_from_wkt() {
+        let esri_utm = "PROJCS[\"WGS_1984_UTM_Zone_33N\",GEOGCS[\"GCS_WGS_1984\",DATUM[\"D_WGS_1984\",SPHEROID[\"WGS_1984\",\
+                        6378137.0,298.257223563]],PRIMEM[\"Greenwich\",0.0],UNIT[\"Degree\",0.0174532925199433]],\
+                        PROJECTION[\"Transverse_Mercator\"],PARAMETER[\"False_Easting\",500000.0],PARAMETER[\
+                        \"False_Northing\",0.0],PARAMETER[\"Central_Meridian\",15.0],PARAMETER[\"Scale_Factor\",0.9996],\
+                        PARAMETER[\"Latitude_Of_Origin\",0.0],UNIT[\"Meter\",1.0]]";
+        assert_eq!(of_wkt(esri_utm), Some(CoordinateSystem::Utm { zone: 33, south: false }));
+        let lambert = "PROJCS[\"RGF_1993_Lambert_93\",GEOGCS[\"GCS_RGF_1993\",DATUM[\"D_RGF_1993\",SPHEROID[\"GRS_1980\",\
+                       6378137.0,298.257222101]],PRIMEM[\"Greenwich\",0.0],UNIT[\"Degree\",0.0174532925199433]],PROJECTION[\
+                       \"Lambert_Conformal_Conic\"],PARAMETER[\"False_Easting\",700000.0],PARAMETER[\"False_Northing\",\
+                       6600000.0],PARAMETER[\"Central_Meridian\",3.0],PARAMETER[\"Standard_Parallel_1\",49.0],PARAMETER[\
+                       \"Standard_Parallel_2\",44.0],PARAMETER[\"Latitude_Of_Origin\",46.5],UNIT[\"Meter\",1.0]]";
+        assert_eq!(of_wkt(lambert), Some(CoordinateSystem::Projected { epsg: Some(2154), metres_per_unit: 1.0 }));
+        let geographic = "GEOGCS[\"GCS_WGS_1984\",DATUM[\"D_WGS_1984\",SPHEROID[\"WGS_1984\",6378137,298.257223563]],PRIMEM[\
+                          \"Greenwich\",0],UNIT[\"Degree\",0.017453292519943295]]";
+        assert_eq!(of_wkt(geographic), Some(CoordinateSystem::Geographic));
+        let stated = "PROJCS[\"ETRS89 / UTM zone 32N\",GEOGCS[\"ETRS89\",AUTHORITY[\"EPSG\",\"4258\"]],AUTHORITY[\"EPSG\",\"25832\"]]";
+        assert_eq!(of_wkt(stated), Some(CoordinateSystem::Utm { zone: 32, south: false }));
+        assert_eq!(
+            of_wkt("PROJCRS[\"x\",ID[\"EPSG\",2154]]")
+                .map(|system| matches!(system, CoordinateSystem::Projected { epsg: Some(2154), .. })),
+            Some(true)
+        );
+        assert_eq!(of_wkt("nothing"), None);
+    }
+
+    #[test]
+    fn rounding_is_no_rotation() {
+        assert!(is_straight([10.0, 1e-16, -3e-9, -10.0]));
+        assert!(!is_straight([10.0, 0.1, 0.1, -10.0]));
+    }
+}
