@@ -19,9 +19,16 @@ fn text(bytes: &[u8]) -> String {
 
 #[test]
 fn help_and_version_succeed_and_show_examples() -> Outcome {
-    for arguments in
-        [&["--help"][..], &["fly", "--help"], &["render", "--help"], &["bake", "--help"], &["info", "--help"]]
-    {
+    for arguments in [
+        &["--help"][..],
+        &["fly", "--help"],
+        &["render", "--help"],
+        &["bake", "--help"],
+        &["compare", "--help"],
+        &["profile", "--help"],
+        &["tune", "--help"],
+        &["info", "--help"],
+    ] {
         let output = canopy(arguments)?;
         assert_eq!(code(&output), Some(0), "{arguments:?}");
         assert!(text(&output.stdout).contains("Examples:"), "{arguments:?}");
@@ -51,6 +58,14 @@ fn wrong_arguments_exit_with_2() -> Outcome {
         &["render", "s.ron", "--out", "a.png", "--out", "b.png"],
         &["render", "s.ron", "--out", "a", "--frames", "0"],
         &["render", "s.ron", "--out", "a", "--frames", "5", "--from", "2026-06-21T15:30Z"],
+        &["render", "s.ron", "--out", "a", "--frames", "5", "--chunk", "1"],
+        &["render", "s.ron", "--out", "a", "--frames", "5", "--chunk", "1/2", "--frames-only", "1"],
+        &["render", "s.ron", "--out", "a", "--frames", "5", "--frames-only", "3-1"],
+        &["render", "s.ron", "--out", "a.png", "--chunk", "1/2"],
+        &["compare", "a.png"],
+        &["tune", "s.ron"],
+        &["tune", "s.ron", "--budget", "8s"],
+        &["tune", "s.ron", "--budget", "8ms", "--error", "0.1"],
         &["fly", "--size", "x"],
         &["info"],
         &["bake", "oak.glb"],

@@ -5,6 +5,7 @@
 mod app;
 mod bake;
 mod cli;
+mod compare;
 mod front_door;
 mod fuzz;
 mod grow;
@@ -17,6 +18,7 @@ mod limits;
 mod load;
 mod math;
 mod plant;
+mod profile;
 mod reference;
 mod render;
 mod scatter;

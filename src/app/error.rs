@@ -31,6 +31,12 @@ pub enum AppError {
     /// The ground truth.
     #[error(transparent)]
     Reference(#[from] crate::reference::ReferenceError),
+    /// A comparison of images.
+    #[error(transparent)]
+    Compare(#[from] super::CompareError),
+    /// A profile.
+    #[error(transparent)]
+    Profile(#[from] super::ProfileError),
     /// An image that cannot be written.
     #[error("{}: {source}; choose a writable folder with --out", path.display())]
     Write {

@@ -12,6 +12,7 @@ use bevy::{
     ecs::{
         change_detection::{DetectChanges, Tick},
         entity::Entity,
+        world::World,
     },
     image::Image,
     log::{Level, LogPlugin},
@@ -35,12 +36,12 @@ use bevy::{
 use chrono::{DateTime, Utc};
 
 use super::{
-    Frame, RenderOptions, RenderPlan, RenderReport, adapter, camera, error::AppError, interrupt, notes::notes,
-    rendered_image::RenderedImage,
+    Frame, RenderOptions, RenderPlan, RenderReport, adapter, camera, error::AppError, fingerprint::fingerprint,
+    interrupt, notes::notes, rendered_image::RenderedImage,
 };
 use crate::{
     assets::Stage,
-    components::{Sun, SunRefresh},
+    components::{Shown, Sun, SunRefresh},
     files,
     plugin::CanopyPlugins,
     progress::Progress,
@@ -69,10 +70,15 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
     let stage = Stage::build_within(&scene, most_trees, progress).map_err(interrupt::building)?;
     let plan = RenderPlan::new(options, &stage.scene, &|x, z| stage.terrain.height(x, z))?;
     let mut report = RenderReport::default();
-    let finished = |frame: &Frame| {
-        options.resume
-            && RenderedImage::is_stored(&frame.file, options.size, &notes(&stage, &frame.view, frame.instant))
+    let scene_print = fingerprint(&stage.scene);
+    // An image of other settings, or of a scene whose files have changed since, is stale.
+    let notes_of = |frame: &Frame| {
+        let mut notes = notes(&stage, &frame.view, frame.instant);
+        notes.push(("Fingerprint", scene_print.clone()));
+        notes
     };
+    let finished =
+        |frame: &Frame| options.resume && RenderedImage::is_stored(&frame.file, options.size, &notes_of(frame));
     let wanted: Vec<bool> = plan.frames.iter().map(|frame| !finished(frame)).collect();
     let kept = wanted.iter().filter(|wanted| !*wanted).count();
     if kept > 0 {
@@ -84,7 +90,7 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
     }
     let started = Instant::now();
     progress.begin("Renderer", 0);
-    let mut renderer = Renderer::with_settings(settings, options.size, stage.scene.quality.msaa)?;
+    let mut renderer = Renderer::with_settings(settings, options.size, stage.scene.quality.msaa, |_| ())?;
     stage.check_device(renderer.app.world().resource::<RenderDevice>())?;
     renderer.show(&stage);
     progress.end();
@@ -102,7 +108,7 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
         let started = Instant::now();
         let picture = renderer.draw(&stage, &frame.view, frame.instant)?;
         let drawn = started.elapsed().as_secs_f64();
-        picture.save(&frame.file, &notes(&stage, &frame.view, frame.instant))?;
+        picture.save(&frame.file, &notes_of(frame))?;
         progress.note(&format!(
             "{}: drawn in {drawn:.2} s, written in {:.2} s",
             frame.file.display(),
@@ -143,6 +149,19 @@ fn interrupted(report: &RenderReport, total: usize) -> AppError {
 /// Time limit for shaders and pipelines; far more than they need on the slowest machine.
 const LONGEST_WAIT: Duration = Duration::from_secs(120);
 
+/// When a frame began and ended.
+#[derive(Clone, Copy, Debug)]
+pub struct UpdateTime {
+    /// Its begin.
+    pub began: Instant,
+    /// When the CPU had submitted all of it.
+    pub submitted: Instant,
+    /// When the device had finished it.
+    pub finished: Instant,
+    /// How often it was drawn: more than once where a pass waited for its pipeline, and then its times say nothing.
+    pub updates: u32,
+}
+
 /// A renderer without a window, driven frame by frame.
 pub struct Renderer {
     app: App,
@@ -151,6 +170,8 @@ pub struct Renderer {
     target: Handle<Image>,
     size: (u32, u32),
     warm: bool,
+    /// What the stage that is shown has in the world.
+    shown: Option<Shown>,
     /// When the device was made whose errors are heard. Devices do not tell: one of another instance of wgpu may have the number
     /// of the lost one and be equal to it.
     device_since: Tick,
@@ -164,10 +185,16 @@ impl Renderer {
     /// # Errors
     /// [`AppError::NoAdapter`], [`AppError::UnknownAdapter`], [`AppError::AdapterConflict`], [`AppError::TooLarge`].
     pub fn new(size: (u32, u32), adapter: Option<&str>, msaa: u32) -> Result<Self, AppError> {
-        Self::with_settings(adapter::settings(adapter)?, size, msaa)
+        Self::with_settings(adapter::settings(adapter)?, size, msaa, |_| ())
     }
 
-    fn with_settings(settings: WgpuSettings, size: (u32, u32), msaa: u32) -> Result<Self, AppError> {
+    /// A renderer of [`adapter::settings`] to whose app `prepare` adds plugins.
+    pub(super) fn with_settings(
+        settings: WgpuSettings,
+        size: (u32, u32),
+        msaa: u32,
+        prepare: impl FnOnce(&mut App),
+    ) -> Result<Self, AppError> {
         let mut app = App::new();
         let mut plugins = DefaultPlugins
             .set(WindowPlugin {
@@ -191,6 +218,7 @@ impl Renderer {
         }
         app.add_plugins(plugins);
         app.add_plugins(CanopyPlugins).insert_resource(LightUpdates::Blocking).insert_resource(ForestUpdates::Blocking);
+        prepare(&mut app);
         while app.plugins_state() == PluginsState::Adding {
             bevy::tasks::tick_global_task_pools_on_main_thread();
         }
@@ -213,7 +241,7 @@ impl Renderer {
             ))
             .id();
         let sun = app.world_mut().spawn(SunShadowSettings::default()).id();
-        Ok(Self { app, camera, sun, target, size, warm: false, device_since, fault })
+        Ok(Self { app, camera, sun, target, size, warm: false, shown: None, device_since, fault })
     }
 
     /// Listens to another device, if the app has made one for a lost one
@@ -239,12 +267,28 @@ impl Renderer {
         &mut self.app
     }
 
+    /// The Bevy app.
+    pub(super) fn world(&self) -> &World {
+        self.app.world()
+    }
+
     /// Shows `stage`: its ground, its forest, its quality.
     pub fn show(&mut self, stage: &Stage) {
         let world = self.app.world_mut();
-        stage.show(&mut world.commands());
+        self.shown = Some(stage.show(&mut world.commands()));
         world.flush();
         self.set_shadow(stage.shadow());
+    }
+
+    /// Shows `stage` with its samples per pixel instead of the one that was shown last.
+    pub fn replace(&mut self, stage: &Stage) {
+        let world = self.app.world_mut();
+        if let Some(before) = self.shown.take() {
+            before.despawn(&mut world.commands());
+        }
+        world.flush();
+        world.entity_mut(self.camera).insert(Msaa::from_samples(stage.scene.quality.msaa));
+        self.show(stage);
     }
 
     /// Sets how shadows are drawn.
@@ -279,28 +323,40 @@ impl Renderer {
     /// # Errors
     /// [`AppError::Render`] with the device's error in this frame.
     pub fn update(&mut self) -> Result<(), AppError> {
+        self.update_timed().map(drop)
+    }
+
+    /// As [`update`](Self::update), with its times.
+    ///
+    /// # Errors
+    /// [`AppError::Render`].
+    pub fn update_timed(&mut self) -> Result<UpdateTime, AppError> {
         if !self.warm {
             self.warm_up()?;
             self.warm = true;
         }
+        let began = Instant::now();
         self.app.update();
+        let mut time = UpdateTime { began, submitted: Instant::now(), finished: began, updates: 1 };
         self.follow_device();
         // A frame in which a pass waited for its pipeline is drawn again.
         let started = Instant::now();
         while !self.pipelines_are_ready()? {
             patience(started, "the pipelines")?;
             self.app.update();
+            time.updates += 1;
         }
         let device = self.app.world().resource::<RenderDevice>();
         let waited = device.wgpu_device().poll(PollType::Wait { submission_index: None, timeout: None });
         // What the device reported says more than that it could not be waited for.
         self.check_fault()?;
         waited.map_err(|error| AppError::Render(error.to_string()))?;
+        time.finished = Instant::now();
         match self.app.should_exit() {
             Some(exit) if exit.is_error() => {
                 Err(AppError::Render("the graphics device reported an error (see above)".to_owned()))
             }
-            _ => Ok(()),
+            _ => Ok(time),
         }
     }
 

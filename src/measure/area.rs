@@ -125,7 +125,7 @@ mod tests {
 
     #[test]
     fn the_references_noise_is_no_contrast() {
-        let leaf = |x: usize, y: usize| if (x + y) % 2 == 0 { 0.4 } else { 0.6 };
+        let leaf = |x: usize, y: usize| if (x + y).is_multiple_of(2) { 0.4 } else { 0.6 };
         let noise = |seed: u64, x: usize, y: usize| 0.6 * (unit_f32(seed, (y * 64 + x) as u64, 1u64) - 0.5);
         let half = picture(|x, y| leaf(x, y) + noise(1, x, y));
         let whole = picture(|x, y| leaf(x, y) + 0.5 * (noise(1, x, y) + noise(2, x, y)));

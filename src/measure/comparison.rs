@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{AreaError, Light, Mask, MeasureError, Picture, Summary, by_area, flip::flip};
+use super::{AreaError, Mask, MeasureError, Picture, Summary, by_area, flip::flip};
 
 /// Sides of the blocks whose means are compared by FLIP, in pixels.
 pub const FILTERED: [usize; 3] = [4, 8, 16];
@@ -163,21 +163,15 @@ pub fn change(
     Ok(Change { test: mean(&ours), reference: mean(&theirs), popping: pops as f64 / counted.len() as f64 })
 }
 
-/// The unit of linear errors in a picture of `light`.
-pub fn unit(light: Light) -> &'static str {
-    match light {
-        Light::Display => "of white",
-        Light::Scene => "in the unit of the images",
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measure::Light;
 
     fn pattern(width: usize, shift: usize, bright: u8) -> Picture {
-        let pixel =
-            |i: usize| if ((i % width + shift) / 8 + i / width / 8) % 2 == 0 { [40, 90, 30] } else { [bright; 3] };
+        let pixel = |i: usize| {
+            if ((i % width + shift) / 8 + i / width / 8).is_multiple_of(2) { [40, 90, 30] } else { [bright; 3] }
+        };
         Picture::from_srgb8(width, 48, &(0..width * 48).flat_map(pixel).collect::<Vec<_>>()).unwrap()
     }
 

@@ -22,7 +22,7 @@ mod picture;
 mod statistics;
 
 pub use area::{AreaError, BLOCK, by_area};
-pub use comparison::{Change, Compared, Comparison, ComparisonSettings, FILTERED, change, compare, unit};
+pub use comparison::{Change, Compared, Comparison, ComparisonSettings, FILTERED, change, compare};
 pub use cutout::{Cutout, LevelError};
 pub use error::MeasureError;
 pub use flip::{PIXELS_PER_DEGREE, flip};

@@ -56,6 +56,7 @@ mod time;
 mod trees;
 
 pub use camera::{Camera, PathKey, Pose, Viewpoint};
+pub(crate) use error::nearest;
 pub use error::{Problem, SceneError};
 pub use ground::{Ground, GroundFile, GroundFlat, GroundImage, GroundNoise};
 pub use lighting::{Lighting, Transfer};

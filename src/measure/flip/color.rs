@@ -3,7 +3,7 @@
 use glam::{Mat3, Vec3};
 
 /// The inverse of the white point's XYZ.
-const INVERSE_WHITE: Vec3 = Vec3::new(1.052_156_9, 1.0, 0.918_357_67);
+const INVERSE_WHITE: Vec3 = Vec3::new(1.052_156_9, 1.0, 0.918_357_7);
 /// XYZ of the white point.
 const WHITE: Vec3 = Vec3::new(0.950_428_55, 1.0, 1.088_900_4);
 

@@ -16,7 +16,7 @@ fn bytes(seed: u32, shift: u32, noise: i32, gain: i32) -> Vec<u8> {
         let (x, y) = (index % 96 + shift, index / 96);
         let base = [[40, 90, 30], [150, 180, 210], [90, 60, 20]][((x / 9 + y / 7) % 3) as usize];
         base.map(|code| {
-            ((code + (random(x, y) * noise >> 8) - (noise >> 1)) * gain).div_euclid(256).clamp(0, 255) as u8
+            ((code + ((random(x, y) * noise) >> 8) - (noise >> 1)) * gain).div_euclid(256).clamp(0, 255) as u8
         })
     };
     (0..96 * 64).flat_map(pixel).collect()
