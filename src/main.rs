@@ -31,9 +31,12 @@ fn run(arguments: Arguments) -> Outcome {
             Ok(options) => trace_reference(&options).into(),
             Err(error) => Outcome::Usage(error),
         },
-        Some(Command::Bake(bake)) => match cli::bake_options(bake, &common) {
-            Ok(options) => bake_levels(&options).into(),
-            Err(error) => Outcome::Usage(error),
+        Some(Command::Bake(bake)) => match cli::baked_scene(&bake, &common) {
+            Some((scene, overrides)) => bake_plants(&scene, &overrides, common.quiet).into(),
+            None => match cli::bake_options(bake, &common) {
+                Ok(options) => bake_levels(&options).into(),
+                Err(error) => Outcome::Usage(error),
+            },
         },
         Some(Command::Compare(compare)) => match cli::compare_options(&compare) {
             Ok(options) => compare_images(&options, &compare, common.quiet).into(),
@@ -144,6 +147,18 @@ fn tune_settings(options: &canopy::app::TuneOptions, quiet: bool) -> anyhow::Res
     let tuned = canopy::app::tune(options, &mut bars)?;
     drop(bars);
     cli::print_lines(if quiet { vec![tuned.file.display().to_string()] } else { tuned.lines() })
+}
+
+fn bake_plants(
+    scene: &canopy::scene::SceneSource,
+    overrides: &canopy::scene::Overrides,
+    quiet: bool,
+) -> anyhow::Result<()> {
+    canopy::app::listen_to_interrupts()?;
+    let mut bars = Bars::new(quiet);
+    let plants = canopy::app::bake_scene(scene, overrides, &mut bars)?;
+    drop(bars);
+    if quiet { Ok(()) } else { cli::print_lines([format!("{plants} plants are in the cache")]) }
 }
 
 fn describe(file: &std::path::Path) -> anyhow::Result<()> {

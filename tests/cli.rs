@@ -140,6 +140,21 @@ fn a_bake_names_the_file_that_it_cannot_use_and_leaves_nothing_behind() -> Outco
 }
 
 #[test]
+fn the_plants_of_a_scene_are_baked_without_a_sheet() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let scene = folder.path().join("s.ron");
+    let written = "(terrain: Flat(size: 100), place: (latitude: 48, longitude: 9), species: [(name: \"x\", plant: Grown(individuals: 2, \
+                triangles: 5000), height: (5, 9), lighting: Local)], trees: Scattered(stems_per_hectare: 9, surroundings: 0))";
+    std::fs::write(&scene, written)?;
+    let output = canopy(&["bake", &scene.display().to_string()])?;
+    assert_eq!(code(&output), Some(0), "{}", text(&output.stderr));
+    assert!(text(&output.stdout).contains("2 plants are in the cache"), "{}", text(&output.stdout));
+    let missing = canopy(&["bake", "no-such-scene.ron"])?;
+    assert_eq!(code(&missing), Some(1), "{}", text(&missing.stderr));
+    Ok(())
+}
+
+#[test]
 fn a_reader_that_leaves_early_is_no_error() -> Outcome {
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/scenes/demo.ron");
     let mut program = Command::new(env!("CARGO_BIN_EXE_canopy"))

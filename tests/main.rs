@@ -17,6 +17,7 @@ mod light;
 mod limits;
 mod load;
 mod math;
+mod pieces;
 mod plant;
 mod profile;
 mod reference;

@@ -99,6 +99,21 @@ pub enum AppError {
     /// The user interrupted the work: what was finished, and how to go on.
     #[error("{0}")]
     Interrupted(String),
+    /// Some images of several failed; the others are finished.
+    #[error(
+        "{failed} of {total} images failed, the first of them {}: {source}; the same command with --resume renders these alone",
+        file.display()
+    )]
+    SomeFailed {
+        /// How many failed.
+        failed: usize,
+        /// How many there are.
+        total: usize,
+        /// The first that failed.
+        file: PathBuf,
+        /// Why.
+        source: Box<AppError>,
+    },
     /// Rendering failed.
     #[error("rendering failed: {0}")]
     Render(String),

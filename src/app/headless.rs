@@ -1,6 +1,7 @@
 //! Renders images without a window: the frames of a plan, one after the other, each a function of its own arguments.
 
 use std::{
+    path::PathBuf,
     sync::{Arc, Mutex},
     time::{Duration, Instant},
 };
@@ -95,6 +96,7 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
     renderer.show(&stage);
     progress.end();
     progress.note(&format!("renderer: {:.2} s", started.elapsed().as_secs_f64()));
+    let mut failures: Vec<(PathBuf, AppError)> = Vec::new();
     progress.begin("Images", plan.frames.len() as u64);
     for (frame, wanted) in plan.frames.iter().zip(wanted) {
         if !wanted {
@@ -106,13 +108,19 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
             return Err(interrupted(&report, plan.frames.len()));
         }
         let started = Instant::now();
-        let picture = renderer.draw(&stage, &frame.view, frame.instant)?;
-        let drawn = started.elapsed().as_secs_f64();
-        picture.save(&frame.file, &notes_of(frame))?;
+        let drawn = renderer.draw(&stage, &frame.view, frame.instant);
+        let seconds = started.elapsed().as_secs_f64();
+        if let Err(error) = drawn.and_then(|picture| picture.save(&frame.file, &notes_of(frame))) {
+            // The other frames do not depend on this one.
+            progress.warn(&format!("{}: {error}", frame.file.display()));
+            failures.push((frame.file.clone(), error));
+            progress.advance(1);
+            continue;
+        }
         progress.note(&format!(
-            "{}: drawn in {drawn:.2} s, written in {:.2} s",
+            "{}: drawn in {seconds:.2} s, written in {:.2} s",
             frame.file.display(),
-            started.elapsed().as_secs_f64() - drawn
+            started.elapsed().as_secs_f64() - seconds
         ));
         if options.explain {
             report.explanation.push(format!("{}:", frame.file.display()));
@@ -122,7 +130,14 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
         progress.advance(1);
     }
     progress.end();
-    Ok(report)
+    let (finished, failed) = (report.files.len(), failures.len());
+    match failures.into_iter().next() {
+        None => Ok(report),
+        Some((_, error)) if finished == 0 => Err(error),
+        Some((file, error)) => {
+            Err(AppError::SomeFailed { failed, total: finished + failed, file, source: Box::new(error) })
+        }
+    }
 }
 
 /// Checks whether the images can be written.

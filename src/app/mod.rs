@@ -29,7 +29,7 @@ mod tune;
 
 pub use crate::measure::PIXELS_PER_DEGREE;
 pub use adapter::list_adapters;
-pub use bake::{LevelFacts, Side, Studio, bake, facts};
+pub use bake::{LevelFacts, Side, Studio, bake, bake_scene, facts};
 pub use compare::{
     COMPARE_VERSION, CompareError, CompareOptions, CompareReport, FrameComparison, compare, read_image, save_map,
 };

@@ -81,7 +81,7 @@ pub enum Command {
     Render(Render),
     /// Path-trace the ground truth of a scene on the CPU: slow, but accurate.
     Reference(Reference),
-    /// Make the levels of detail of a plant, and show them on a contact sheet.
+    /// Make the levels of detail of a plant, and show them on a contact sheet; or bake all plants of a scene.
     Bake(Bake),
     /// Compare images with references: how different they look, and why.
     Compare(Compare),
@@ -254,13 +254,14 @@ pub enum LightChoice {
 #[command(after_help = "Examples:
   canopy bake oak.glb --out oak-levels.png
   canopy bake oak.glb --out oak-200.png --planes 200 --lighting local
+  canopy bake my-valley.ron           bakes all plants of a scene, so that later calls find them in the cache
 The sheet shows each level from four sides and from above, and its triangles, memory, deviation and error.")]
 pub struct Bake {
-    /// The plant (.glb, .gltf).
+    /// The plant (.glb, .gltf), or a scene (.ron), whose plants are baked into the cache.
     pub plant: PathBuf,
-    /// PNG file to write.
+    /// PNG file to write; required for a plant, none for a scene.
     #[arg(long, value_name = "FILE")]
-    pub out: PathBuf,
+    pub out: Option<PathBuf>,
     /// Planes of the billboard cloud, 1 to 1000. More are nearer to the plant, and slower.
     #[arg(long, value_name = "NUMBER", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub planes: u32,

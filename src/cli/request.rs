@@ -7,7 +7,7 @@ use canopy::{
         BakeOptions, Clock, Combination, CompareOptions, FlyOptions, Goal, LightGroup, Output, PIXELS_PER_DEGREE,
         ProfileOptions, ReferenceKind, ReferenceOptions, RenderOptions, Still, TuneOptions, View, Views,
     },
-    scene::{LocalTime, Overrides},
+    scene::{LocalTime, Overrides, SceneSource},
 };
 use clap::CommandFactory;
 use clap::error::ErrorKind;
@@ -89,18 +89,27 @@ pub fn reference_options(reference: Reference, common: &Common) -> Result<Refere
     })
 }
 
+/// The scene whose plants are to be baked, with what replaces its values; `None` for the contact sheet of a plant.
+pub fn baked_scene(bake: &Bake, common: &Common) -> Option<(SceneSource, Overrides)> {
+    let is_scene = bake.out.is_none() && ends_in(&bake.plant, "ron");
+    is_scene.then(|| (bake.plant.clone().into(), overrides(common)))
+}
+
 /// The options of a bake.
 ///
 /// # Errors
 /// A usage error for a file that does not end in `.png`.
 pub fn bake_options(bake: Bake, common: &Common) -> Result<BakeOptions, clap::Error> {
-    if !ends_in(&bake.out, "png") {
-        let file = bake.out.display();
+    let Some(out) = bake.out else {
+        return Err(usage("--out: name the PNG file for the contact sheet of a plant".to_owned()));
+    };
+    if !ends_in(&out, "png") {
+        let file = out.display();
         return Err(usage(format!("--out {file}: a contact sheet is a PNG file; the name must end in .png")));
     }
     Ok(BakeOptions {
         plant: bake.plant,
-        out: bake.out,
+        out,
         planes: bake.planes,
         msaa: common.msaa,
         lighting: common.lighting.clone(),
