@@ -148,3 +148,29 @@ fn settings_are_listed_and_wrong_ones_cost_nothing() -> Outcome {
     assert_eq!(listing(folder.path()), before);
     Ok(())
 }
+
+#[test]
+fn a_search_climbs_to_the_least_error_and_writes_what_a_scene_file_can_have() -> Outcome {
+    let _gpu = gpu();
+    let folder = tempfile::tempdir()?;
+    let (scene, out) = (scene(folder.path())?, folder.path().join("tune"));
+    let out_name = out.display().to_string();
+    let fixed =
+        ["tune", &scene, "--out", &out_name, "--size", "96x54", "--frames", "2", "--warm-up", "0", "--rounds", "4"];
+    let more = ["--supersample", "1", "--sweep", "quality.near_distance=5,15,30,80"];
+    let call = |goal: [&str; 2]| canopy(&fixed.iter().chain(&more).chain(&goal).copied().collect::<Vec<_>>());
+    let output = call(["--budget", "100000ms"])?;
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    let text = String::from_utf8(output.stdout)?;
+    assert!(text.contains("no neighbour is better"), "{text}");
+    let block = std::fs::read_to_string(out.join("quality.ron"))?;
+    assert!(block.contains("near_distance: 80,") && block.contains("// Found by `canopy tune"), "{block}");
+    let written = format!("(terrain: Flat(), place: (latitude: 48, longitude: 9),\n{block}\n)");
+    let read = canopy::scene::Scene::parse(&written, "tuned.ron".as_ref())?;
+    assert_eq!((read.quality.near_distance, read.quality.cross_resolution), (80.0, 64));
+
+    let impossible = call(["--budget", "0.0001ms"])?;
+    assert_eq!(impossible.status.code(), Some(1));
+    assert!(said(&impossible).contains("no settings draw 95 of 100 frames within 0.0001 ms"), "{}", said(&impossible));
+    Ok(())
+}

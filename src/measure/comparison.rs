@@ -35,7 +35,7 @@ pub struct Comparison {
     pub filtered_flip: [Option<f64>; 3],
     /// Root mean square error of linear light over the three channels, in the pictures' unit.
     pub rmse: f64,
-    /// The same as a fraction of the reference's mean luminance; `None` of a black one.
+    /// The same as a fraction of the reference's own root mean square; `None` of a black one.
     pub relative_rmse: Option<f64>,
     /// Greatest error of a channel of linear light, in the pictures' unit.
     pub greatest_error: f64,
@@ -76,12 +76,12 @@ pub fn compare(reference: &Picture, test: &Picture, settings: &ComparisonSetting
     let errors: Vec<f64> = counted.iter().map(|pixel| f64::from(map[*pixel])).collect();
     let flip_errors = Summary::of(&errors).ok_or(MeasureError::NoPixels)?;
 
-    let (mut squares, mut greatest, mut light) = (0.0, 0.0f64, 0.0);
+    let (mut squares, mut greatest, mut own_squares) = (0.0, 0.0f64, 0.0);
     for pixel in &counted {
         let (test, reference) = (test.pixels[*pixel].as_dvec3(), reference.pixels[*pixel].as_dvec3());
         squares += (test - reference).length_squared() / 3.0;
         greatest = greatest.max((test - reference).abs().max_element());
-        light += f64::from(crate::math::luminance(reference.as_vec3()));
+        own_squares += reference.length_squared() / 3.0;
     }
     let count = counted.len() as f64;
     let rmse = (squares / count).sqrt();
@@ -95,7 +95,7 @@ pub fn compare(reference: &Picture, test: &Picture, settings: &ComparisonSetting
             flip: flip_errors,
             filtered_flip,
             rmse,
-            relative_rmse: (light > 0.0).then(|| rmse / (light / count)),
+            relative_rmse: (own_squares > 0.0).then(|| (squares / own_squares).sqrt()),
             greatest_error: greatest,
             area: by_area(reference, test, settings.mask, settings.half),
         },

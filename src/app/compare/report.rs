@@ -119,7 +119,7 @@ impl CompareReport {
             ),
             format!("FLIP of blocks  {}", filtered.join("   ")),
             format!(
-                "RMSE            {:.6} {unit}, {} of the reference's mean luminance; greatest error {:.6}",
+                "RMSE            {:.6} {unit}, {} of the reference's own; greatest error {:.6}",
                 found.rmse,
                 figure(found.relative_rmse, 4),
                 found.greatest_error

@@ -42,7 +42,7 @@ pub use self::{
 };
 
 use self::{
-    reference::Asked,
+    reference::{Asked, Reference},
     stages::Stages,
     sweep::{Point, points},
     views::ProfileView,
@@ -195,7 +195,7 @@ struct Work<'a> {
     options: &'a ProfileOptions,
     points: &'a [Point],
     views: &'a [ProfileView],
-    references: Vec<Option<PathBuf>>,
+    references: Vec<Option<Reference>>,
     fingerprint: String,
     report: ProfileReport,
 }
@@ -270,7 +270,7 @@ impl<'a> Work<'a> {
         };
         self.references = reference::make(&self.options.reference, scene, stages, self.views, &asked, progress)?;
         for (view, reference) in self.report.views.iter_mut().zip(&self.references) {
-            view.reference = reference.as_ref().map(|file| relative(file, &self.options.out));
+            view.reference = reference.as_ref().map(|reference| relative(&reference.file, &self.options.out));
         }
         self.draw_all(renderer, stages, progress)?;
         self.time_all(renderer, stages, progress)
@@ -323,13 +323,14 @@ impl<'a> Work<'a> {
             image.save(&file, &[("Settings", self.points[index].label())])?;
             let mut record = counts(renderer);
             record.file = relative(&file, &self.options.out);
-            if let Some(reference) = &self.references[number] {
+            if let Some(Reference { file: reference, half }) = &self.references[number] {
                 let test = Picture::from_srgb8(image.width as usize, image.height as usize, &image.pixels);
                 let failed =
                     |source| super::CompareError::Measure { test: file.clone(), reference: reference.clone(), source };
                 let test = test.map_err(failed)?;
                 let truth = read_image(reference)?;
-                let settings = ComparisonSettings::default();
+                let half = half.as_deref().map(read_image).transpose()?;
+                let settings = ComparisonSettings { half: half.as_ref(), ..ComparisonSettings::default() };
                 let compared = compare(&truth, &test, &settings).map_err(failed)?;
                 if self.is_shown(number) {
                     save_map(&compared.map, truth.size(), &folder.join(format!("{}-error.png", view.name)))?;

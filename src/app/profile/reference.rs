@@ -62,6 +62,21 @@ impl ReferenceKind {
     }
 }
 
+/// The reference of a view.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Reference {
+    /// Its image.
+    pub file: PathBuf,
+    /// The same from the first half of its samples, which tells how noisy it is.
+    pub half: Option<PathBuf>,
+}
+
+impl Reference {
+    fn whole(file: PathBuf) -> Option<Self> {
+        Some(Self { file, half: None })
+    }
+}
+
 /// The scene that `full` draws.
 pub fn full_scene(scene: &Scene) -> Scene {
     let mut full = scene.clone();
@@ -83,10 +98,10 @@ pub fn make(
     views: &[ProfileView],
     asked: &Asked,
     progress: &mut dyn Progress,
-) -> Result<Vec<Option<PathBuf>>, AppError> {
+) -> Result<Vec<Option<Reference>>, AppError> {
     match kind {
         ReferenceKind::None => Ok(vec![None; views.len()]),
-        ReferenceKind::Folder(given) => Ok(given_files(given, views)?.into_iter().map(Some).collect()),
+        ReferenceKind::Folder(given) => Ok(given_files(given, views)?.into_iter().map(Reference::whole).collect()),
         ReferenceKind::Full { supersampling } => draw_full(*supersampling, scene, stages, views, asked, progress),
         ReferenceKind::Traced { samples } => trace_all(*samples, scene, views, asked, progress),
     }
@@ -128,7 +143,7 @@ fn draw_full(
     views: &[ProfileView],
     asked: &Asked,
     progress: &mut dyn Progress,
-) -> Result<Vec<Option<PathBuf>>, AppError> {
+) -> Result<Vec<Option<Reference>>, AppError> {
     let size = (asked.size.0.saturating_mul(supersampling), asked.size.1.saturating_mul(supersampling));
     let settings = adapter::settings(asked.adapter)?;
     adapter::check_size(&settings, size)?;
@@ -159,7 +174,7 @@ fn draw_full(
         }
         progress.end();
     }
-    Ok(views.iter().map(|view| Some(file(view))).collect())
+    Ok(views.iter().map(|view| Reference::whole(file(view))).collect())
 }
 
 /// The means of `times`² pixels in linear light.
@@ -177,13 +192,13 @@ fn trace_all(
     views: &[ProfileView],
     asked: &Asked,
     progress: &mut dyn Progress,
-) -> Result<Vec<Option<PathBuf>>, AppError> {
+) -> Result<Vec<Option<Reference>>, AppError> {
     let mut files = Vec::with_capacity(views.len());
     for (number, view) in views.iter().enumerate() {
         progress.note(&format!("reference {} of {}: tracing {samples} samples a pixel", number + 1, views.len()));
-        let options = ReferenceOptions {
+        let options = |name: String, samples: u32| ReferenceOptions {
             scene: scene.clone().into(),
-            out: asked.folder.join(format!("{}.png", view.name)),
+            out: asked.folder.join(name),
             at: Some(LocalTime::new(view.instant.fixed_offset())),
             view: View::Pose(view.pose),
             size: asked.size,
@@ -196,7 +211,28 @@ fn trace_all(
             overrides: Overrides::default(),
             quiet: true,
         };
-        files.push(Some(trace(&options, progress)?));
+        let half = if samples > 1 {
+            Some(trace(&options(format!("{}-half.png", view.name), samples / 2), progress)?)
+        } else {
+            None
+        };
+        let whole = options(format!("{}.png", view.name), samples);
+        if let Some(half) = &half {
+            go_on_from(half, &whole.out)?;
+        }
+        let file = trace(&whole, progress)?;
+        // Of an odd number of samples the first half is smaller, and tells nothing.
+        files.push(Some(Reference { file, half: half.filter(|_| samples.is_multiple_of(2)) }));
     }
     Ok(files)
+}
+
+/// Lets the trace of `whole` begin with the samples of `half`, unless it has some of its own. If those are of another scene,
+/// the trace finds out by itself.
+fn go_on_from(half: &Path, whole: &Path) -> Result<(), AppError> {
+    let [from, to] = [half, whole].map(|image| image.with_extension("checkpoint"));
+    if from.exists() && !to.exists() {
+        std::fs::copy(&from, &to).map_err(|source| AppError::Write { path: to.clone(), source })?;
+    }
+    Ok(())
 }
