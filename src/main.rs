@@ -31,8 +31,23 @@ fn run(arguments: Arguments) -> Outcome {
             Ok(options) => trace_reference(&options).into(),
             Err(error) => Outcome::Usage(error),
         },
-        Some(Command::Bake(bake)) => match cli::bake_options(bake, &common) {
-            Ok(options) => bake_levels(&options).into(),
+        Some(Command::Bake(bake)) => match cli::baked_scene(&bake, &common) {
+            Some((scene, overrides)) => bake_plants(&scene, &overrides, common.quiet).into(),
+            None => match cli::bake_options(bake, &common) {
+                Ok(options) => bake_levels(&options).into(),
+                Err(error) => Outcome::Usage(error),
+            },
+        },
+        Some(Command::Compare(compare)) => match cli::compare_options(&compare) {
+            Ok(options) => compare_images(&options, &compare, common.quiet).into(),
+            Err(error) => Outcome::Usage(error),
+        },
+        Some(Command::Profile(profile)) => match cli::profile_options(&profile, &common) {
+            Ok(options) => profile_scene(&options, &profile, common.quiet).into(),
+            Err(error) => Outcome::Usage(error),
+        },
+        Some(Command::Tune(tune)) => match cli::tune_options(&tune, &common) {
+            Ok(options) => tune_settings(&options, common.quiet).into(),
             Err(error) => Outcome::Usage(error),
         },
         Some(Command::Info(info)) => describe(&info.file).into(),
@@ -81,6 +96,69 @@ fn bake_levels(options: &canopy::app::BakeOptions) -> anyhow::Result<()> {
         return Ok(());
     }
     cli::print_lines([options.out.display()])
+}
+
+fn compare_images(options: &canopy::app::CompareOptions, arguments: &cli::Compare, quiet: bool) -> anyhow::Result<()> {
+    canopy::app::listen_to_interrupts()?;
+    let mut bars = Bars::new(quiet);
+    let report = canopy::app::compare(options, &mut bars)?;
+    drop(bars);
+    if arguments.json {
+        cli::print_lines([serde_json::to_string_pretty(&report)?])?;
+    } else if !quiet {
+        cli::print_lines(report.lines())?;
+    }
+    if let Some(limit) = arguments.limit {
+        report.check_limit(limit)?;
+    }
+    Ok(())
+}
+
+fn profile_scene(options: &canopy::app::ProfileOptions, arguments: &cli::Profile, quiet: bool) -> anyhow::Result<()> {
+    use canopy::app::{BaselineRow, against, profile, profiled_scene, read_report, settings_of};
+    if arguments.list_settings {
+        let settings = settings_of(&profiled_scene(&options.scene, &options.overrides)?);
+        return cli::print_lines(
+            settings.iter().map(|one| format!("{} = {}   ({})", one.name, one.value, one.expected)),
+        );
+    }
+    // A baseline that cannot be read is found before the long work.
+    let baseline = arguments.baseline.as_deref().map(|path| Ok::<_, anyhow::Error>((path, read_report(path)?)));
+    let baseline = baseline.transpose()?;
+    canopy::app::listen_to_interrupts()?;
+    let mut bars = Bars::new(quiet);
+    let (report, files) = profile(options, &mut bars)?;
+    drop(bars);
+    if !quiet {
+        cli::print_lines(report.lines())?;
+        cli::print_lines(files.all().iter().map(|file| file.display()))?;
+    }
+    if let Some((path, baseline)) = baseline {
+        let (rows, outcome) = against(&report, &baseline, path, arguments.limit);
+        cli::print_lines(BaselineRow::lines(&rows))?;
+        outcome?;
+    }
+    Ok(())
+}
+
+fn tune_settings(options: &canopy::app::TuneOptions, quiet: bool) -> anyhow::Result<()> {
+    canopy::app::listen_to_interrupts()?;
+    let mut bars = Bars::new(quiet);
+    let tuned = canopy::app::tune(options, &mut bars)?;
+    drop(bars);
+    cli::print_lines(if quiet { vec![tuned.file.display().to_string()] } else { tuned.lines() })
+}
+
+fn bake_plants(
+    scene: &canopy::scene::SceneSource,
+    overrides: &canopy::scene::Overrides,
+    quiet: bool,
+) -> anyhow::Result<()> {
+    canopy::app::listen_to_interrupts()?;
+    let mut bars = Bars::new(quiet);
+    let plants = canopy::app::bake_scene(scene, overrides, &mut bars)?;
+    drop(bars);
+    if quiet { Ok(()) } else { cli::print_lines([format!("{plants} plants are in the cache")]) }
 }
 
 fn describe(file: &std::path::Path) -> anyhow::Result<()> {

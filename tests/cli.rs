@@ -19,9 +19,16 @@ fn text(bytes: &[u8]) -> String {
 
 #[test]
 fn help_and_version_succeed_and_show_examples() -> Outcome {
-    for arguments in
-        [&["--help"][..], &["fly", "--help"], &["render", "--help"], &["bake", "--help"], &["info", "--help"]]
-    {
+    for arguments in [
+        &["--help"][..],
+        &["fly", "--help"],
+        &["render", "--help"],
+        &["bake", "--help"],
+        &["compare", "--help"],
+        &["profile", "--help"],
+        &["tune", "--help"],
+        &["info", "--help"],
+    ] {
         let output = canopy(arguments)?;
         assert_eq!(code(&output), Some(0), "{arguments:?}");
         assert!(text(&output.stdout).contains("Examples:"), "{arguments:?}");
@@ -51,6 +58,14 @@ fn wrong_arguments_exit_with_2() -> Outcome {
         &["render", "s.ron", "--out", "a.png", "--out", "b.png"],
         &["render", "s.ron", "--out", "a", "--frames", "0"],
         &["render", "s.ron", "--out", "a", "--frames", "5", "--from", "2026-06-21T15:30Z"],
+        &["render", "s.ron", "--out", "a", "--frames", "5", "--chunk", "1"],
+        &["render", "s.ron", "--out", "a", "--frames", "5", "--chunk", "1/2", "--frames-only", "1"],
+        &["render", "s.ron", "--out", "a", "--frames", "5", "--frames-only", "3-1"],
+        &["render", "s.ron", "--out", "a.png", "--chunk", "1/2"],
+        &["compare", "a.png"],
+        &["tune", "s.ron"],
+        &["tune", "s.ron", "--budget", "8s"],
+        &["tune", "s.ron", "--budget", "8ms", "--error", "0.1"],
         &["fly", "--size", "x"],
         &["info"],
         &["bake", "oak.glb"],
@@ -121,6 +136,21 @@ fn a_bake_names_the_file_that_it_cannot_use_and_leaves_nothing_behind() -> Outco
         assert!(text(&output.stderr).contains(message), "{}", text(&output.stderr));
     }
     assert!(!out.exists() && !folder.path().join("sheets").exists());
+    Ok(())
+}
+
+#[test]
+fn the_plants_of_a_scene_are_baked_without_a_sheet() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let scene = folder.path().join("s.ron");
+    let written = "(terrain: Flat(size: 100), place: (latitude: 48, longitude: 9), species: [(name: \"x\", plant: Grown(individuals: 2, \
+                triangles: 5000), height: (5, 9), lighting: Local)], trees: Scattered(stems_per_hectare: 9, surroundings: 0))";
+    std::fs::write(&scene, written)?;
+    let output = canopy(&["bake", &scene.display().to_string()])?;
+    assert_eq!(code(&output), Some(0), "{}", text(&output.stderr));
+    assert!(text(&output.stdout).contains("2 plants are in the cache"), "{}", text(&output.stdout));
+    let missing = canopy(&["bake", "no-such-scene.ron"])?;
+    assert_eq!(code(&missing), Some(1), "{}", text(&missing.stderr));
     Ok(())
 }
 

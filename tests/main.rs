@@ -5,6 +5,7 @@
 mod app;
 mod bake;
 mod cli;
+mod compare;
 mod front_door;
 mod fuzz;
 mod grow;
@@ -17,7 +18,9 @@ mod light;
 mod limits;
 mod load;
 mod math;
+mod pieces;
 mod plant;
+mod profile;
 mod reference;
 mod render;
 mod scatter;

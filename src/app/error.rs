@@ -31,6 +31,12 @@ pub enum AppError {
     /// The ground truth.
     #[error(transparent)]
     Reference(#[from] crate::reference::ReferenceError),
+    /// A comparison of images.
+    #[error(transparent)]
+    Compare(#[from] super::CompareError),
+    /// A profile.
+    #[error(transparent)]
+    Profile(#[from] super::ProfileError),
     /// An image that cannot be written.
     #[error("{}: {source}; choose a writable folder with --out", path.display())]
     Write {
@@ -93,6 +99,21 @@ pub enum AppError {
     /// The user interrupted the work: what was finished, and how to go on.
     #[error("{0}")]
     Interrupted(String),
+    /// Some images of several failed; the others are finished.
+    #[error(
+        "{failed} of {total} images failed, the first of them {}: {source}; the same command with --resume renders these alone",
+        file.display()
+    )]
+    SomeFailed {
+        /// How many failed.
+        failed: usize,
+        /// How many there are.
+        total: usize,
+        /// The first that failed.
+        file: PathBuf,
+        /// Why.
+        source: Box<AppError>,
+    },
     /// Rendering failed.
     #[error("rendering failed: {0}")]
     Render(String),

@@ -1,6 +1,7 @@
 //! Renders images without a window: the frames of a plan, one after the other, each a function of its own arguments.
 
 use std::{
+    path::PathBuf,
     sync::{Arc, Mutex},
     time::{Duration, Instant},
 };
@@ -12,6 +13,7 @@ use bevy::{
     ecs::{
         change_detection::{DetectChanges, Tick},
         entity::Entity,
+        world::World,
     },
     image::Image,
     log::{Level, LogPlugin},
@@ -35,12 +37,12 @@ use bevy::{
 use chrono::{DateTime, Utc};
 
 use super::{
-    Frame, RenderOptions, RenderPlan, RenderReport, adapter, camera, error::AppError, interrupt, notes::notes,
-    rendered_image::RenderedImage,
+    Frame, RenderOptions, RenderPlan, RenderReport, adapter, camera, error::AppError, fingerprint::fingerprint,
+    interrupt, notes::notes, rendered_image::RenderedImage,
 };
 use crate::{
     assets::Stage,
-    components::{Sun, SunRefresh},
+    components::{Shown, Sun, SunRefresh},
     files,
     plugin::CanopyPlugins,
     progress::Progress,
@@ -71,10 +73,15 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
     let stage = Stage::build_within(&scene, most_trees, progress).map_err(interrupt::building)?;
     let plan = RenderPlan::new(options, &stage.scene, &|x, z| stage.terrain.height(x, z))?;
     let mut report = RenderReport::default();
-    let finished = |frame: &Frame| {
-        options.resume
-            && RenderedImage::is_stored(&frame.file, options.size, &notes(&stage, &frame.view, frame.instant))
+    let scene_print = fingerprint(&stage.scene);
+    // An image of other settings, or of a scene whose files have changed since, is stale.
+    let notes_of = |frame: &Frame| {
+        let mut notes = notes(&stage, &frame.view, frame.instant);
+        notes.push(("Fingerprint", scene_print.clone()));
+        notes
     };
+    let finished =
+        |frame: &Frame| options.resume && RenderedImage::is_stored(&frame.file, options.size, &notes_of(frame));
     let wanted: Vec<bool> = plan.frames.iter().map(|frame| !finished(frame)).collect();
     let kept = wanted.iter().filter(|wanted| !*wanted).count();
     if kept > 0 {
@@ -86,11 +93,12 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
     }
     let started = Instant::now();
     progress.begin("Renderer", 0);
-    let mut renderer = Renderer::with_settings(settings, options.size, stage.scene.quality.msaa)?;
+    let mut renderer = Renderer::with_settings(settings, options.size, stage.scene.quality.msaa, |_| ())?;
     stage.check_device(renderer.app.world().resource::<RenderDevice>())?;
     renderer.show(&stage);
     progress.end();
     progress.note(&format!("renderer: {:.2} s", started.elapsed().as_secs_f64()));
+    let mut failures: Vec<(PathBuf, AppError)> = Vec::new();
     progress.begin("Images", plan.frames.len() as u64);
     for (frame, wanted) in plan.frames.iter().zip(wanted) {
         if !wanted {
@@ -102,13 +110,19 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
             return Err(interrupted(&report, plan.frames.len()));
         }
         let started = Instant::now();
-        let picture = renderer.draw(&stage, &frame.view, frame.instant)?;
-        let drawn = started.elapsed().as_secs_f64();
-        picture.save(&frame.file, &notes(&stage, &frame.view, frame.instant))?;
+        let drawn = renderer.draw(&stage, &frame.view, frame.instant);
+        let seconds = started.elapsed().as_secs_f64();
+        if let Err(error) = drawn.and_then(|picture| picture.save(&frame.file, &notes_of(frame))) {
+            // The other frames do not depend on this one.
+            progress.warn(&format!("{}: {error}", frame.file.display()));
+            failures.push((frame.file.clone(), error));
+            progress.advance(1);
+            continue;
+        }
         progress.note(&format!(
-            "{}: drawn in {drawn:.2} s, written in {:.2} s",
+            "{}: drawn in {seconds:.2} s, written in {:.2} s",
             frame.file.display(),
-            started.elapsed().as_secs_f64() - drawn
+            started.elapsed().as_secs_f64() - seconds
         ));
         if options.explain {
             report.explanation.push(format!("{}:", frame.file.display()));
@@ -118,7 +132,14 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
         progress.advance(1);
     }
     progress.end();
-    Ok(report)
+    let (finished, failed) = (report.files.len(), failures.len());
+    match failures.into_iter().next() {
+        None => Ok(report),
+        Some((_, error)) if finished == 0 => Err(error),
+        Some((file, error)) => {
+            Err(AppError::SomeFailed { failed, total: finished + failed, file, source: Box::new(error) })
+        }
+    }
 }
 
 /// Checks whether the images can be written.
@@ -145,9 +166,26 @@ fn interrupted(report: &RenderReport, total: usize) -> AppError {
 /// Time limit for shaders and pipelines; far more than they need on the slowest machine.
 const LONGEST_WAIT: Duration = Duration::from_secs(120);
 
-/// How often a frame is drawn again because lists of trees were too short: once is enough, since all that they lack is
-/// counted.
-const MOST_REDRAWS: usize = 3;
+        let mut time = self.draw_once()?;
+        // Lists of trees that were too short have grown, and the frame is drawn again.
+        for _ in 0..MOST_REDRAWS {
+            if !self.lists_were_short() {
+                break;
+            }
+            let again = self.draw_once()?;
+            time = UpdateTime { updates: time.updates + again.updates, ..again };
+        }
+        match self.app.should_exit() {
+            Some(exit) if exit.is_error() => {
+                Err(AppError::Render("the graphics device reported an error (see above)".to_owned()))
+            }
+            _ => Ok(time),
+        }
+    }
+
+    /// Draws one frame with the lists of trees as long as they are.
+    fn draw_once(&mut self) -> Result<UpdateTime, AppError> {
+        let began = Instant::now();
 
 /// A renderer without a window, driven frame by frame.
 pub struct Renderer {
@@ -157,6 +195,8 @@ pub struct Renderer {
     target: Handle<Image>,
     size: (u32, u32),
     warm: bool,
+    /// What the stage that is shown has in the world.
+    shown: Option<Shown>,
     /// When the device was made whose errors are heard. Devices do not tell: one of another instance of wgpu may have the number
     /// of the lost one and be equal to it.
     device_since: Tick,
@@ -170,10 +210,16 @@ impl Renderer {
     /// # Errors
     /// [`AppError::NoAdapter`], [`AppError::UnknownAdapter`], [`AppError::AdapterConflict`], [`AppError::TooLarge`].
     pub fn new(size: (u32, u32), adapter: Option<&str>, msaa: u32) -> Result<Self, AppError> {
-        Self::with_settings(adapter::settings(adapter)?, size, msaa)
+        Self::with_settings(adapter::settings(adapter)?, size, msaa, |_| ())
     }
 
-    fn with_settings(settings: WgpuSettings, size: (u32, u32), msaa: u32) -> Result<Self, AppError> {
+    /// A renderer of [`adapter::settings`] to whose app `prepare` adds plugins.
+    pub(super) fn with_settings(
+        settings: WgpuSettings,
+        size: (u32, u32),
+        msaa: u32,
+        prepare: impl FnOnce(&mut App),
+    ) -> Result<Self, AppError> {
         let mut app = App::new();
         let mut plugins = DefaultPlugins
             .set(WindowPlugin {
@@ -197,6 +243,7 @@ impl Renderer {
         }
         app.add_plugins(plugins);
         app.add_plugins(CanopyPlugins).insert_resource(LightUpdates::Blocking).insert_resource(ForestUpdates::Blocking);
+        prepare(&mut app);
         while app.plugins_state() == PluginsState::Adding {
             bevy::tasks::tick_global_task_pools_on_main_thread();
         }
@@ -219,7 +266,7 @@ impl Renderer {
             ))
             .id();
         let sun = app.world_mut().spawn(SunShadowSettings::default()).id();
-        Ok(Self { app, camera, sun, target, size, warm: false, device_since, fault })
+        Ok(Self { app, camera, sun, target, size, warm: false, shown: None, device_since, fault })
     }
 
     /// Listens to another device, if the app has made one for a lost one
@@ -245,12 +292,28 @@ impl Renderer {
         &mut self.app
     }
 
+    /// The Bevy app.
+    pub(super) fn world(&self) -> &World {
+        self.app.world()
+    }
+
     /// Shows `stage`: its ground, its forest, its quality.
     pub fn show(&mut self, stage: &Stage) {
         let world = self.app.world_mut();
-        stage.show(&mut world.commands());
+        self.shown = Some(stage.show(&mut world.commands()));
         world.flush();
         self.set_shadow(stage.shadow());
+    }
+
+    /// Shows `stage` with its samples per pixel instead of the one that was shown last.
+    pub fn replace(&mut self, stage: &Stage) {
+        let world = self.app.world_mut();
+        if let Some(before) = self.shown.take() {
+            before.despawn(&mut world.commands());
+        }
+        world.flush();
+        world.entity_mut(self.camera).insert(Msaa::from_samples(stage.scene.quality.msaa));
+        self.show(stage);
     }
 
     /// Sets how shadows are drawn.
@@ -285,41 +348,44 @@ impl Renderer {
     /// # Errors
     /// [`AppError::Render`] with the device's error in this frame.
     pub fn update(&mut self) -> Result<(), AppError> {
+        self.update_timed().map(drop)
+    }
+
+    /// As [`update`](Self::update), with its times.
+    ///
+    /// # Errors
+    /// [`AppError::Render`].
+    pub fn update_timed(&mut self) -> Result<UpdateTime, AppError> {
         if !self.warm {
             self.warm_up()?;
             self.warm = true;
         }
-        self.draw_once()?;
-        // Lists of trees that were too short have grown, and the frame is drawn again.
-        for _ in 0..MOST_REDRAWS {
-            if !self.lists_were_short() {
-                break;
-            }
-            self.draw_once()?;
-        }
-        match self.app.should_exit() {
-            Some(exit) if exit.is_error() => {
-                Err(AppError::Render("the graphics device reported an error (see above)".to_owned()))
-            }
-            _ => Ok(()),
-        }
+        time.finished = Instant::now();
+        Ok(time)
     }
 
-    /// Draws one frame with the lists of trees as long as they are.
-    fn draw_once(&mut self) -> Result<(), AppError> {
+    /// Takes the counts of the lists that the device made; whether trees are missing in the last frame.
+    fn lists_were_short(&mut self) -> bool {
+        let world = self.app.sub_app_mut(RenderApp).world_mut();
+        let view = world.run_system_cached(collect_view_counts).unwrap_or(false);
+        let casters = world.run_system_cached(collect_caster_counts).unwrap_or(false);
+        view || casters
         self.app.update();
+        let mut time = UpdateTime { began, submitted: Instant::now(), finished: began, updates: 1 };
         self.follow_device();
         // A frame in which a pass waited for its pipeline is drawn again.
         let started = Instant::now();
         while !self.pipelines_are_ready()? {
             patience(started, "the pipelines")?;
             self.app.update();
+            time.updates += 1;
         }
         let device = self.app.world().resource::<RenderDevice>();
         let waited = device.wgpu_device().poll(PollType::Wait { submission_index: None, timeout: None });
         // What the device reported says more than that it could not be waited for.
         self.check_fault()?;
         waited.map_err(|error| AppError::Render(error.to_string()))?;
+<<<<<<< HEAD
         Ok(())
     }
 
@@ -329,6 +395,15 @@ impl Renderer {
         let view = world.run_system_cached(collect_view_counts).unwrap_or(false);
         let casters = world.run_system_cached(collect_caster_counts).unwrap_or(false);
         view || casters
+=======
+        time.finished = Instant::now();
+        match self.app.should_exit() {
+            Some(exit) if exit.is_error() => {
+                Err(AppError::Render("the graphics device reported an error (see above)".to_owned()))
+            }
+            _ => Ok(time),
+        }
+>>>>>>> slice-measure
     }
 
     /// The first updates upload meshes, textures and shaders, and draw nothing yet.

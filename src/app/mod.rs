@@ -1,6 +1,7 @@
 //! The program, behind the cargo feature `program`: the interactive flight, rendering without a window, the ground
-//! truth of a scene, what a file holds, and the levels of detail of a plant. The command line fills the requests ([`FlyOptions`], [`RenderOptions`],
-//! [`ReferenceOptions`]), and the functions here carry them out.
+//! truth of a scene, what a file holds, the levels of detail of a plant, images against references, run time against error, and
+//! the settings that fit a budget. The command line fills the requests ([`FlyOptions`], [`RenderOptions`],
+//! [`ReferenceOptions`], ...), and the functions here carry them out.
 //!
 //! It uses the library as any program does. The flight spawns a [`CanopyScene`](crate::components::CanopyScene), which is
 //! built in the background. [`render`] and [`reference()`] have nothing to show before their scene is built, so they wait
@@ -9,7 +10,9 @@
 mod adapter;
 mod bake;
 mod camera;
+mod compare;
 mod error;
+mod fingerprint;
 mod fly;
 mod headless;
 mod info;
@@ -17,24 +20,39 @@ mod interrupt;
 mod notes;
 mod parse;
 mod plan;
+mod profile;
 mod reference;
 mod rendered_image;
 mod request;
 mod tone;
+mod tune;
 
+pub use crate::measure::PIXELS_PER_DEGREE;
 pub use adapter::list_adapters;
-pub use bake::{LevelFacts, Side, Studio, bake, facts};
+pub use bake::{LevelFacts, Side, Studio, bake, bake_scene, facts};
+pub use compare::{
+    COMPARE_VERSION, CompareError, CompareOptions, CompareReport, FrameComparison, compare, read_image, save_map,
+};
 pub use error::AppError;
 pub use fly::fly;
-pub use headless::{Renderer, render};
+pub use headless::{Renderer, UpdateTime, render};
 pub use info::info;
 pub use interrupt::{Interrupt, listen as listen_to_interrupts, received as interrupt_received};
 pub use parse::{
-    ArgumentError, parse_exposure, parse_lighting, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size,
+    ArgumentError, parse_chunk, parse_exposure, parse_flip, parse_frames, parse_lighting, parse_milliseconds,
+    parse_pixels_per_degree, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size,
 };
 pub use plan::{Frame, PlanError, RenderPlan};
+pub use profile::{
+    BaselineRow, Combination, FrameTime, LevelCount, Machine, Memory, Method, PROFILE_VERSION, PictureRecord,
+    PointRecord, PointSummary, ProfileError, ProfileOptions, ProfileReport, ReferenceKind, ReportFiles, Round,
+    SettingError, SettingInfo, Sweep, ViewRecord, Views, against, profile, profiled_scene, read_report, set_setting,
+    settings_of,
+};
 pub use reference::reference;
 pub use rendered_image::RenderedImage;
 pub use request::{
-    BakeOptions, Clock, FlyOptions, LightGroup, Output, ReferenceOptions, RenderOptions, RenderReport, Still, View,
+    BakeOptions, Clock, FlyOptions, LightGroup, Output, ReferenceOptions, RenderOptions, RenderReport, Selection,
+    Still, View,
 };
+pub use tune::{Goal, TuneOptions, Tuned, tune};

@@ -1,5 +1,6 @@
 //! Parses the values of command-line arguments.
 
+use super::Selection;
 use crate::{
     bake::lighting::{SunLight, implicit::ImplicitSettings},
     scene::{Lighting, Pose, Transfer},
@@ -31,6 +32,21 @@ pub enum ArgumentError {
     /// Not a time in seconds.
     #[error("`{0}` is not a time in seconds (expected a number from 0 up, as in 12.5s)")]
     Seconds(String),
+    /// Not a piece of a sequence.
+    #[error("`{0}` is not a piece of a sequence (expected its number and how many there are, as in 2/8)")]
+    Chunk(String),
+    /// Not numbers of frames.
+    #[error("`{0}` is not a list of frames (expected numbers and ranges, as in 10-19,30)")]
+    Frames(String),
+    /// Not a FLIP.
+    #[error("`{0}` is not a FLIP (expected a number from 0 to 1, as in 0.05)")]
+    Flip(String),
+    /// Not a number of pixels per degree.
+    #[error("`{0}` is not a number of pixels per degree (expected 1 to 1000, as in 67)")]
+    PixelsPerDegree(String),
+    /// Not a frame time.
+    #[error("`{0}` is not a frame time (expected milliseconds above 0, as in 8ms)")]
+    Milliseconds(String),
     /// Not a positive number.
     #[error("`{0}` is not a positive number (expected a number above 0, as in 25)")]
     Positive(String),
@@ -120,6 +136,60 @@ pub fn parse_exposure(text: &str) -> Result<f64, ArgumentError> {
     number.filter(|ev: &f64| (-10.0..=25.0).contains(ev)).ok_or(ArgumentError::Exposure(text.to_owned()))
 }
 
+/// Reads `2/8`: the number of a piece, from 1, and how many there are. Whether it is one of them is checked with the
+/// sequence.
+///
+/// # Errors
+/// [`ArgumentError::Chunk`].
+pub fn parse_chunk(text: &str) -> Result<Selection, ArgumentError> {
+    let parts =
+        text.split_once('/').and_then(|(number, of)| Some((number.trim().parse().ok()?, of.trim().parse().ok()?)));
+    let chunk = parts.filter(|(_, of): &(u32, u32)| *of > 0);
+    chunk.map(|(number, of)| Selection::Chunk { number, of }).ok_or_else(|| ArgumentError::Chunk(text.to_owned()))
+}
+
+/// Reads `10-19,30`: numbers of frames and ranges of them, both ends included.
+///
+/// # Errors
+/// [`ArgumentError::Frames`].
+pub fn parse_frames(text: &str) -> Result<Selection, ArgumentError> {
+    let range = |part: &str| {
+        let (first, last) = part.split_once('-').unwrap_or((part, part));
+        let range: (u32, u32) = (first.trim().parse().ok()?, last.trim().parse().ok()?);
+        (range.0 <= range.1).then_some(range)
+    };
+    let ranges: Option<Vec<(u32, u32)>> = text.split(',').map(range).collect();
+    ranges.map(Selection::Only).ok_or_else(|| ArgumentError::Frames(text.to_owned()))
+}
+
+/// Reads a FLIP, 0 to 1.
+///
+/// # Errors
+/// [`ArgumentError::Flip`].
+pub fn parse_flip(text: &str) -> Result<f64, ArgumentError> {
+    let number = text.trim().parse().ok();
+    number.filter(|flip: &f64| (0.0..=1.0).contains(flip)).ok_or(ArgumentError::Flip(text.to_owned()))
+}
+
+/// Reads a number of pixels per degree of the visual field, 1 to 1000.
+///
+/// # Errors
+/// [`ArgumentError::PixelsPerDegree`].
+pub fn parse_pixels_per_degree(text: &str) -> Result<f32, ArgumentError> {
+    let number = text.trim().parse().ok();
+    number.filter(|number: &f32| (1.0..=1000.0).contains(number)).ok_or(ArgumentError::PixelsPerDegree(text.to_owned()))
+}
+
+/// Reads milliseconds above 0, with or without an `ms` behind them.
+///
+/// # Errors
+/// [`ArgumentError::Milliseconds`].
+pub fn parse_milliseconds(text: &str) -> Result<f64, ArgumentError> {
+    let trimmed = text.trim();
+    let number = trimmed.strip_suffix("ms").unwrap_or(trimmed).trim_end();
+    parse_positive(number).map_err(|_| ArgumentError::Milliseconds(text.to_owned()))
+}
+
 /// Reads a finite number above 0.
 ///
 /// # Errors
@@ -159,6 +229,14 @@ mod tests {
         assert!(parse_seconds("-1s").is_err() && parse_seconds("inf").is_err() && parse_seconds("s").is_err());
         assert_eq!(parse_positive("25"), Ok(25.0));
         assert!(parse_positive("0").is_err() && parse_positive("NaN").is_err());
+        assert_eq!((parse_milliseconds("8.5ms"), parse_milliseconds("8")), (Ok(8.5), Ok(8.0)));
+        assert!(["", "ms", "8s", "0", "-1ms"].iter().all(|wrong| parse_milliseconds(wrong).is_err()));
+        assert_eq!(parse_chunk("2/8"), Ok(Selection::Chunk { number: 2, of: 8 }));
+        assert_eq!(parse_frames("10-19, 30"), Ok(Selection::Only(vec![(10, 19), (30, 30)])));
+        assert!(["", "1", "1/0", "a/2", "-1/2"].iter().all(|wrong| parse_chunk(wrong).is_err()));
+        assert!(["", "a", "5-3", "1,,2", "1-"].iter().all(|wrong| parse_frames(wrong).is_err()));
+        assert_eq!((parse_flip("0.05"), parse_pixels_per_degree("67")), (Ok(0.05), Ok(67.0)));
+        assert!(parse_flip("2").is_err() && parse_flip("NaN").is_err() && parse_pixels_per_degree("0").is_err());
         assert_eq!(parse_exposure("-3.5"), Ok(-3.5));
         assert!(parse_exposure("26").is_err() && parse_exposure("NaN").is_err() && parse_exposure("").is_err());
     }

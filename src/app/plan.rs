@@ -6,7 +6,7 @@ use std::path::{Path as FilePath, PathBuf};
 
 use chrono::{DateTime, Utc};
 
-use super::request::{Clock, Output, RenderOptions, View};
+use super::request::{Clock, Output, RenderOptions, Selection, View};
 use crate::scene::{LocalTime, Path, Pose, Scene, Viewpoint};
 
 /// Default frames per second of a flight.
@@ -54,6 +54,25 @@ pub enum PlanError {
     /// Too many frames.
     #[error("{0} frames are too many; request at most {MOST_FRAMES}")]
     TooMany(u32),
+    /// A frame that the sequence does not have.
+    #[error("frame {number} is not one of the {frames} frames of the sequence, which are 0 to {}", frames.saturating_sub(1))]
+    NoFrame {
+        /// The frame.
+        number: u32,
+        /// Number of frames.
+        frames: u32,
+    },
+    /// A piece that is none.
+    #[error("there is no piece {number} of {of}; the pieces are 1/{of} to {of}/{of}")]
+    NoChunk {
+        /// Its number.
+        number: u32,
+        /// Number of pieces.
+        of: u32,
+    },
+    /// Some of a single image.
+    #[error("only frames of a sequence can be chosen; add --frames, or leave out --frames-only and --chunk")]
+    NoSequence,
     /// A frame rate that is not positive.
     #[error("{0} is not a frame rate (expected a number of frames per second above 0, such as 25)")]
     BadRate(f64),
@@ -73,6 +92,7 @@ impl RenderPlan {
     pub fn check(options: &RenderOptions, scene: &Scene) -> Result<(), PlanError> {
         Flight::new(options.view, scene)?;
         match &options.output {
+            Output::Stills(_) if options.selection != Selection::All => Err(PlanError::NoSequence),
             Output::Stills(stills) => {
                 for (number, still) in stills.iter().enumerate() {
                     if !is_png(&still.out) {
@@ -91,6 +111,7 @@ impl RenderPlan {
                 if let Some(rate) = fps.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
                     return Err(PlanError::BadRate(rate));
                 }
+                numbers(&options.selection, *frames)?;
                 if *frames == 0 { Err(PlanError::Nothing) } else { Ok(()) }
             }
         }
@@ -137,10 +158,31 @@ impl RenderPlan {
                     view: viewpoint(step.map_or(camera.still(), |step| camera.moving(f64::from(number) * step))),
                     instant: instant(*clock, scene.place.time, number, *frames),
                 };
-                (0..*frames).map(frame).collect::<Vec<_>>()
+                numbers(&options.selection, *frames)?.into_iter().map(frame).collect::<Vec<_>>()
             }
         };
         Ok(Self { frames })
+    }
+}
+
+/// The numbers of the frames to render of a sequence of `frames`, in order.
+fn numbers(selection: &Selection, frames: u32) -> Result<Vec<u32>, PlanError> {
+    match selection {
+        Selection::All => Ok((0..frames).collect()),
+        Selection::Only(ranges) => {
+            if let Some((_, last)) = ranges.iter().find(|(first, last)| first > last || *last >= frames) {
+                return Err(PlanError::NoFrame { number: *last, frames });
+            }
+            let wanted = |number: &u32| ranges.iter().any(|(first, last)| (first..=last).contains(&number));
+            Ok((0..frames).filter(wanted).collect())
+        }
+        Selection::Chunk { number, of } => {
+            if *number == 0 || number > of {
+                return Err(PlanError::NoChunk { number: *number, of: *of });
+            }
+            let start = |piece: u32| (u64::from(frames) * u64::from(piece) / u64::from(*of)) as u32;
+            Ok((start(number - 1)..start(*number)).collect())
+        }
     }
 }
 
@@ -239,6 +281,7 @@ mod tests {
             output,
             view,
             size: (64, 36),
+            selection: Selection::All,
             resume: false,
             overrides: Overrides::default(),
             adapter: None,
@@ -292,6 +335,33 @@ mod tests {
         assert!(moving.frames[0].view != moving.frames[4].view);
         let single = RenderPlan::new(&options(View::Scene, sequence(1, None, clock)), &scene(PATH)?, &hill)?;
         assert_eq!(single.frames[0].instant.to_rfc3339(), "2026-06-21T04:00:00+00:00");
+        Ok(())
+    }
+
+    #[test]
+    fn pieces_are_the_whole_and_none_twice() -> Outcome {
+        let scene = scene(PATH)?;
+        let files = |selection: Selection, frames: u32| -> Result<Vec<PathBuf>, PlanError> {
+            let output = sequence(frames, None, Clock::Standing(None));
+            let plan = RenderPlan::new(&RenderOptions { selection, ..options(View::Scene, output) }, &scene, &hill)?;
+            Ok(plan.frames.into_iter().map(|frame| frame.file).collect())
+        };
+        for frames in [1, 7, 20] {
+            let piece = |number| files(Selection::Chunk { number, of: 3 }, frames);
+            let pieces = [piece(1)?, piece(2)?, piece(3)?];
+            assert_eq!(pieces.concat(), files(Selection::All, frames)?);
+            assert!(pieces.iter().all(|piece| piece.len().abs_diff(frames as usize / 3) <= 1));
+        }
+        let names = ["out/flight/0002.png", "out/flight/0003.png", "out/flight/0006.png"].map(PathBuf::from);
+        assert_eq!(files(Selection::Only(vec![(6, 6), (2, 3), (3, 3)]), 7)?, names);
+        let message = |selection| files(selection, 7).map_or_else(|error| error.to_string(), |_| String::new());
+        assert!(message(Selection::Only(vec![(5, 7)])).contains("frame 7 is not one of the 7 frames"));
+        for number in [0, 4] {
+            assert!(message(Selection::Chunk { number, of: 3 }).contains("the pieces are 1/3 to 3/3"));
+        }
+        let still = Output::Stills(vec![Still { out: "a.png".into(), at: None }]);
+        let chosen = RenderOptions { selection: Selection::Chunk { number: 1, of: 1 }, ..options(View::Scene, still) };
+        assert_eq!(RenderPlan::check(&chosen, &scene), Err(PlanError::NoSequence));
         Ok(())
     }
 

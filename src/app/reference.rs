@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 
 use super::{
-    Frame, LightGroup, Output, PlanError, ReferenceOptions, RenderOptions, RenderPlan, Still, camera::NEAR,
+    Frame, LightGroup, Output, PlanError, ReferenceOptions, RenderOptions, RenderPlan, Selection, Still, camera::NEAR,
     error::AppError, interrupt, notes::notes, rendered_image::RenderedImage, tone::tone_table,
 };
 use crate::{
@@ -134,6 +134,7 @@ fn as_still(options: &ReferenceOptions) -> RenderOptions {
         output: Output::Stills(vec![Still { out: options.out.with_extension("png"), at: options.at }]),
         view: options.view,
         size: options.size,
+        selection: Selection::All,
         resume: false,
         overrides: options.overrides.clone(),
         adapter: None,

@@ -40,6 +40,8 @@ pub struct RenderOptions {
     pub view: View,
     /// Size of an image in pixels, each at least 1; the device may have a lower limit.
     pub size: (u32, u32),
+    /// Which frames of a sequence to render.
+    pub selection: Selection,
     /// Whether to keep images that an earlier render of the same request has finished: files of the same size and with
     /// the same notes. The scene must be the same too.
     pub resume: bool,
@@ -131,6 +133,24 @@ pub enum Output {
         fps: Option<f64>,
         /// The instants.
         clock: Clock,
+    },
+}
+
+/// Which frames of a sequence to render. Frames do not depend on each other: several machines may render some each, and the
+/// files are those of one that renders all.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Selection {
+    /// All of them.
+    #[default]
+    All,
+    /// Those with these numbers, first and last of each range.
+    Only(Vec<(u32, u32)>),
+    /// One of several pieces of nearly the same length.
+    Chunk {
+        /// Its number, from 1.
+        number: u32,
+        /// Number of pieces.
+        of: u32,
     },
 }
 

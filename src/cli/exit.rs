@@ -1,9 +1,13 @@
-//! How the program ends: 0 for success, 1 for an error, 2 for wrong usage, 130 and 143 for an interrupt.
+//! How the program ends: 0 for success, 1 for an error, 2 for wrong usage, 3 if some of several images failed, 130 and 143 for
+//! an interrupt.
 
 use std::io::Write;
 use std::process::ExitCode;
 
 use canopy::app::{AppError, Interrupt, interrupt_received};
+
+/// Some of several images failed, the others are finished.
+const SOME_FAILED: u8 = 3;
 
 /// The outcome of a command.
 pub enum Outcome {
@@ -49,7 +53,10 @@ pub fn finish(outcome: Outcome) -> ExitCode {
         }
         Outcome::Failed(error) => {
             let _ = writeln!(std::io::stderr(), "error: {error}");
-            ExitCode::FAILURE
+            match error.downcast_ref() {
+                Some(AppError::SomeFailed { .. }) => ExitCode::from(SOME_FAILED),
+                _ => ExitCode::FAILURE,
+            }
         }
     }
 }

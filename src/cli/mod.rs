@@ -5,7 +5,10 @@ mod exit;
 mod progress;
 mod request;
 
-pub use arguments::{Arguments, Command};
+pub use arguments::{Arguments, Command, Compare, Profile};
 pub use exit::{Outcome, finish, print_lines};
 pub use progress::Bars;
-pub use request::{bake_options, fly_options, no_command, reference_options, render_options};
+pub use request::{
+    bake_options, baked_scene, compare_options, fly_options, no_command, profile_options, reference_options,
+    render_options, tune_options,
+};

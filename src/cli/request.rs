@@ -3,13 +3,18 @@
 use std::path::{Path, PathBuf};
 
 use canopy::{
-    app::{BakeOptions, Clock, FlyOptions, LightGroup, Output, ReferenceOptions, RenderOptions, Still, View},
-    scene::{LocalTime, Overrides},
+    app::{
+        BakeOptions, Clock, Combination, CompareOptions, FlyOptions, Goal, LightGroup, Output, PIXELS_PER_DEGREE,
+        ProfileOptions, ReferenceKind, ReferenceOptions, RenderOptions, Still, TuneOptions, View, Views,
+    },
+    scene::{LocalTime, Overrides, SceneSource},
 };
 use clap::CommandFactory;
 use clap::error::ErrorKind;
 
-use super::arguments::{Arguments, Bake, CameraArguments, Common, Fly, LightChoice, Reference, Render};
+use super::arguments::{
+    Arguments, Bake, CameraArguments, Common, Compare, Fly, LightChoice, Measured, Profile, Reference, Render, Tune,
+};
 
 /// The scene of `canopy fly` without an argument.
 const DEMO: &str = "scenes/demo.ron";
@@ -48,6 +53,7 @@ pub fn render_options(render: Render, common: &Common) -> Result<RenderOptions, 
     Ok(RenderOptions {
         view: view(&render.view),
         size: render.size,
+        selection: render.frames_only.or(render.chunk).unwrap_or_default(),
         resume: render.resume,
         overrides: overrides(common),
         adapter: common.adapter.clone(),
@@ -89,24 +95,129 @@ pub fn reference_options(reference: Reference, common: &Common) -> Result<Refere
     })
 }
 
+/// The scene whose plants are to be baked, with what replaces its values; `None` for the contact sheet of a plant.
+pub fn baked_scene(bake: &Bake, common: &Common) -> Option<(SceneSource, Overrides)> {
+    let is_scene = bake.out.is_none() && ends_in(&bake.plant, "ron");
+    is_scene.then(|| (bake.plant.clone().into(), overrides(common)))
+}
+
 /// The options of a bake.
 ///
 /// # Errors
 /// A usage error for a file that does not end in `.png`.
 pub fn bake_options(bake: Bake, common: &Common) -> Result<BakeOptions, clap::Error> {
-    if !ends_in(&bake.out, "png") {
-        let file = bake.out.display();
+    let Some(out) = bake.out else {
+        return Err(usage("--out: name the PNG file for the contact sheet of a plant".to_owned()));
+    };
+    if !ends_in(&out, "png") {
+        let file = out.display();
         return Err(usage(format!("--out {file}: a contact sheet is a PNG file; the name must end in .png")));
     }
     Ok(BakeOptions {
         plant: bake.plant,
-        out: bake.out,
+        out,
         planes: bake.planes,
         msaa: common.msaa,
         lighting: common.lighting.clone(),
         adapter: common.adapter.clone(),
         quiet: common.quiet,
     })
+}
+
+/// The options of a comparison.
+///
+/// # Errors
+/// A usage error for a map of single images that does not end in `.png`.
+pub fn compare_options(compare: &Compare) -> Result<CompareOptions, clap::Error> {
+    let is_sequence = compare.test.is_dir() || compare.test.to_string_lossy().contains('*');
+    if let Some(map) = compare.map.as_ref().filter(|map| !is_sequence && !ends_in(map, "png")) {
+        let file = map.display();
+        return Err(usage(format!("--map {file}: a map of errors is a PNG file; the name must end in .png")));
+    }
+    Ok(CompareOptions {
+        test: compare.test.clone(),
+        reference: compare.reference.clone(),
+        pixels_per_degree: compare.ppd.unwrap_or(PIXELS_PER_DEGREE),
+        mask: compare.mask.clone(),
+        half: compare.half.clone(),
+        map: compare.map.clone(),
+    })
+}
+
+/// The options of a profile.
+///
+/// # Errors
+/// A usage error for several times of a flight, or a reference that is none.
+pub fn profile_options(profile: &Profile, common: &Common) -> Result<ProfileOptions, clap::Error> {
+    Ok(ProfileOptions {
+        sweeps: profile.sweep.clone(),
+        combination: if profile.each { Combination::Each } else { Combination::All },
+        shown: profile.pictures,
+        resume: profile.resume,
+        ..measured(&profile.scene, &profile.out, &profile.measured, common)?
+    })
+}
+
+/// The options of a search.
+///
+/// # Errors
+/// Those of [`profile_options`].
+pub fn tune_options(tune: &Tune, common: &Common) -> Result<TuneOptions, clap::Error> {
+    let goal = match (tune.budget, tune.error) {
+        (Some(budget), _) => Goal::Budget(budget),
+        (None, Some(error)) => Goal::Error(error),
+        (None, None) => return Err(usage("give a --budget or an --error".to_owned())),
+    };
+    let profile = measured(&tune.scene, &tune.out, &tune.measured, common)?;
+    Ok(TuneOptions { goal, profile: ProfileOptions { sweeps: tune.sweep.clone(), ..profile } })
+}
+
+/// What profiles and searches have in common.
+fn measured(scene: &Path, out: &Path, measured: &Measured, common: &Common) -> Result<ProfileOptions, clap::Error> {
+    let views = if measured.camera.is_empty() {
+        if measured.at.len() > 1 {
+            return Err(usage("a flight takes one --at; give a --camera for several times of day".to_owned()));
+        }
+        let (frames, fps, from) = (measured.frames, measured.fps, measured.along);
+        Views::Flight { frames, fps, from, at: measured.at.first().copied() }
+    } else {
+        Views::Stills { cameras: measured.camera.clone(), times: measured.at.clone() }
+    };
+    let reference = match measured.reference.to_str() {
+        Some("none") => ReferenceKind::None,
+        Some("full") => ReferenceKind::Full { supersampling: measured.supersample },
+        Some("traced") => ReferenceKind::Traced { samples: measured.spp },
+        _ if measured.reference.is_dir() => ReferenceKind::Folder(measured.reference.clone()),
+        _ => {
+            let what = measured.reference.display();
+            return Err(usage(format!("--reference {what}: expected full, traced, none or a folder with images")));
+        }
+    };
+    Ok(ProfileOptions {
+        scene: scene.to_owned().into(),
+        out: out.to_owned(),
+        sweeps: Vec::new(),
+        combination: Combination::All,
+        views,
+        size: measured.size,
+        rounds: measured.rounds,
+        warm_up: measured.warm_up,
+        reference,
+        shown: 1,
+        resume: false,
+        overrides: overrides(common),
+        adapter: common.adapter.clone(),
+        command: command_line(),
+    })
+}
+
+/// The command line, with quotes where a shell needs them.
+fn command_line() -> String {
+    let plain =
+        |word: &str| !word.is_empty() && word.chars().all(|c| c.is_ascii_alphanumeric() || "-_=.,:/+".contains(c));
+    let quoted = |word: String| if plain(&word) { word } else { format!("'{}'", word.replace('\'', "'\\''")) };
+    let words = std::env::args_os().skip(1).map(|word| quoted(word.to_string_lossy().into_owned()));
+    std::iter::once("canopy".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
 }
 
 fn output(
@@ -157,8 +268,10 @@ fn usage(message: String) -> clap::Error {
 
 /// The usage error of a command line without a command.
 pub fn no_command() -> clap::Error {
-    Arguments::command()
-        .error(ErrorKind::MissingSubcommand, "no command given (expected fly, render, reference, bake or info)")
+    Arguments::command().error(
+        ErrorKind::MissingSubcommand,
+        "no command given (expected fly, render, reference, bake, compare, profile, tune or info)",
+    )
 }
 
 fn view(camera: &CameraArguments) -> View {

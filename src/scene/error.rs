@@ -194,7 +194,7 @@ fn suggestion(found: &str, known: &[&str], kind: &str) -> String {
 
 /// The name of `known` that `found` most likely means: the least edit distance (Damerau 1964, adjacent swaps count
 /// once), at most a third of the longer name's length but always allowing one slip; letter case is ignored.
-pub(super) fn nearest<'a>(found: &str, known: &[&'a str]) -> Option<&'a str> {
+pub(crate) fn nearest<'a>(found: &str, known: &[&'a str]) -> Option<&'a str> {
     let found: Vec<char> = found.to_lowercase().chars().collect();
     known
         .iter()

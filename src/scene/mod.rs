@@ -56,6 +56,8 @@ mod time;
 mod trees;
 
 pub use camera::{Camera, PathKey, Pose, Viewpoint};
+#[cfg(feature = "program")]
+pub(crate) use error::nearest;
 pub use error::{Problem, SceneError};
 pub use ground::{Ground, GroundFile, GroundFlat, GroundImage, GroundNoise};
 pub use lighting::{Lighting, Transfer};

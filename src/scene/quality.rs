@@ -1,5 +1,6 @@
 //! How finely a scene is drawn: each value trades run time and memory for error.
 
+use bevy::reflect::Reflect;
 use serde::Deserialize;
 
 use super::check::Check;
@@ -10,7 +11,7 @@ const REPRESENTATIONS: [Representation; 4] =
     [Representation::MODEL, Representation::THINNED, Representation::CLOUD, Representation::CROSS];
 
 /// One level of detail in a scene file: `(draw: "model", until: 60, fade: 20)`.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Reflect)]
 #[serde(deny_unknown_fields)]
 pub struct QualityLevel {
     /// Name of the representation: `"model"`, `"thinned"`, `"cloud"` or `"cross"`.
@@ -32,7 +33,7 @@ fn default_fade() -> f64 {
 ///
 /// The passes' own settings ([`Levels`], [`SunShadowSettings`](crate::render::components::SunShadowSettings), ...)
 /// belong to different entities and have further values, which follow from these or are constants.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Reflect)]
 #[serde(deny_unknown_fields, default)]
 pub struct Quality {
     /// Edge of one shadow cascade's depth map in texels, a power of two from 256 to 8192. Higher: sharper shadows,

@@ -1,6 +1,7 @@
-//! `canopy bake`: makes all levels of detail of a plant, and shows them on a contact sheet.
+//! `canopy bake`: makes all levels of detail of a plant, and shows them on a contact sheet; or bakes the plants of a scene.
 
 mod levels;
+mod of_scene;
 mod sheet;
 mod studio;
 mod text;
@@ -8,6 +9,7 @@ mod text;
 use std::{path::Path, sync::Arc, time::Instant};
 
 pub use levels::{LevelFacts, facts};
+pub use of_scene::bake_scene;
 pub use studio::{Side, Studio};
 
 use self::sheet::Row;

@@ -18,7 +18,7 @@ mod motion;
 mod overlay;
 mod picture;
 mod session;
-mod settings;
+pub(super) mod settings;
 mod timing;
 mod tour;
 mod window;

@@ -6,7 +6,7 @@
 //! `rebake` bakes in the background; `draw` draws the panel. This file connects them.
 
 mod draw;
-mod fields;
+pub(in crate::app) mod fields;
 mod rebake;
 mod species;
 

@@ -1,0 +1,78 @@
+//! What tells a scene with its files from others, wherever they lie.
+
+use std::path::{Path, PathBuf};
+
+use crate::scene::{Ground, GrownForm, PlantSource, Scene, Trees};
+
+/// 32 hexadecimal digits that follow from the scene's values, the content of the files that it names, and the version of the
+/// program, but not from the names of files and folders. Files that these files name in turn (a glTF file's textures) have no
+/// influence. A file that cannot be read counts as empty.
+pub fn fingerprint(scene: &Scene) -> String {
+    let mut bare = scene.clone();
+    let mut hasher = blake3::Hasher::new();
+    bare.file = None;
+    for path in paths(&mut bare) {
+        hash(&mut hasher, path);
+        *path = PathBuf::new();
+    }
+    hasher.update(format!("{} {bare:?}", env!("CARGO_PKG_VERSION")).as_bytes());
+    hasher.finalize().to_hex()[..32].to_owned()
+}
+
+fn hash(hasher: &mut blake3::Hasher, path: &Path) {
+    // A pipe, which might never end, is not read.
+    if path.is_file()
+        && let Ok(file) = std::fs::File::open(path)
+    {
+        let _ = hasher.update_reader(file);
+    }
+    hasher.update(b"\0");
+}
+
+/// The files that a scene names.
+fn paths(scene: &mut Scene) -> Vec<&mut PathBuf> {
+    let mut paths = Vec::new();
+    match &mut scene.terrain {
+        Ground::File(file) => paths.push(&mut file.path),
+        Ground::Image(image) => paths.push(&mut image.path),
+        Ground::Noise(_) | Ground::Flat(_) => {}
+    }
+    if let Trees::Inventory(inventory) = &mut scene.trees {
+        paths.push(&mut inventory.path);
+    }
+    for species in &mut scene.species {
+        match &mut species.plant {
+            PlantSource::Gltf(gltf) => paths.extend(gltf.files.iter_mut()),
+            PlantSource::Grown(grown) => {
+                if let GrownForm::File(path) = &mut grown.form {
+                    paths.push(path);
+                }
+            }
+        }
+    }
+    paths
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{GltfPlants, Species};
+
+    #[test]
+    fn a_scene_is_known_by_its_values_and_the_content_of_its_files() -> std::io::Result<()> {
+        let folder = tempfile::tempdir()?;
+        let scene = |name: &str| {
+            let plant = GltfPlants::new([folder.path().join(name)]);
+            Scene { species: vec![Species::new("oak", plant)], ..Scene::default() }
+        };
+        std::fs::write(folder.path().join("a.glb"), "one")?;
+        std::fs::write(folder.path().join("b.glb"), "one")?;
+        let first = fingerprint(&scene("a.glb"));
+        assert!(first.len() == 32 && first == fingerprint(&scene("b.glb")));
+        assert_ne!(first, fingerprint(&Scene { seed: 2, ..scene("a.glb") }));
+        std::fs::write(folder.path().join("b.glb"), "two")?;
+        assert_ne!(first, fingerprint(&scene("b.glb")));
+        assert_ne!(first, fingerprint(&scene("none.glb")));
+        Ok(())
+    }
+}

@@ -1,0 +1,478 @@
+//! Run time against error: what `canopy profile` does.
+//!
+//! Every round draws all views with all settings, in turn from the first to the last and from the last to the first, so that
+//! what warms up or slows down meanwhile meets all of them alike. A frame's time ends when the device has finished it. Errors
+//! are counted from a reference, view by view. What was measured is written after every round, so that an interrupted profile
+//! can be resumed.
+
+mod baseline;
+mod csv;
+mod error;
+mod machine;
+mod page;
+mod record;
+mod reference;
+mod settings;
+mod stages;
+mod summary;
+mod sweep;
+mod table;
+mod timing;
+mod views;
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    time::{Instant, SystemTime},
+};
+
+use chrono::{DateTime, Utc};
+
+pub use self::{
+    baseline::{BaselineRow, against},
+    error::ProfileError,
+    record::{
+        FrameTime, LevelCount, Machine, Memory, Method, PROFILE_VERSION, PictureRecord, PointRecord, PointSummary,
+        ProfileReport, Round, ViewRecord,
+    },
+    reference::ReferenceKind,
+    settings::{SettingError, SettingInfo, list as settings_of, set as set_setting},
+    sweep::{Combination, Sweep},
+    views::Views,
+};
+
+use self::{
+    reference::{Asked, Reference},
+    stages::Stages,
+    sweep::{Point, points},
+    views::ProfileView,
+};
+use super::{AppError, Renderer, adapter, compare::read_image, compare::save_map, fingerprint::fingerprint};
+use crate::{
+    assets::Stage,
+    files,
+    measure::{ComparisonSettings, PIXELS_PER_DEGREE, Picture, change, compare},
+    progress::Progress,
+    render::{forest::ForestStatistics, terrain::TerrainStatistics},
+    scene::{Overrides, Scene, SceneSource},
+};
+use bevy::render::{RenderApp, renderer::RenderDevice};
+
+/// What to profile, and how.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProfileOptions {
+    /// The scene.
+    pub scene: SceneSource,
+    /// Folder of the report.
+    pub out: PathBuf,
+    /// Settings to sweep; none: the scene as written alone.
+    pub sweeps: Vec<Sweep>,
+    /// How several sweeps go together.
+    pub combination: Combination,
+    /// Where to look from, and when.
+    pub views: Views,
+    /// Width and height of a frame in pixels.
+    pub size: (u32, u32),
+    /// Rounds; 0: frames are not timed.
+    pub rounds: u32,
+    /// Frames before those that count, each time that settings change.
+    pub warm_up: u32,
+    /// What errors are counted from.
+    pub reference: ReferenceKind,
+    /// Views whose images the page shows.
+    pub shown: u32,
+    /// Whether to keep what an earlier, interrupted run of the same profile has measured.
+    pub resume: bool,
+    /// Values that replace those of the scene.
+    pub overrides: Overrides,
+    /// Part of the name of the graphics adapter to use.
+    pub adapter: Option<String>,
+    /// The command line, for the report.
+    pub command: String,
+}
+
+/// The files of a report.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReportFiles {
+    /// All figures: docs/reports.md documents them.
+    pub json: PathBuf,
+    /// One row a frame, with the columns of PresentMon.
+    pub frames: PathBuf,
+    /// One row a combination of settings.
+    pub points: PathBuf,
+    /// The page for people.
+    pub page: PathBuf,
+}
+
+impl ReportFiles {
+    fn in_folder(folder: &Path) -> Self {
+        Self {
+            json: folder.join("report.json"),
+            frames: folder.join("frames.csv"),
+            points: folder.join("points.csv"),
+            page: folder.join("report.html"),
+        }
+    }
+
+    /// The files.
+    pub fn all(&self) -> [&Path; 4] {
+        [&self.page, &self.json, &self.frames, &self.points]
+    }
+}
+
+/// Reads a report.
+///
+/// # Errors
+/// [`ProfileError::Report`].
+pub fn read_report(path: &Path) -> Result<ProfileReport, ProfileError> {
+    let failed = |why: String| ProfileError::Report { path: path.to_owned(), why };
+    let bytes = files::read_ordinary(path).map_err(|error| failed(error.to_string()))?;
+    let report: ProfileReport =
+        serde_json::from_slice(&bytes).map_err(|error| failed(format!("this is not a profile's report: {error}")))?;
+    if report.schema != "canopy-profile" || report.version != PROFILE_VERSION {
+        let (schema, version) = (report.schema, report.version);
+        return Err(failed(format!(
+            "this is {schema} version {version}; this program reads canopy-profile version {PROFILE_VERSION}"
+        )));
+    }
+    Ok(report)
+}
+
+/// The scene of a profile with its overrides; its settings are those of `--list-settings`.
+///
+/// # Errors
+/// [`AppError::Scene`].
+pub fn profiled_scene(source: &SceneSource, overrides: &Overrides) -> Result<Scene, AppError> {
+    Ok(overrides.applied(source.read()?))
+}
+
+/// Profiles a scene and writes the report.
+///
+/// # Errors
+/// [`AppError`]; what was measured before it is in the report. [`AppError::Interrupted`] soon after `progress`
+/// [is cancelled](Progress::is_cancelled).
+pub fn profile(
+    options: &ProfileOptions,
+    progress: &mut dyn Progress,
+) -> Result<(ProfileReport, ReportFiles), AppError> {
+    let scene = profiled_scene(&options.scene, &options.overrides)?;
+    let points = points(&scene, &options.sweeps, options.combination)?;
+    // Views off the path and references that are missing are found before the long work; heights do not matter for that.
+    let early = options.views.of(&scene, &|_, _| 0.0)?;
+    if let ReferenceKind::Folder(given) = &options.reference {
+        reference::given_files(given, &early)?;
+    }
+    let report_files = ReportFiles::in_folder(&options.out);
+    for file in report_files.all() {
+        files::check_writable(file).map_err(|source| AppError::Write { path: file.to_owned(), source })?;
+    }
+    let settings = adapter::settings(options.adapter.as_deref())?;
+    let most_trees = adapter::check_size(&settings, options.size)?;
+    let full = reference::full_scene(&scene);
+    let drawn = points.iter().map(|point| &point.scene).chain([&full]);
+    let mut stages = Stages::new(drawn, most_trees);
+    let written = stages.stage(&scene, progress)?;
+    let views = options.views.of(&scene, &|x, z| written.terrain.height(x, z))?;
+
+    progress.begin("Renderer", 0);
+    let mut renderer = Renderer::with_settings(settings, options.size, scene.quality.msaa, timing::prepare)?;
+    written.check_device(renderer.world().resource::<RenderDevice>())?;
+    progress.end();
+
+    let mut work = Work::new(options, &scene, &points, &views, &renderer)?;
+    let outcome = work.run(&mut renderer, &mut stages, &scene, progress);
+    work.report.complete = outcome.is_ok();
+    summary::summarize(&mut work.report);
+    // What was measured is kept, whatever went wrong. A report that cannot be written says why, unless something else did.
+    let saved = work.save(&report_files);
+    outcome?;
+    saved?;
+    Ok((work.report, report_files))
+}
+
+/// A profile under way.
+struct Work<'a> {
+    options: &'a ProfileOptions,
+    points: &'a [Point],
+    views: &'a [ProfileView],
+    references: Vec<Option<Reference>>,
+    fingerprint: String,
+    report: ProfileReport,
+}
+
+impl<'a> Work<'a> {
+    fn new(
+        options: &'a ProfileOptions,
+        scene: &Scene,
+        points: &'a [Point],
+        views: &'a [ProfileView],
+        renderer: &Renderer,
+    ) -> Result<Self, AppError> {
+        let machine = machine::machine(renderer);
+        let mut hasher = blake3::Hasher::new();
+        for point in points {
+            hasher.update(fingerprint(&point.scene).as_bytes());
+        }
+        let method = (options.size, options.warm_up, &options.reference, &machine.adapter, &machine.driver);
+        hasher.update(format!("{method:?} {views:?}").as_bytes());
+        let whole = hasher.finalize().to_hex()[..32].to_owned();
+        let fresh = ProfileReport {
+            schema: "canopy-profile".to_owned(),
+            version: PROFILE_VERSION,
+            scene: scene.name.clone(),
+            file: scene.label(),
+            command: options.command.clone(),
+            begun: DateTime::<Utc>::from(SystemTime::now()).to_rfc3339_opts(chrono::SecondsFormat::Secs, true),
+            complete: false,
+            fingerprint: whole.clone(),
+            machine,
+            method: Method {
+                size: options.size,
+                rounds: options.rounds,
+                warm_up: options.warm_up,
+                reference: options.reference.name(),
+                reference_details: options.reference.details(),
+                pixels_per_degree: PIXELS_PER_DEGREE,
+                step_seconds: step(views),
+            },
+            views: views.iter().map(view_record).collect(),
+            points: points.iter().map(point_record).collect(),
+            front: Vec::new(),
+            knee: None,
+        };
+        let json = ReportFiles::in_folder(&options.out).json;
+        let report = if options.resume && json.exists() {
+            let mut earlier = read_report(&json)?;
+            if earlier.fingerprint != whole {
+                return Err(ProfileError::Another(options.out.clone()).into());
+            }
+            earlier.method.rounds = options.rounds;
+            earlier
+        } else {
+            fresh
+        };
+        Ok(Self { options, points, views, references: Vec::new(), fingerprint: fingerprint(scene), report })
+    }
+
+    fn run(
+        &mut self,
+        renderer: &mut Renderer,
+        stages: &mut Stages,
+        scene: &Scene,
+        progress: &mut dyn Progress,
+    ) -> Result<(), AppError> {
+        let folder = self.options.out.join(self.options.reference.folder_name());
+        let asked = Asked {
+            folder: &folder,
+            size: self.options.size,
+            adapter: self.options.adapter.as_deref(),
+            fingerprint: &self.fingerprint,
+        };
+        self.references = reference::make(&self.options.reference, scene, stages, self.views, &asked, progress)?;
+        for (view, reference) in self.report.views.iter_mut().zip(&self.references) {
+            view.reference = reference.as_ref().map(|reference| relative(&reference.file, &self.options.out));
+        }
+        self.draw_all(renderer, stages, progress)?;
+        self.time_all(renderer, stages, progress)
+    }
+
+    /// Draws every view with every combination of settings, and compares it.
+    fn draw_all(
+        &mut self,
+        renderer: &mut Renderer,
+        stages: &mut Stages,
+        progress: &mut dyn Progress,
+    ) -> Result<(), AppError> {
+        let open: Vec<usize> = (0..self.points.len())
+            .filter(|index| self.report.points[*index].pictures.len() < self.views.len())
+            .collect();
+        let mut built = Vec::new();
+        for index in &open {
+            built.push(stages.stage(&self.points[*index].scene, progress)?);
+        }
+        progress.begin("Images", (open.len() * self.views.len()) as u64);
+        for (index, stage) in open.into_iter().zip(built) {
+            let (pictures, memory) = self.draw_point(index, renderer, &stage, progress)?;
+            self.report.points[index].pictures = pictures;
+            self.report.points[index].memory = memory;
+            self.save_data()?;
+        }
+        progress.end();
+        Ok(())
+    }
+
+    fn draw_point(
+        &self,
+        index: usize,
+        renderer: &mut Renderer,
+        stage: &Stage,
+        progress: &mut dyn Progress,
+    ) -> Result<(Vec<PictureRecord>, Memory), AppError> {
+        let folder = self.options.out.join("images").join(format!("{index:03}"));
+        renderer.replace(stage);
+        let mut records: Vec<PictureRecord> = Vec::with_capacity(self.views.len());
+        let mut before: Option<(Picture, Picture)> = None;
+        let mut reader = timing::DeviceReader::default();
+        let pixels = f64::from(self.options.size.0) * f64::from(self.options.size.1);
+        for (number, view) in self.views.iter().enumerate() {
+            if progress.is_cancelled() {
+                return Err(self.interrupted());
+            }
+            let image = renderer.draw(stage, &view.view, view.instant)?;
+            let file = folder.join(format!("{}.png", view.name));
+            image.save(&file, &[("Settings", self.points[index].label())])?;
+            let mut record = counts(renderer);
+            record.file = relative(&file, &self.options.out);
+            if let Some(Reference { file: reference, half }) = &self.references[number] {
+                let test = Picture::from_srgb8(image.width as usize, image.height as usize, &image.pixels);
+                let failed =
+                    |source| super::CompareError::Measure { test: file.clone(), reference: reference.clone(), source };
+                let test = test.map_err(failed)?;
+                let truth = read_image(reference)?;
+                let half = half.as_deref().map(read_image).transpose()?;
+                let settings = ComparisonSettings { half: half.as_ref(), ..ComparisonSettings::default() };
+                let compared = compare(&truth, &test, &settings).map_err(failed)?;
+                if self.is_shown(number) {
+                    save_map(&compared.map, truth.size(), &folder.join(format!("{}-error.png", view.name)))?;
+                }
+                record.error = Some(compared.comparison);
+                if let Some((earlier, earlier_truth)) = before.as_ref().filter(|_| self.options.views.is_flight()) {
+                    record.change = Some(change([earlier, &test], [earlier_truth, &truth], &settings).map_err(failed)?);
+                }
+                before = Some((test, truth));
+            }
+            // The device's figures of this frame come two updates later; the view stays, so they are its own.
+            renderer.update()?;
+            renderer.update()?;
+            record.fragments_per_pixel = timing::fragments(&reader.read(renderer)).map(|count| count / pixels);
+            records.push(record);
+            progress.advance(1);
+        }
+        Ok((records, machine::memory(renderer)))
+    }
+
+    /// Times all rounds.
+    fn time_all(
+        &mut self,
+        renderer: &mut Renderer,
+        stages: &mut Stages,
+        progress: &mut dyn Progress,
+    ) -> Result<(), AppError> {
+        let since = Instant::now();
+        let rounds = self.options.rounds as usize;
+        let missing: usize = self.report.points.iter().map(|point| rounds.saturating_sub(point.rounds.len())).sum();
+        progress.begin("Rounds", missing as u64);
+        for round in 0..rounds {
+            let forward = round % 2 == 0;
+            let mut order: Vec<usize> = (0..self.points.len()).collect();
+            if !forward {
+                order.reverse();
+            }
+            for index in order {
+                if self.report.points[index].rounds.len() > round {
+                    continue;
+                }
+                let stage = stages.stage(&self.points[index].scene, progress)?;
+                renderer.replace(&stage);
+                let stop = || progress.is_cancelled();
+                let frames = timing::time_round(renderer, &stage, self.views, self.options.warm_up, since, &stop)?;
+                let Some(frames) = frames else { return Err(self.interrupted()) };
+                self.report.points[index].rounds.push(Round { forward, frames });
+                progress.advance(1);
+            }
+            self.save_data()?;
+        }
+        progress.end();
+        Ok(())
+    }
+
+    fn interrupted(&self) -> AppError {
+        let rounds: usize = self.report.points.iter().map(|point| point.rounds.len()).sum();
+        let total = self.points.len() * self.options.rounds as usize;
+        AppError::Interrupted(format!(
+            "{rounds} of {total} rounds of settings are timed; the report in {} has them, and the same command with --resume \
+             goes on",
+            self.options.out.display()
+        ))
+    }
+
+    /// Whether the page shows the images of a view.
+    fn is_shown(&self, view: usize) -> bool {
+        page::shown(self.views.len(), self.options.shown as usize).contains(&view)
+    }
+
+    /// Writes the figures.
+    fn save_data(&mut self) -> Result<(), AppError> {
+        let path = ReportFiles::in_folder(&self.options.out).json;
+        write(&path, &json(&self.report)?)
+    }
+
+    /// Writes all files.
+    fn save(&mut self, files: &ReportFiles) -> Result<(), AppError> {
+        write(&files.json, &json(&self.report)?)?;
+        write(&files.frames, &csv::frames(&self.report))?;
+        write(&files.points, &csv::points(&self.report))?;
+        let page = page::page(&self.report, &self.options.out, self.options.shown as usize);
+        write(&files.page, page?.as_bytes())
+    }
+}
+
+fn json(report: &ProfileReport) -> Result<Vec<u8>, AppError> {
+    serde_json::to_vec_pretty(report)
+        .map_err(|error| AppError::Render(format!("the report cannot be written: {error}")))
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), AppError> {
+    files::write_whole(path, |writer| writer.write_all(bytes))
+        .map_err(|source| AppError::Write { path: path.to_owned(), source })
+}
+
+/// `file` as it is named from `folder`, if it lies in it.
+fn relative(file: &Path, folder: &Path) -> String {
+    file.strip_prefix(folder).unwrap_or(file).display().to_string()
+}
+
+fn step(views: &[ProfileView]) -> Option<f64> {
+    match views {
+        [first, second, ..] => Some(second.seconds? - first.seconds?),
+        _ => None,
+    }
+}
+
+fn view_record(view: &ProfileView) -> ViewRecord {
+    let (x, y, z) = view.pose.position;
+    ViewRecord {
+        name: view.name.clone(),
+        seconds: view.seconds,
+        camera: [x, y, z, view.pose.yaw, view.pose.pitch],
+        instant: view.instant.to_rfc3339(),
+        reference: None,
+    }
+}
+
+fn point_record(point: &Point) -> PointRecord {
+    PointRecord {
+        label: point.label(),
+        settings: point.settings.iter().cloned().collect::<BTreeMap<_, _>>(),
+        ..PointRecord::default()
+    }
+}
+
+/// What the last frame drew.
+fn counts(renderer: &mut Renderer) -> PictureRecord {
+    let world = renderer.app().sub_app(RenderApp).world();
+    let mut record = PictureRecord::default();
+    if let Some(forest) = world.get_resource::<ForestStatistics>() {
+        let level = |level: &crate::render::forest::LevelStatistics| LevelCount {
+            name: level.representation.name().to_owned(),
+            trees: level.trees as f64,
+            triangles: level.triangles as f64,
+        };
+        record.levels = forest.levels.iter().map(level).collect();
+    }
+    if let Some(terrain) = world.get_resource::<TerrainStatistics>() {
+        record.tiles = terrain.tiles;
+        record.ground_triangles = terrain.triangles;
+    }
+    record
+}

@@ -1,0 +1,238 @@
+//! The images that errors are counted from.
+
+use std::path::{Path, PathBuf};
+
+use super::{error::ProfileError, stages::Stages, views::ProfileView};
+use crate::{
+    app::{AppError, LightGroup, ReferenceOptions, RenderedImage, Renderer, View, adapter, reference as trace},
+    measure::Picture,
+    progress::Progress,
+    scene::{LocalTime, Overrides, QualityLevel, Scene},
+};
+
+/// What errors are counted from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ReferenceKind {
+    /// Nothing: errors are not measured.
+    None,
+    /// The renderer itself with full models, supersampled: what levels of detail cost, not what is wrong with the light.
+    Full {
+        /// Samples along a pixel's side, on top of the four of MSAA.
+        supersampling: u32,
+    },
+    /// The path tracer.
+    Traced {
+        /// Samples per pixel.
+        samples: u32,
+    },
+    /// Images of a folder, `0000.png` and so on.
+    Folder(PathBuf),
+}
+
+impl ReferenceKind {
+    /// Its name in reports.
+    pub fn name(&self) -> String {
+        match self {
+            Self::None => "none".to_owned(),
+            Self::Full { .. } => "full".to_owned(),
+            Self::Traced { .. } => "traced".to_owned(),
+            Self::Folder(folder) => folder.display().to_string(),
+        }
+    }
+
+    /// The folder in a report that has the images.
+    pub fn folder_name(&self) -> String {
+        match self {
+            Self::Full { .. } | Self::Traced { .. } => format!("reference-{}", self.name()),
+            Self::None | Self::Folder(_) => "reference".to_owned(),
+        }
+    }
+
+    /// How it is made.
+    pub fn details(&self) -> String {
+        match self {
+            Self::None => String::new(),
+            Self::Full { supersampling } => format!(
+                "full models at any distance, terrain error 0.25 pixels, {supersampling}x{supersampling} times 4 samples a \
+                 pixel; the rest as the scene says"
+            ),
+            Self::Traced { samples } => format!("path tracer, {samples} samples a pixel"),
+            Self::Folder(_) => "given images".to_owned(),
+        }
+    }
+}
+
+/// The reference of a view.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Reference {
+    /// Its image.
+    pub file: PathBuf,
+    /// The same from the first half of its samples, which tells how noisy it is.
+    pub half: Option<PathBuf>,
+}
+
+impl Reference {
+    fn whole(file: PathBuf) -> Option<Self> {
+        Some(Self { file, half: None })
+    }
+}
+
+/// The scene that `full` draws.
+pub fn full_scene(scene: &Scene) -> Scene {
+    let mut full = scene.clone();
+    full.quality.levels = vec![QualityLevel { draw: "model".to_owned(), until: 0.0, fade: 20.0 }];
+    full.quality.msaa = 4;
+    full.quality.terrain_error = 0.25;
+    full
+}
+
+/// Makes the references of `views` in `folder`, or finds them there; returns the file of each view, none without a
+/// reference.
+///
+/// # Errors
+/// [`AppError`].
+pub fn make(
+    kind: &ReferenceKind,
+    scene: &Scene,
+    stages: &mut Stages,
+    views: &[ProfileView],
+    asked: &Asked,
+    progress: &mut dyn Progress,
+) -> Result<Vec<Option<Reference>>, AppError> {
+    match kind {
+        ReferenceKind::None => Ok(vec![None; views.len()]),
+        ReferenceKind::Folder(given) => Ok(given_files(given, views)?.into_iter().map(Reference::whole).collect()),
+        ReferenceKind::Full { supersampling } => draw_full(*supersampling, scene, stages, views, asked, progress),
+        ReferenceKind::Traced { samples } => trace_all(*samples, scene, views, asked, progress),
+    }
+}
+
+/// What all references need.
+pub struct Asked<'a> {
+    /// Where they are kept.
+    pub folder: &'a Path,
+    /// Width and height in pixels.
+    pub size: (u32, u32),
+    /// Part of the adapter's name.
+    pub adapter: Option<&'a str>,
+    /// What tells the scene with its files from others.
+    pub fingerprint: &'a str,
+}
+
+/// The files of a given folder, one for each view.
+///
+/// # Errors
+/// [`ProfileError::Missing`].
+pub fn given_files(given: &Path, views: &[ProfileView]) -> Result<Vec<PathBuf>, ProfileError> {
+    let file = |view: &ProfileView| {
+        let candidates = ["png", "exr", "jpg"].map(|ending| given.join(format!("{}.{ending}", view.name)));
+        candidates.into_iter().find(|file| file.is_file())
+    };
+    let missing: Vec<String> = views.iter().filter(|view| file(view).is_none()).map(|view| view.name.clone()).collect();
+    if !missing.is_empty() {
+        let (folder, total) = (given.to_owned(), views.len());
+        return Err(ProfileError::Missing { folder, missing, total });
+    }
+    Ok(views.iter().filter_map(file).collect())
+}
+
+fn draw_full(
+    supersampling: u32,
+    scene: &Scene,
+    stages: &mut Stages,
+    views: &[ProfileView],
+    asked: &Asked,
+    progress: &mut dyn Progress,
+) -> Result<Vec<Option<Reference>>, AppError> {
+    let size = (asked.size.0.saturating_mul(supersampling), asked.size.1.saturating_mul(supersampling));
+    let settings = adapter::settings(asked.adapter)?;
+    adapter::check_size(&settings, size)?;
+    let file = |view: &ProfileView| asked.folder.join(format!("{}.png", view.name));
+    let notes = |view: &ProfileView| {
+        vec![
+            ("Software", format!("Canopy {}", env!("CARGO_PKG_VERSION"))),
+            ("Reference", ReferenceKind::Full { supersampling }.details()),
+            ("Fingerprint", format!("{} {:?} {}", asked.fingerprint, view.view, view.instant.to_rfc3339())),
+        ]
+    };
+    let missing: Vec<&ProfileView> =
+        views.iter().filter(|view| !RenderedImage::is_stored(&file(view), asked.size, &notes(view))).collect();
+    if !missing.is_empty() {
+        let stage = stages.stage(&full_scene(scene), progress)?;
+        progress.begin("Reference: full models", missing.len() as u64);
+        let mut renderer = Renderer::new(size, asked.adapter, 4)?;
+        renderer.replace(&stage);
+        for view in missing {
+            if progress.is_cancelled() {
+                return Err(AppError::Interrupted(
+                    "the reference was still being drawn; run the same command with --resume to go on".to_owned(),
+                ));
+            }
+            let image = renderer.draw(&stage, &view.view, view.instant)?;
+            reduced(&image, supersampling)?.save(&file(view), &notes(view))?;
+            progress.advance(1);
+        }
+        progress.end();
+    }
+    Ok(views.iter().map(|view| Reference::whole(file(view))).collect())
+}
+
+/// The means of `times`² pixels in linear light.
+fn reduced(image: &RenderedImage, times: u32) -> Result<RenderedImage, AppError> {
+    let failed = |why: String| AppError::Render(format!("the reference could not be reduced: {why}"));
+    let picture = Picture::from_srgb8(image.width as usize, image.height as usize, &image.pixels);
+    let picture = picture.map_err(|error| failed(error.to_string()))?;
+    let small = picture.averaged(times as usize).ok_or_else(|| failed("it is too small".to_owned()))?;
+    Ok(RenderedImage { width: small.width as u32, height: small.height as u32, pixels: small.to_srgb8() })
+}
+
+fn trace_all(
+    samples: u32,
+    scene: &Scene,
+    views: &[ProfileView],
+    asked: &Asked,
+    progress: &mut dyn Progress,
+) -> Result<Vec<Option<Reference>>, AppError> {
+    let mut files = Vec::with_capacity(views.len());
+    for (number, view) in views.iter().enumerate() {
+        progress.note(&format!("reference {} of {}: tracing {samples} samples a pixel", number + 1, views.len()));
+        let options = |name: String, samples: u32| ReferenceOptions {
+            scene: scene.clone().into(),
+            out: asked.folder.join(name),
+            at: Some(LocalTime::new(view.instant.fixed_offset())),
+            view: View::Pose(view.pose),
+            size: asked.size,
+            samples,
+            bounces: None,
+            light: LightGroup::All,
+            fog: true,
+            // An earlier trace of the same scene, light and camera is its cache.
+            resume: true,
+            overrides: Overrides::default(),
+            quiet: true,
+        };
+        let half = if samples > 1 {
+            Some(trace(&options(format!("{}-half.png", view.name), samples / 2), progress)?)
+        } else {
+            None
+        };
+        let whole = options(format!("{}.png", view.name), samples);
+        if let Some(half) = &half {
+            go_on_from(half, &whole.out)?;
+        }
+        let file = trace(&whole, progress)?;
+        // Of an odd number of samples the first half is smaller, and tells nothing.
+        files.push(Some(Reference { file, half: half.filter(|_| samples.is_multiple_of(2)) }));
+    }
+    Ok(files)
+}
+
+/// Lets the trace of `whole` begin with the samples of `half`, unless it has some of its own. If those are of another scene,
+/// the trace finds out by itself.
+fn go_on_from(half: &Path, whole: &Path) -> Result<(), AppError> {
+    let [from, to] = [half, whole].map(|image| image.with_extension("checkpoint"));
+    if from.exists() && !to.exists() {
+        std::fs::copy(&from, &to).map_err(|source| AppError::Write { path: to.clone(), source })?;
+    }
+    Ok(())
+}

@@ -1,0 +1,56 @@
+//! A report in lines for a terminal.
+
+use super::{baseline::BaselineRow, record::ProfileReport};
+use crate::app::compare::{aligned, figure};
+
+impl ProfileReport {
+    /// The combinations of settings from fast to slow, those on the front marked.
+    pub fn lines(&self) -> Vec<String> {
+        let header = ["settings", "p50 ms", "±", "p95", "1 % low", "ratio", "95 %", "FLIP", "worst", "change", ""];
+        let mut order: Vec<usize> = (0..self.points.len()).collect();
+        let time = |index: &usize| self.points[*index].summary.frame.map_or(f64::INFINITY, |frame| frame.p50);
+        order.sort_by(|a, b| time(a).total_cmp(&time(b)));
+        let row = |index: usize| {
+            let (point, found) = (&self.points[index], &self.points[index].summary);
+            let interval = found.ratio.map_or("n/a".to_owned(), |ratio| format!("{:.3}-{:.3}", ratio.low, ratio.high));
+            let mark = match (self.knee == Some(index), self.front.contains(&index)) {
+                (true, _) => "knee",
+                (_, true) => "front",
+                _ => "",
+            };
+            vec![
+                point.label.clone(),
+                figure(found.frame.map(|frame| frame.p50), 2),
+                figure(found.median.map(|median| 0.5 * (median.high - median.low)), 2),
+                figure(found.frame.map(|frame| frame.p95), 2),
+                figure(found.low_1_percent, 2),
+                figure(found.ratio.map(|ratio| ratio.value), 3),
+                interval,
+                figure(found.error, 4),
+                figure(found.worst_error, 4),
+                figure(found.excess_change, 4),
+                mark.to_owned(),
+            ]
+        };
+        let rows: Vec<Vec<String>> =
+            std::iter::once(header.map(str::to_owned).to_vec()).chain(order.into_iter().map(row)).collect();
+        aligned(&rows)
+    }
+}
+
+impl BaselineRow {
+    /// Rows in lines for a terminal.
+    pub fn lines(rows: &[Self]) -> Vec<String> {
+        let header = ["settings", "time / baseline", "95 %", "FLIP", "baseline's"].map(str::to_owned).to_vec();
+        let row = |row: &Self| {
+            vec![
+                row.label.clone(),
+                figure(row.time.map(|time| time.value), 3),
+                row.time.map_or("n/a".to_owned(), |time| format!("{:.3}-{:.3}", time.low, time.high)),
+                figure(row.error.0, 4),
+                figure(row.error.1, 4),
+            ]
+        };
+        aligned(&std::iter::once(header).chain(rows.iter().map(row)).collect::<Vec<_>>())
+    }
+}

@@ -1,0 +1,89 @@
+//! Sequences in pieces, as several machines render them.
+
+use std::{collections::BTreeMap, path::Path};
+
+use crate::support::{
+    gpu::gpu,
+    program::{canopy, said},
+};
+
+type Outcome = Result<(), Box<dyn std::error::Error>>;
+
+fn scene(trees: u32) -> String {
+    format!(
+        "(name: \"grove\", terrain: Noise(size: 100, amplitude: 4, wavelength: 60, seed: 3), place: (latitude: 48, longitude: 9, time: \
+         \"2026-06-21T12:30+01:00\"), species: [(name: \"broadleaf\", plant: Grown(form: Broadleaf, individuals: 1, triangles: 5000), \
+         height: (9, 12), lighting: Local)], trees: Scattered(stems_per_hectare: {trees}, min_distance: 4, surroundings: 0), camera: \
+         (path: [(seconds: 0, position: (0, 6, 45), yaw: 0, pitch: -5), (seconds: 4, position: (0, 6, 20), yaw: 20, pitch: -5)]), \
+         quality: (shadow_map_size: 256, cascades: 1, shadow_distance: 80, msaa: 1, cross_resolution: 64, view_distance: 500))"
+    )
+}
+
+/// The bytes of all files in a folder.
+fn bytes(folder: &Path) -> std::io::Result<BTreeMap<String, Vec<u8>>> {
+    let entries = std::fs::read_dir(folder)?.collect::<Result<Vec<_>, _>>()?;
+    let file =
+        |entry: std::fs::DirEntry| Ok((entry.file_name().to_string_lossy().into_owned(), std::fs::read(entry.path())?));
+    entries.into_iter().map(file).collect()
+}
+
+#[test]
+fn pieces_have_the_bytes_of_the_whole_and_stale_frames_are_rendered_again() -> Outcome {
+    let _gpu = gpu();
+    let folder = tempfile::tempdir()?;
+    let file = folder.path().join("grove.ron");
+    std::fs::write(&file, scene(40))?;
+    let name = file.display().to_string();
+    let render = |out: &str, more: &[&str]| {
+        let out = folder.path().join(out).display().to_string();
+        let fixed = ["render", &name, "--out", &out, "--frames", "4", "--fps", "1", "--size", "48x27"];
+        canopy(&fixed.into_iter().chain(more.iter().copied()).collect::<Vec<_>>())
+    };
+    assert_eq!(render("whole", &[])?.status.code(), Some(0));
+    for piece in ["1/3", "3/3", "2/3"] {
+        let output = render("pieces", &["--chunk", piece])?;
+        assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    }
+    assert_eq!(bytes(&folder.path().join("pieces"))?, bytes(&folder.path().join("whole"))?);
+    assert_eq!(render("some", &["--frames-only", "0,3"])?.status.code(), Some(0));
+    assert_eq!(bytes(&folder.path().join("some"))?.into_keys().collect::<Vec<_>>(), ["0000.png", "0003.png"]);
+    for (arguments, words) in [
+        (["--chunk", "4/3"], "the pieces are 1/3 to 3/3"),
+        (["--frames-only", "2-4"], "frame 4 is not one of the 4 frames"),
+    ] {
+        let output = render("none", &arguments)?;
+        assert_eq!(output.status.code(), Some(1));
+        assert!(said(&output).contains(words), "{}", said(&output));
+    }
+
+    let kept = render("whole", &["--skip-existing"])?;
+    assert!(said(&kept).contains("4 of 4 images are finished already"), "{}", said(&kept));
+    // Another number of trees: the same notes but for the fingerprint.
+    std::fs::write(&file, scene(90))?;
+    let stale = render("whole", &["--skip-existing", "--frames-only", "1"])?;
+    assert!(!said(&stale).contains("finished already"), "{}", said(&stale));
+    let (now, before) = (bytes(&folder.path().join("whole"))?, bytes(&folder.path().join("pieces"))?);
+    assert!(now["0001.png"] != before["0001.png"] && now["0000.png"] == before["0000.png"]);
+    Ok(())
+}
+
+#[test]
+fn a_frame_that_fails_does_not_stop_the_others_and_ends_with_3() -> Outcome {
+    let _gpu = gpu();
+    let folder = tempfile::tempdir()?;
+    let (file, out) = (folder.path().join("grove.ron"), folder.path().join("out"));
+    std::fs::write(&file, scene(40))?;
+    // Nothing can be written where a folder is.
+    std::fs::create_dir_all(out.join("0001.png"))?;
+    let (file, out_name) = (file.display().to_string(), out.display().to_string());
+    let arguments = ["render", &file, "--out", &out_name, "--frames", "3", "--fps", "1", "--size", "48x27"];
+    let output = canopy(&arguments)?;
+    assert_eq!(output.status.code(), Some(3), "{}", said(&output));
+    assert!(said(&output).contains("1 of 3 images failed") && said(&output).contains("0001.png"), "{}", said(&output));
+    assert!(out.join("0000.png").is_file() && out.join("0002.png").is_file());
+    std::fs::remove_dir(out.join("0001.png"))?;
+    let resumed = canopy(&[&arguments[..], &["--resume"]].concat())?;
+    assert_eq!(resumed.status.code(), Some(0), "{}", said(&resumed));
+    assert!(said(&resumed).contains("2 of 3 images are finished already"), "{}", said(&resumed));
+    Ok(())
+}
