@@ -62,6 +62,7 @@ pub mod reference;
 pub mod render;
 pub mod scatter;
 pub mod scene;
+pub mod style;
 pub mod terrain;
 pub mod trace;
 

@@ -53,6 +53,8 @@ struct Variant {
     lobe_limit: f32,
     // Factor on the cover around it: 0 where its ambient visibility holds the shade of the trees around already, else 1.
     cover_weight: f32,
+    // Layer of its foliage in the styles.
+    foliage_layer: u32,
 }
 
 struct Instance {

@@ -45,7 +45,7 @@ use crate::{
     plugin::CanopyPlugins,
     progress::Progress,
     render::{
-        components::{CanopyCamera, ForestUpdates, LightUpdates, SunShadowSettings},
+        components::{CanopyCamera, CanopyStyle, ForestUpdates, LightUpdates, SunShadowSettings},
         readback::read_rgb,
         report::{FrameReport, PassOutcome},
         shaders::CanopyShaders,
@@ -245,6 +245,12 @@ impl Renderer {
         stage.show(&mut world.commands());
         world.flush();
         self.set_shadow(stage.shadow());
+        self.set_style(stage.style.clone());
+    }
+
+    /// Sets the style of the images.
+    pub fn set_style(&mut self, style: CanopyStyle) {
+        self.app.world_mut().entity_mut(self.camera).insert(style);
     }
 
     /// Sets how shadows are drawn.

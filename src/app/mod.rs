@@ -30,7 +30,8 @@ pub use headless::{Renderer, render};
 pub use info::info;
 pub use interrupt::{Interrupt, listen as listen_to_interrupts, received as interrupt_received};
 pub use parse::{
-    ArgumentError, parse_exposure, parse_lighting, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size,
+    ArgumentError, parse_exposure, parse_lighting, parse_palette, parse_paper, parse_pose, parse_positive,
+    parse_samples, parse_seconds, parse_size, parse_style,
 };
 pub use plan::{Frame, PlanError, RenderPlan};
 pub use reference::reference;

@@ -3,8 +3,12 @@
 use std::path::PathBuf;
 
 use canopy::{
-    app::{parse_exposure, parse_lighting, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size},
+    app::{
+        parse_exposure, parse_lighting, parse_palette, parse_paper, parse_pose, parse_positive, parse_samples,
+        parse_seconds, parse_size, parse_style,
+    },
     scene::{Lighting, LocalTime, Pose},
+    style::Style,
 };
 use clap::{Args, Parser, Subcommand};
 
@@ -93,6 +97,21 @@ pub struct CameraArguments {
     pub along: Option<f64>,
 }
 
+/// The style of the pictures.
+#[derive(Clone, Debug, Args)]
+pub struct StyleArguments {
+    /// Draw in a style: photograph, watercolour, lines or toon [default: the scene's].
+    #[arg(long, value_name = "STYLE", value_parser = parse_style)]
+    pub style: Option<Style>,
+    /// Palette of a watercolour or of lines: natural, sepia, cool-to-warm, autumn, indigo, or a .ron file [default: the
+    /// scene's].
+    #[arg(long, value_name = "PALETTE", value_parser = parse_palette)]
+    pub palette: Option<String>,
+    /// Paper of a watercolour or of lines: hot-pressed, cold-pressed, rough, laid or canvas [default: the scene's].
+    #[arg(long, value_name = "PAPER", value_parser = parse_paper)]
+    pub paper: Option<String>,
+}
+
 /// Arguments of `canopy fly`.
 #[derive(Debug, Args)]
 #[command(after_help = "Keys:
@@ -133,6 +152,9 @@ pub struct Fly {
     /// Let the camera go below the ground.
     #[arg(long)]
     pub underground: bool,
+    /// The style of the pictures.
+    #[command(flatten)]
+    pub style: StyleArguments,
 }
 
 /// Arguments of `canopy render`.
@@ -144,6 +166,8 @@ pub struct Fly {
     canopy render demo.ron --at 2026-06-21T06:30-04:00 --out dawn.png --at 2026-06-21T23:00-04:00 --out night.png
   A flight along the scene's path, written to flight/0000.png and so on:
     canopy render demo.ron --out flight --along 10s --frames 250 --fps 25
+  The same as a watercolour in sepia:
+    canopy render demo.ron --out sepia.png --style watercolour --palette sepia
   A day from a fixed camera:
     canopy render demo.ron --out day.png --frames 96 --from 2026-06-21T04:00-04:00 --to 2026-06-21T22:00-04:00
 Ctrl-C stops after the current image; the same command with --resume renders the others.")]
@@ -174,6 +198,9 @@ pub struct Render {
     /// Last instant of a time-lapse.
     #[arg(long, value_name = "TIME", requires = "from")]
     pub to: Option<LocalTime>,
+    /// The style of the pictures.
+    #[command(flatten)]
+    pub style: StyleArguments,
     /// Keep the images that an earlier, interrupted run of the same command has finished; the scene must be unchanged.
     #[arg(long)]
     pub resume: bool,

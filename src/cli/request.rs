@@ -9,13 +9,25 @@ use canopy::{
 use clap::CommandFactory;
 use clap::error::ErrorKind;
 
-use super::arguments::{Arguments, Bake, CameraArguments, Common, Fly, LightChoice, Reference, Render};
+use super::arguments::{Arguments, Bake, CameraArguments, Common, Fly, LightChoice, Reference, Render, StyleArguments};
 
 /// The scene of `canopy fly` without an argument.
 const DEMO: &str = "scenes/demo.ron";
 
 fn overrides(common: &Common) -> Overrides {
-    Overrides { seed: common.seed, msaa: common.msaa, exposure: common.exposure, lighting: common.lighting.clone() }
+    Overrides {
+        seed: common.seed,
+        msaa: common.msaa,
+        exposure: common.exposure,
+        lighting: common.lighting.clone(),
+        ..Overrides::default()
+    }
+}
+
+/// As [`overrides`], with a style.
+fn styled(common: &Common, style: &StyleArguments) -> Overrides {
+    let StyleArguments { style, palette, paper } = style.clone();
+    Overrides { style, palette, paper, ..overrides(common) }
 }
 
 /// The options of a flight.
@@ -27,7 +39,7 @@ pub fn fly_options(fly: Fly, common: &Common) -> FlyOptions {
         view: view(&fly.view),
         clock: fly.clock.unwrap_or(0.0),
         underground: fly.underground,
-        overrides: overrides(common),
+        overrides: styled(common, &fly.style),
         adapter: common.adapter.clone(),
         quiet: common.quiet,
         explain: common.explain,
@@ -43,7 +55,7 @@ pub fn render_options(render: Render, common: &Common) -> Result<RenderOptions, 
         view: view(&render.view),
         size: render.size,
         resume: render.resume,
-        overrides: overrides(common),
+        overrides: styled(common, &render.style),
         adapter: common.adapter.clone(),
         quiet: common.quiet,
         explain: common.explain,

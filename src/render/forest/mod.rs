@@ -42,9 +42,10 @@ pub use cloud_uniforms::{CloudPlaneUniform, CloudVariantUniform};
 pub use draw::draw_levels;
 pub use gpu_forest::{GpuForest, GpuForests, most_trees};
 pub use instance_layout::instance_layout;
-pub use instances::{forest_view, instance_bind_group};
+pub use instances::{LevelLook, forest_view, instance_bind_group};
 pub(super) use leaves::Leaves;
 pub use lists::{ForestStatistics, LevelStatistics};
+pub(super) use lists::{PreparedForest, PreparedForests};
 pub use pipelines::LevelPipelines;
 pub use representation::Representations;
 pub use uniforms::{

@@ -1,7 +1,7 @@
 //! The forest pass of a view.
 
 use bevy::{
-    ecs::{query::With, system::Res},
+    ecs::system::Res,
     render::{
         camera::ExtractedCamera,
         diagnostic::RecordDiagnostics,
@@ -18,11 +18,11 @@ use super::{
     pipelines::LevelPipelines,
     representation::LevelTarget,
 };
-use crate::render::{bindings::FrameBindGroup, components::CanopyCamera, view::PreparedFrame};
+use crate::render::{bindings::FrameBindGroup, components::Photographed, view::PreparedFrame};
 
 /// Draws every forest into the camera's colour and depth, level by level.
 pub fn forest_pass(
-    view: ViewQuery<(&ViewTarget, &ViewDepthTexture, &ExtractedCamera), With<CanopyCamera>>,
+    view: ViewQuery<(&ViewTarget, &ViewDepthTexture, &ExtractedCamera), Photographed>,
     frame: Res<PreparedFrame>,
     group: Res<FrameBindGroup>,
     forests: Res<GpuForests>,

@@ -17,6 +17,7 @@ use crate::{
     math::luminance,
     plant::{LeafColors, PlantMaterial, lobe_gain, lobe_peak},
     scatter::PlantSize,
+    style::layers,
 };
 
 /// `ForestView` of `shaders/forest/instance.wgsl`.
@@ -93,8 +94,8 @@ pub struct VariantUniform {
     pub lobe_limit: f32,
     /// Factor on the cover around it: 0 where its k_a holds the shade of the trees around already, else 1.
     pub cover_weight: f32,
-    /// WGSL rounds the size up to 16 bytes.
-    pub padding: u32,
+    /// Layer of its foliage in the styles ([`layers`](crate::style::layers)).
+    pub foliage_layer: u32,
 }
 
 /// `CrossVariant` of `shaders/forest/cross_variant.wgsl`.
@@ -197,7 +198,16 @@ pub fn indirect_light_color(leaves: &LeafColors) -> Vec3 {
 
 /// The uniforms of each plant.
 pub fn variants(plants: &[BakedPlant], sizes: &[PlantSize]) -> Vec<VariantUniform> {
-    plants.iter().zip(sizes).map(|(plant, size)| variant(plant, size)).collect()
+    let groups = foliage_groups(plants);
+    let layer = |group: &u8| u32::from(layers::FIRST_FOLIAGE) + u32::from(*group);
+    let uniform = |((plant, size), group)| VariantUniform { foliage_layer: layer(group), ..variant(plant, size) };
+    plants.iter().zip(sizes).zip(&groups).map(uniform).collect()
+}
+
+/// The layer of foliage (0, 1, ...) of each plant: those with leaves of one colour share it.
+pub fn foliage_groups(plants: &[BakedPlant]) -> Vec<u8> {
+    let colors: Vec<Vec3> = plants.iter().map(|plant| plant.plant.leaf_colors().reflected).collect();
+    layers::foliage_groups(&colors, layers::MOST_FOLIAGE)
 }
 
 fn variant(plant: &BakedPlant, size: &PlantSize) -> VariantUniform {
@@ -217,7 +227,7 @@ fn variant(plant: &BakedPlant, size: &PlantSize) -> VariantUniform {
         lobe_gain: lobe_gain(gloss.roughness),
         lobe_limit: lobe_peak(gloss.roughness).recip(),
         cover_weight: cover_weight(&plant.lighting),
-        padding: 0,
+        foliage_layer: 0,
     }
 }
 
