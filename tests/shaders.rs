@@ -339,6 +339,7 @@ fn gpu_structs_are_what_the_shaders_think() {
             hatching,
             tones,
             scaled_normals,
+            scene,
         }
     );
     twin!(layouts, "Layer", LayerUniform { threshold, softness, edge, foliage });

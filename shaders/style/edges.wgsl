@@ -1,13 +1,18 @@
 // Contours: discontinuities of depth and normal [Saito & Takahashi 1990; Luft 2007, section 4].
 #define_import_path canopy::style_edges
 
-#import canopy::style::style
+#import canopy::style::{style, NEAREST, FARTHEST}
+
+// Least steps in depth that are drawn, metres.
+const LEAF_STEP: f32 = 2.0;
+const CROWN_STEP: f32 = 0.4;
 
 // How strongly the maps change around `uv` within `reach` texels, 0..1: `normals` (scaled by the ambient visibility, which
 // suppresses what is inside a crown) and `light`, whose third channel is the depth.
 fn contour(normals: texture_2d<f32>, lights: texture_2d<f32>, linear_sampler: sampler, uv: vec2<f32>, reach: f32) -> f32 {
-    let dx = vec2(max(reach, 0.75), 0.0) / style.map_size;
-    let dy = vec2(0.0, max(reach, 0.75)) / style.map_size;
+    let span = max(reach, 0.0022 * style.map_size.y);
+    let dx = vec2(span, 0.0) / style.map_size;
+    let dy = vec2(0.0, span) / style.map_size;
     let n0 = direction(textureSampleLevel(normals, linear_sampler, uv - dx, 0.0).xyz);
     let n1 = direction(textureSampleLevel(normals, linear_sampler, uv + dx, 0.0).xyz);
     let n2 = direction(textureSampleLevel(normals, linear_sampler, uv - dy, 0.0).xyz);
@@ -22,8 +27,12 @@ fn contour(normals: texture_2d<f32>, lights: texture_2d<f32>, linear_sampler: sa
     let step = max(z0 + z1 - 2.0 * z, 0.0) + max(z2 + z3 - 2.0 * z, 0.0);
     // Far crowns are a few pixels wide: only what stands out against the distance is left of their contours.
     let near = 1.0 - smoothstep(0.50, 0.66, z);
-    let creases = smoothstep(0.30, 0.95, style.detail * bend) * near;
-    let silhouettes = smoothstep(0.0012, 0.006, style.detail * step) * mix(0.35, 1.0, near) + smoothstep(0.01, 0.03, style.detail * step);
+    let creases = smoothstep(0.28, 0.85, style.detail * bend) * near;
+    // Steps from leaf to leaf inside a near crown do not count; of farther crowns, steps from one to the next do.
+    let metres = log(FARTHEST / NEAREST) * NEAREST * exp(z * log(FARTHEST / NEAREST));
+    let least = max(0.0005, mix(LEAF_STEP, CROWN_STEP, smoothstep(0.32, 0.46, z)) / metres);
+    let strong = smoothstep(0.01, 0.03, style.detail * step) * (1.0 - near);
+    let silhouettes = smoothstep(least, 4.0 * least, style.detail * step) * mix(0.25, 1.0, near) + strong;
     return saturate(max(0.8 * creases, silhouettes));
 }
 

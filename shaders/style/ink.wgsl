@@ -29,11 +29,12 @@ fn toned(texel: vec2<i32>) -> vec3<f32> {
     // The light, with the shadow: a surface in shade has the light of one that is turned away.
     let soft = textureSampleLevel(soft_lights, linear_sampler, (vec2<f32>(texel) + 0.5) / style.map_size, 0.0);
     let reach = mix(lit.x, soft.x, 0.7) * (1.0 - 0.45 * smoothstep(0.35, 0.65, soft.y));
-    let tone = (floor(saturate(reach) * style.tones * 0.999) + 0.5) / style.tones;
+    // Most of a crown lies between a quarter and three quarters.
+    let tone = (floor(smoothstep(0.18, 0.82, reach) * style.tones * 0.999) + 0.5) / style.tones;
     // Albedo to paint: brighter and more saturated than leaves are.
     let luminance = dot(albedo, vec3(0.2126, 0.7152, 0.0722));
-    let vivid = max(mix(vec3(luminance), albedo, 1.25), vec3(0.0)) * 3.2;
-    let painted = min(vivid, vec3(0.95)) * mix(0.28, 1.25, tone);
+    let vivid = max(mix(vec3(luminance), albedo, 0.95), vec3(0.0)) * 3.6;
+    let painted = min(vivid, vec3(0.95)) * mix(0.22, 1.3, tone);
     let hazy = mix(painted, style.distance, 0.85 * airiness(lit.z));
     // The sky in tones from the horizon to the zenith.
     let size = vec2<f32>(textureDimensions(ramps));

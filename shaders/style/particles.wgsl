@@ -30,6 +30,9 @@ struct ParticleView {
 @group(2) @binding(1) var<uniform> settings: ParticleView;
 @group(2) @binding(2) var soft_lights: texture_2d<f32>;
 
+// Metres: lower plants have smaller dabs.
+const TALL: f32 = 12.0;
+
 struct Varying {
     @builtin(position) clip: vec4<f32>,
     @location(0) corner: vec2<f32>,
@@ -55,14 +58,14 @@ fn hash(index: u32) -> f32 {
     return f32((h ^ (h >> 16u)) >> 8u) / 16777216.0;
 }
 
-// Pixels of the maps across a dab at a distance.
-fn dab_pixels(distance: f32) -> f32 {
-    return max(settings.size * frame.focal_length_pixels / max(distance, 0.5), settings.least_pixels);
+// Pixels of the maps across a dab of a plant `height` metres high at a distance.
+fn dab_pixels(distance: f32, height: f32) -> f32 {
+    return max(settings.size * min(height / TALL, 1.0) * frame.focal_length_pixels / max(distance, 0.5), settings.least_pixels);
 }
 
 // Dabs of a crown `height` and `radius` metres large at a distance: the twin of `wanted` in src/render/style/particles.rs.
 fn wanted(distance: f32, height: f32, radius: f32) -> f32 {
-    let pixels = dab_pixels(distance);
+    let pixels = dab_pixels(distance, height);
     let scale = frame.focal_length_pixels / max(distance, 0.5);
     return settings.cover * height * 2.0 * radius * scale * scale / (pixels * pixels);
 }
@@ -91,7 +94,7 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
 
     var out: Varying;
     out.clip = frame.clip_from_relative * vec4(center, 1.0);
-    out.clip += vec4(turned * grown * dab_pixels(distance) / settings.map_size * out.clip.w, 0.0, 0.0);
+    out.clip += vec4(turned * grown * dab_pixels(distance, size.x) / settings.map_size * out.clip.w, 0.0, 0.0);
     out.corner = corner;
     let facing = dot(rotate(decode_octahedral(particle.normal), tree.yaw), light.key_direction);
     let dark = facing <= settings.thresholds.x;
@@ -106,7 +109,10 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
 
 @fragment
 fn fragment(in: Varying) -> @location(0) vec4<f32> {
-    let shape = 1.0 - smoothstep(0.72, 1.0, length(in.corner));
+    // No dab is an ellipse: its outline has lobes.
+    let angle = atan2(in.corner.y, in.corner.x) + 40.0 * in.at.y + in.at.x;
+    let outline = 0.82 + 0.11 * sin(3.0 * angle) + 0.07 * sin(5.0 * angle + 1.3);
+    let shape = 1.0 - smoothstep(outline - 0.22, outline, length(in.corner));
     // The blurred depth test [Luft 2006, eq. 2] with a shift of its half width, in metres: a band of constant width.
     let texel = vec2<i32>(in.clip.xy);
     let depth = textureLoad(soft_lights, texel, 0).z;

@@ -32,6 +32,8 @@ struct Style {
     tones: f32,
     // 0: contours of the normals' directions alone; 1: of normals scaled by the ambient visibility.
     scaled_normals: f32,
+    // How far foliage takes on the colour of the scene's own leaves.
+    scene: f32,
 }
 
 @group(1) @binding(0) var<uniform> style: Style;
@@ -58,5 +60,5 @@ fn landscape_depth(distance: f32) -> f32 {
 
 // Where a distance begins to fade, and where it has faded.
 fn airiness(depth: f32) -> f32 {
-    return smoothstep(0.42, 0.84, depth);
+    return smoothstep(0.42, 0.78, depth);
 }

@@ -32,6 +32,8 @@ struct Layer {
 @group(1) @binding(12) var paper_sampler: sampler;
 // Intensities of the particles: dark, medium, bright.
 @group(1) @binding(13) var soft_dabs: texture_2d<f32>;
+// Albedo, and how much of a pixel has one.
+@group(1) @binding(14) var soft_colors: texture_2d<f32>;
 
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> FullScreen {
@@ -57,6 +59,9 @@ struct Pigment {
 
 const PAPER_ON_SHAPE: f32 = 0.22;
 const RIM: f32 = 0.38;
+const LUMINANCE: vec3<f32> = vec3(0.2126, 0.7152, 0.0722);
+// The washes of dark and medium foliage.
+const GLAZE: Layer = Layer(0.5, 0.10, 0.9, 1.0);
 
 // The twin of Wash::pigment in src/style/wash.rs.
 fn pigment(intensity: f32, layer: Layer, height: f32, flow: f32) -> Pigment {
@@ -95,9 +100,10 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let middle = anchored_noise(position, footprint * 22.0, 2u);
     let fine = anchored_noise(position, footprint * 6.0, 3u);
     let finer = anchored_noise(position, footprint * 3.2, 4u);
+    let cloud = anchored_noise(position * vec3(1.0, 1.8, 1.0), footprint * 190.0, 5u);
 
     // The hand: shapes waver.
-    let waver = (vec2(middle, broad) * (1.6 + 5.0 * style.wetness) + vec2(fine, finer) * 1.1) * style.unit / style.size;
+    let waver = (vec2(middle, broad) * (1.8 + 5.0 * style.wetness) + vec2(fine, finer) * 0.5) * style.unit / style.size;
     let uv = in.uv + waver;
     let soft = textureSampleLevel(soft_lights, linear_sampler, uv, 0.0);
     let wide = textureSampleLevel(wide_lights, linear_sampler, uv, 0.0);
@@ -107,10 +113,19 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
 
     // Forms stand out against their surroundings: light against its wide mean, and a rim where something nearer ends in front of
     // something farther [Luft, Colditz, Deussen 2006, unsharp masking of the depth].
-    let form = soft.x + 0.7 * (soft.x - wide.x);
+    let form = saturate((mix(soft.x, wide.x, 0.25) + 0.5 * (soft.x - wide.x) - 0.20) / 0.62);
+    let drawn = contour(soft_normals, soft_lights, linear_sampler, uv, style.line_width);
+    let particles = textureSampleLevel(soft_dabs, linear_sampler, uv, 0.0).rgb;
+    // Bright dabs are left out of the washes, as paper that masking fluid has kept.
+    let kept = smoothstep(0.30, 0.62, particles.z + 0.25 * (height - 0.5) - 0.5 * soft.y) * saturate(style.dabs);
     let step = wide.z - soft.z;
     let near_rim = smoothstep(0.002, 0.02, step);
     let behind = smoothstep(0.002, 0.03, -step);
+
+    // The hue of the scene's own leaves and petals.
+    let seen_color = textureSampleLevel(soft_colors, linear_sampler, uv, 0.0);
+    let albedo = seen_color.rgb / max(seen_color.a, 1e-3);
+    let hue = albedo / max(dot(albedo, LUMINANCE), 1e-4);
 
     var color = style.paper * (1.0 + 0.10 * relief);
     var foliage = 0.0;
@@ -119,39 +134,37 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
         let layer = layers[k];
         let slice = textureSampleLevel(shapes, linear_sampler, uv, k / 4, 0.0);
         let intensity = slice[k % 4];
-        let wash = pigment(intensity, layer, height, broad * 0.5 + 0.35 * middle);
-        let t = form + layer.foliage * (0.10 * tree + 0.10 * middle);
+        let wash = pigment(intensity, layer, height, broad * 0.7 + middle * select(0.4, 0.12, k == 0));
+        // The sky's ramp is over its height, and has no form.
+        let t = select(mix(form, 0.45 + 0.55 * form, layer.foliage) + layer.foliage * (0.14 * tree + 0.08 * middle) + (1.0 - layer.foliage) * (0.22 * broad + 0.12 * middle), soft.x, k == 0);
         let paint = ramp(k, t);
-        let transmittance = mix(paint.rgb, style.distance, 0.75 * air * min(layer.foliage + 0.6, 1.0) * f32(k > 0));
-        let rim = style.edges * (0.9 * near_rim + 0.35 * behind) * (1.0 - 0.5 * air) * layer.edge;
-        let thickness = (1.0 - 0.5 * air) * (1.0 + layer.foliage * 0.3 * tree);
+        // Each crown is mixed anew, warmer or cooler.
+        let mixed = paint.rgb * (1.0 + layer.foliage * tree * vec3(0.20, 0.04, -0.30) + layer.foliage * broad * vec3(0.06, 0.0, -0.10));
+        let own = min(hue * dot(mixed, LUMINANCE), vec3(1.0));
+        let pigmented = mix(mixed, own, style.scene * layer.foliage);
+        let transmittance = mix(saturate(pigmented), style.distance, 0.9 * air * f32(k > 0));
+        let rim = style.edges * min(0.5 * near_rim + 0.2 * behind + 1.2 * drawn, 1.3) * (1.0 - 0.6 * air) * layer.edge;
+        let clear = select(0.0, smoothstep(0.0, 0.55, 0.8 * cloud + 0.35 * broad), k == 0);
+        let thickness = (1.0 - 0.4 * air) * (1.0 + layer.foliage * 0.35 * tree) * (1.0 - 0.5 * kept * layer.foliage) * (1.0 - 0.8 * clear);
         color = glaze(color, transmittance, (wash.density + rim) * thickness, wash.coverage * paint.a);
         foliage += layer.foliage * wash.coverage;
         painted += wash.coverage;
     }
     foliage = saturate(foliage);
 
-    // Dabs of leaves in three maps, dark, medium and bright, by how the crown faces the light [Luft 2006, 4.2]; each is a wash
-    // of its own, glazed over the others.
-    let near = 1.0 - smoothstep(0.55, 0.8, soft.z);
-    let leaf = 0.62 * fine + 0.38 * finer + 0.35 * middle;
-    let facing = 2.0 * form - 1.0;
-    let dark = (1.0 - smoothstep(-0.75, 0.05, facing)) * 0.75 + 0.3 * (1.0 - soft.w);
-    let medium = 1.0 - abs(facing + 0.1) * 1.4;
-    let dabs = foliage * style.dabs * near;
+    // Two more washes of foliage, over where the crowns turn away from the light, and the dabs of near crowns in them: dark, medium
+    // and bright areas, each with its own shape, glazed over each other [Luft 2006, 4.2].
+    let near = 1.0 - smoothstep(0.55, 0.80, soft.z);
     let row = i32(arrayLength(&layers)) + 1;
-    let edge = 0.10 + 0.25 * style.wetness;
-    // Near crowns have particles; farther ones have noise that is fixed to them instead.
-    let particles = textureSampleLevel(soft_dabs, linear_sampler, uv, 0.0).rgb;
-    let by_noise = smoothstep(0.50, 0.56, soft.z);
-    let dab = Layer(0.42, 0.10 + 0.25 * style.wetness, 0.6, 1.0);
+    let glazed = foliage * style.dabs * near * (1.0 - 0.75 * air);
+    let ragged = 0.16 * middle + 0.10 * fine;
     for (var map = 0; map < 2; map += 1) {
-        let share = select(medium, dark, map == 0);
-        let threshold = mix(0.75, -0.05, saturate(share));
-        let noise = smoothstep(threshold - edge, threshold + edge, select(-leaf, leaf, map == 0));
-        let wash = pigment(mix(particles[map], noise, by_noise), dab, height, 0.5 * middle);
+        let limit = select(0.58, 0.30, map == 0);
+        let area = saturate(0.5 + 2.6 * (limit - form - ragged));
+        let wash = pigment(saturate(area + 0.75 * particles[map]), GLAZE, height, 0.6 * middle);
         let paint = ramp(row + map, form);
-        color = glaze(color, paint.rgb, 0.85 * wash.density, wash.coverage * dabs * paint.a);
+        let own = min(hue * dot(paint.rgb, LUMINANCE), vec3(1.0));
+        color = glaze(color, mix(paint.rgb, own, 0.7 * style.scene), 0.8 * wash.density + 0.4 * style.edges * drawn, wash.coverage * glazed * paint.a * (1.0 - 0.6 * kept));
     }
 
     // The layer of shadows.
@@ -161,24 +174,17 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let shadow_rim = shadow * (1.0 - smoothstep(0.42, 0.85, shade));
     let shadow_paint = ramp(i32(arrayLength(&layers)), airiness(soft.z));
     let shadow_density = 0.85 + 0.35 * style.edges * shadow_rim + style.granulation * (0.5 - height) + 0.3 * style.flow * broad;
-    color = glaze(color, shadow_paint.rgb, max(shadow_density, 0.0), shadow * style.shadow * shadow_paint.a * mix(1.0, 0.75, foliage));
-
-    // Bright dabs are body colour: the only ones that cover.
-    let bright_paint = ramp(row + 2, form);
-    let bright = smoothstep(0.15, 0.75, facing) * (1.0 - shadow);
-    let by_particle = smoothstep(0.35, 0.55, particles.z + 0.2 * (height - 0.5)) * (1.0 - 0.8 * shadow);
-    let lit = mix(by_particle, smoothstep(0.45 - edge, 0.45 + edge, -leaf + 0.3 * bright) * bright, by_noise) * dabs;
-    color = mix(color, bright_paint.rgb * style.paper, 0.55 * lit * bright_paint.a);
+    color = glaze(color, shadow_paint.rgb, max(shadow_density, 0.0), shadow * style.shadow * shadow_paint.a * mix(1.0, 0.45, foliage));
 
     // The night is one glaze over all.
     color *= style.night;
 
     // The pencil drawing, which the paper's hills take.
-    let tremble = vec2(broad, middle) * 0.9 * style.unit / style.size;
-    let drawn = contour(soft_normals, soft_lights, linear_sampler, in.uv + tremble, style.line_width);
-    let grain = smoothstep(0.30, 0.62, height + 0.16 * finer);
-    let pencil = drawn * grain * style.sketch * (0.75 + 0.35 * broad) * (1.0 - 0.7 * air);
-    color = mix(color, style.ink * style.paper, saturate(pencil) * 0.8);
+    let tremble = vec2(broad, middle) * 1.6 * style.unit / style.size;
+    let sketched = contour(soft_normals, soft_lights, linear_sampler, in.uv + tremble, style.line_width);
+    let grain = smoothstep(0.25, 0.55, height + 0.16 * finer);
+    let pencil = 1.6 * sketched * grain * style.sketch * (0.9 + 0.5 * broad) * (1.0 - 0.7 * air);
+    color = mix(color, style.ink * style.paper, saturate(pencil) * 0.85);
 
     // The margin: the brush does not end in a straight line.
     let from_edge = min(min(page.x, page.y), min(style.size.x / style.unit - page.x, style.size.y / style.unit - page.y));

@@ -40,10 +40,12 @@ impl Overrides {
         scene.quality.msaa = self.msaa.unwrap_or(scene.quality.msaa);
         scene.camera.exposure = self.exposure.or(scene.camera.exposure);
         self.restyle(scene);
-        if scene.style.is_drawn() {
-            light_for_style(scene);
-        }
-        let Some(lighting) = &self.lighting else { return };
+        let Some(lighting) = &self.lighting else {
+            if scene.style.is_drawn() {
+                light_for_style(scene);
+            }
+            return;
+        };
         for species in &mut scene.species {
             let kind = |lighting: &Lighting| std::mem::discriminant(lighting);
             match (&mut species.lighting, lighting) {

@@ -19,7 +19,7 @@ pub const FIRST_FOLIAGE: u8 = 3;
 pub const MOST_FOLIAGE: usize = 252;
 
 /// Distance of two colours at which they are mixed apart.
-const APART: f32 = 0.12;
+const APART: f32 = 0.05;
 
 /// The layer of foliage (0, 1, ...) of each plant by the mean linear colour of its leaves, at most `most` layers (at least
 /// one). The first plant has layer 0. The numbers of plants do not depend on those that follow.
@@ -51,17 +51,6 @@ fn pigment(color: Vec3) -> Vec3 {
     Vec3::new(color.x / sum, color.y / sum, luminance(color).cbrt())
 }
 
-/// The transmittance of a wash that looks like leaves of the linear colour `color`: its hue, as light as paint on white paper.
-pub fn wash_color(color: Vec3) -> Vec3 {
-    let light = luminance(color);
-    if !(color.is_finite() && light > 1e-5) {
-        return Vec3::splat(0.5);
-    }
-    // A sheet of paint passes far more light than a leaf reflects; the root keeps dark leaves darker than bright ones.
-    let wanted = (0.95 * light.max(0.0).cbrt()).clamp(0.2, 0.75);
-    (color / light * wanted).clamp(Vec3::splat(0.02), Vec3::splat(0.97))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -88,16 +77,5 @@ mod tests {
             .collect();
         let most = foliage_groups(&colors, 1000).into_iter().max().unwrap_or(0);
         assert!((64..MOST_FOLIAGE as u8).contains(&most), "{most}");
-    }
-
-    #[test]
-    fn paint_has_the_hue_of_the_leaves_and_is_lighter() {
-        for color in [BROADLEAF, CONIFER, AUTUMN] {
-            let paint = wash_color(color);
-            assert!(luminance(paint) > 1.5 * luminance(color) && paint.max_element() < 1.0);
-            assert_eq!(paint.max_position(), color.max_position());
-        }
-        assert!(luminance(wash_color(CONIFER)) < luminance(wash_color(BROADLEAF)));
-        assert_eq!(wash_color(Vec3::ZERO), Vec3::splat(0.5));
     }
 }

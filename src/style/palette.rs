@@ -93,7 +93,7 @@ macro_rules! built_in {
     };
 }
 
-built_in!("natural", "sepia", "cool-to-warm", "autumn", "indigo");
+built_in!("natural", "sepia", "cool-to-warm", "autumn", "indigo", "botanical");
 
 fn names() -> String {
     BUILT_IN.map(|(name, _)| name).join(", ")

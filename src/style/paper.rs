@@ -70,15 +70,13 @@ impl Paper {
     fn height(self, column: usize, row: usize) -> f32 {
         let (x, y) = (column as f32 / Self::SIDE as f32, row as f32 / Self::SIDE as f32);
         // Warped, so that nothing is a lattice.
-        let warp = |seed| 0.012 * (noise(x, y, 24, seed) - 0.5);
-        let (u, v) = (x + warp(11), y + warp(12));
-        let fibres = noise(u, v, 170, 3) - 0.5;
+        let warp = |seed| 0.014 * (noise(x, y, 20, seed) - 0.5) + 0.006 * (noise(x, y, 64, seed + 2) - 0.5);
+        let (u, v) = (x + warp(11), y + warp(21));
+        let fibres = noise(u, v, 200, 3) - 0.5;
         match self {
-            Self::HotPressed => bumps(u, v, 128, 1) * 0.5 + fibres,
-            Self::ColdPressed => {
-                bumps(u, v, 80, 1) + 0.5 * bumps(u, v, 128, 2) + 0.4 * fibres + 0.3 * noise(x, y, 12, 4)
-            }
-            Self::Rough => bumps(u, v, 48, 1) + 0.5 * bumps(u, v, 96, 2) + 0.3 * fibres + 0.4 * noise(x, y, 8, 4),
+            Self::HotPressed => 0.4 * tooth(u, v, 96, 1) + fibres,
+            Self::ColdPressed => tooth(u, v, 56, 1) + 0.35 * bumps(u, v, 72, 2) + 0.35 * fibres,
+            Self::Rough => tooth(u, v, 36, 1) + 0.6 * bumps(u, v, 48, 2) + 0.25 * fibres,
             Self::Laid => 0.5 * (TAU * 64.0 * v).sin() + 0.25 * (TAU * 6.0 * u).sin().max(0.8) + 0.8 * fibres,
             Self::Canvas => {
                 let (across, along) = ((TAU * 48.0 * u).sin(), (TAU * 48.0 * v).sin());
@@ -86,6 +84,12 @@ impl Paper {
             }
         }
     }
+}
+
+/// The tooth of a felt: three octaves of noise from `cells` cells along each side, 0..1.
+fn tooth(x: f32, y: f32, cells: usize, seed: u64) -> f32 {
+    let octave = |factor: usize, weight: f32| weight * noise(x, y, factor * cells, seed + 100 * factor as u64);
+    octave(1, 0.5) + octave(2, 0.32) + octave(4, 0.18)
 }
 
 /// Value noise of `cells` cells along each side, 0..1; it repeats.

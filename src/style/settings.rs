@@ -51,7 +51,7 @@ pub struct Watercolour {
     /// Strength of the layer of shadows, 0 to 2. Default 1.
     #[reflect(@Range::steps(0.0..=2.0, 0.1, 0.02), @"Strength of the layer of shadows.")]
     pub shadow: f32,
-    /// Depth in metres over which shadows begin, δ of the blurred depth test, 0 to 20. Default 2.
+    /// Depth in metres over which shadows begin, δ of the blurred depth test, 0 to 20. Default 1.6.
     #[reflect(@Range::steps(0.0..=20.0, 0.5, 0.1).unit("m"), @"Softness of shadows.")]
     pub shadow_softness: f32,
     /// Strength of the dabs of foliage, 0 to 2. Default 1.
@@ -117,6 +117,9 @@ pub struct Lines {
     /// How small a discontinuity is drawn, 0 to 4. Default 1.
     #[reflect(@Range::steps(0.0..=4.0, 0.1, 0.02), @"How small a discontinuity is drawn.")]
     pub detail: f32,
+    /// Standard deviation in pixels of a picture of 720 lines of the Gaussian that simplifies shapes, 0 to 20. Default 1.6.
+    #[reflect(@Range::steps(0.0..=20.0, 0.5, 0.1).unit("px"), @"How far shapes are simplified.")]
+    pub simplification: f32,
     /// Which normals are used. Default `Scaled`.
     #[reflect(@"Normals in which contours are found.")]
     pub normals: LineNormals,
@@ -132,6 +135,7 @@ impl Default for Lines {
             paper: Paper::HotPressed.name().to_owned(),
             width: 1.2,
             detail: 1.0,
+            simplification: 1.6,
             normals: LineNormals::default(),
             hatching: 0.5,
         }
@@ -240,6 +244,7 @@ impl Style {
                 vec![
                     ("width", l.width, 0.25..=10.0),
                     ("detail", l.detail, 0.0..=4.0),
+                    ("simplification", l.simplification, 0.0..=20.0),
                     ("hatching", l.hatching, 0.0..=1.0),
                 ]
             }

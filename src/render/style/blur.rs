@@ -25,7 +25,7 @@ use crate::{
 };
 
 /// Number of blurred maps, whose jobs come first; then the dabs', then the layers'.
-pub const MAPS: usize = 3;
+pub const MAPS: usize = 4;
 
 /// The Gaussians of a view.
 struct Blurs<'a> {
@@ -69,7 +69,7 @@ impl<'a> Blurs<'a> {
     }
 }
 
-/// Blurs light, depth and normals.
+/// Blurs light, depth, normals and albedo.
 pub fn maps_pass(
     view: ViewQuery<&DrawnStyle, With<CanopyCamera>>,
     targets: Res<StyleTargets>,
@@ -85,6 +85,7 @@ pub fn maps_pass(
         (&maps.lights, &maps.soft_lights, true),
         (&maps.soft_lights, &maps.wide_lights, wide),
         (&maps.surfaces, &maps.soft_normals, true),
+        (&maps.colors, &maps.soft_colors, wide),
     ];
     for (job, (source, target, _)) in jobs.into_iter().enumerate().filter(|(_, (.., wanted))| *wanted) {
         blurs.both(&mut ctx, job, [0, 0], [source, &maps.half_blurred, target]);

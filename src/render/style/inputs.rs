@@ -14,7 +14,7 @@ use bevy::{
         renderer::RenderDevice,
     },
 };
-use glam::{Vec3, Vec4, Vec4Swizzles};
+use glam::Vec4;
 use half::f16;
 
 use super::{
@@ -25,7 +25,6 @@ use crate::{
     math::MipView,
     render::{
         components::{CanopyCamera, DrawnStyle},
-        forest::GpuForests,
         gpu::{self, Gpu, UNIFORM_STRIDE},
         report::FrameReport,
         view::PreparedFrame,
@@ -35,8 +34,8 @@ use crate::{
 
 /// Colours of a ramp on the device.
 const RAMP_STEPS: usize = 64;
-/// Passes of the Gaussian: three maps, the dabs, and the slices of the layers, both directions each.
-pub const MOST_BLURS: u64 = 2 * (4 + 64);
+/// Passes of the Gaussian: four maps, the dabs, and the slices of the layers, both directions each.
+pub const MOST_BLURS: u64 = 2 * (5 + 64);
 
 /// The values of the style that is drawn.
 #[derive(Resource)]
@@ -69,8 +68,6 @@ struct InputKey {
     palette: Option<Palette>,
     paper: Paper,
     layers: u32,
-    /// Mean linear colours of the leaves of each layer of foliage.
-    leaves: Vec<Vec3>,
     wetness: f32,
 }
 
@@ -112,9 +109,12 @@ impl Deviations {
         match style {
             Style::Watercolour(w) => {
                 let s = w.simplification;
-                Self { shapes: s, lights: 1.3 * s, wide: 4.0 * s, normals: 0.6 * s, dabs: 0.3 * s }
+                Self { shapes: s, lights: 0.6 * s, wide: 3.0 * s, normals: 0.6 * s, dabs: 0.3 * s }
             }
-            Style::Lines(_) => Self { shapes: 0.0, lights: 1.6, wide: 0.0, normals: 1.6, dabs: 0.0 },
+            Style::Lines(l) => {
+                let s = l.simplification;
+                Self { shapes: 0.0, lights: s, wide: 0.0, normals: s, dabs: 0.0 }
+            }
             Style::Toon(_) => Self { shapes: 0.0, lights: 1.6, wide: 0.0, normals: 1.2, dabs: 0.0 },
             Style::Photograph => Self { shapes: 0.0, lights: 0.0, wide: 0.0, normals: 0.0, dabs: 0.0 },
         }
@@ -125,7 +125,6 @@ impl Deviations {
 pub fn prepare_inputs(
     views: Query<&DrawnStyle, With<CanopyCamera>>,
     frame: Res<PreparedFrame>,
-    forests: Res<GpuForests>,
     targets: Res<StyleTargets>,
     gpu: Gpu,
     report: Res<FrameReport>,
@@ -141,13 +140,7 @@ pub fn prepare_inputs(
     write_blurs(&gpu, &inputs.blurs, &Deviations::of(&drawn.style), maps.key.size.1, maps.key.layers);
 
     let wetness = if let Style::Watercolour(w) = &drawn.style { w.wetness } else { 0.0 };
-    let key = InputKey {
-        palette: drawn.palette().cloned(),
-        paper: drawn.paper(),
-        layers: maps.key.layers,
-        leaves: leaf_colors(&forests),
-        wetness,
-    };
+    let key = InputKey { palette: drawn.palette().cloned(), paper: drawn.paper(), layers: maps.key.layers, wetness };
     if inputs.drawn.as_ref().is_some_and(|known| known.key == key) {
         report.skipped("palette and paper", "neither has changed");
         return;
@@ -162,8 +155,8 @@ pub fn prepare_inputs(
 
 /// Writes the steps of all Gaussians, in the order in which `blur` runs them.
 fn write_blurs(gpu: &Gpu, buffer: &Buffer, deviations: &Deviations, lines: u32, layers: u32) {
-    let maps =
-        [deviations.lights, deviations.wide, deviations.normals, deviations.dabs].map(|deviation| (deviation, 0));
+    let maps = [deviations.lights, deviations.wide, deviations.normals, deviations.lights, deviations.dabs]
+        .map(|deviation| (deviation, 0));
     let slices = (0..layers.div_ceil(4)).map(|slice| (deviations.shapes, 4 * slice));
     for (index, (deviation, first_layer)) in maps.into_iter().chain(slices).enumerate() {
         // The shader's points are 3/8 of the deviation apart.
@@ -176,22 +169,6 @@ fn write_blurs(gpu: &Gpu, buffer: &Buffer, deviations: &Deviations, lines: u32, 
             }
         }
     }
-}
-
-/// Mean linear colour of the leaves of each layer of foliage.
-fn leaf_colors(forests: &GpuForests) -> Vec<Vec3> {
-    let mut sums: Vec<(Vec3, f32)> = Vec::new();
-    for (_, forest) in forests.iter() {
-        for (plant, group) in forest.plants().iter().zip(forest.foliage_groups()) {
-            let group = usize::from(*group);
-            if sums.len() <= group {
-                sums.resize(group + 1, (Vec3::ZERO, 0.0));
-            }
-            let color = plant.plant.leaf_colors().reflected;
-            sums[group] = (sums[group].0 + color, sums[group].1 + 1.0);
-        }
-    }
-    sums.into_iter().map(|(sum, count)| sum / count.max(1.0)).collect()
 }
 
 /// How each layer is painted: the sky on wet paper, the rest on dry paper as far as the style says.
@@ -219,28 +196,13 @@ fn ramps(key: &InputKey) -> Vec<Vec<Vec4>> {
         layers::WOOD => hued(&palette.wood),
         foliage => {
             let group = usize::from(foliage - layers::FIRST_FOLIAGE);
-            let mut ramp = hued(palette.foliage_of(group));
-            if let Some(leaves) = key.leaves.get(group) {
-                toward_scene(&mut ramp, *leaves, palette.scene);
-            }
-            ramp
+            hued(palette.foliage_of(group))
         }
     };
     let mut rows: Vec<_> = (0..key.layers.max(1)).map(layer).collect();
     rows.push(palette.shadow.table(RAMP_STEPS));
     rows.extend(palette.dabs.iter().map(|ramp| ramp.table(RAMP_STEPS)));
     rows
-}
-
-/// Turns the hue of a ramp by `share` towards that of leaves of the linear colour `leaves`; the brightness stays the ramp's.
-fn toward_scene(ramp: &mut [Vec4], leaves: Vec3, share: f32) {
-    let paint = layers::wash_color(leaves);
-    let paint = paint / crate::math::luminance(paint).max(1e-4);
-    for color in ramp {
-        let own = color.xyz();
-        let hue = (paint * crate::math::luminance(own)).min(Vec3::ONE);
-        *color = own.lerp(hue, share).extend(color.w);
-    }
 }
 
 fn upload_ramps(gpu: &Gpu, key: &InputKey) -> TextureView {
@@ -264,13 +226,7 @@ mod tests {
     use super::*;
 
     fn key(layers: u32) -> InputKey {
-        InputKey {
-            palette: Palette::named("natural").ok(),
-            paper: Paper::Rough,
-            layers,
-            leaves: vec![Vec3::new(0.065, 0.127, 0.033)],
-            wetness: 0.3,
-        }
+        InputKey { palette: Palette::named("natural").ok(), paper: Paper::Rough, layers, wetness: 0.3 }
     }
 
     #[test]
@@ -282,14 +238,6 @@ mod tests {
             assert_eq!(rows.len(), layers.max(1) as usize + 4);
             assert!(rows.iter().all(|row| row.len() == RAMP_STEPS && row.iter().all(|color| color.is_finite())));
         }
-        assert!(MOST_BLURS >= 2 * (4 + 256 / 4));
-    }
-
-    #[test]
-    fn the_scenes_leaves_turn_the_hue_and_keep_the_light() {
-        let mut ramp = vec![Vec4::new(0.5, 0.4, 0.3, 1.0)];
-        let before = crate::math::luminance(ramp[0].xyz());
-        toward_scene(&mut ramp, Vec3::new(0.05, 0.15, 0.03), 1.0);
-        assert!((crate::math::luminance(ramp[0].xyz()) - before).abs() < 0.02 && ramp[0].y > ramp[0].x);
+        assert!(MOST_BLURS >= 2 * (5 + 256 / 4));
     }
 }

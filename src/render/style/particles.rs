@@ -52,9 +52,11 @@ use crate::{
 };
 
 /// Metres across a dab.
-const SIZE: f32 = 0.55;
+const SIZE: f32 = 0.42;
+/// Metres: lower plants have smaller dabs.
+const TALL: f32 = 12.0;
 /// Least pixels across a dab, of a picture of 720 lines.
-const LEAST_PIXELS: f32 = 7.0;
+const LEAST_PIXELS: f32 = 6.0;
 /// Dabs per area of the crown's box and area of their own box.
 const COVER: f32 = 1.5;
 /// Metres to which dabs are seen into a crown: δ of the blurred depth test.
@@ -123,7 +125,7 @@ fn settings(map_size: (u32, u32)) -> ParticleViewUniform {
 /// Dabs of a crown `height` and `radius` metres large at `distance` metres: as many as cover it at their size.
 fn wanted(settings: &ParticleViewUniform, focal_pixels: f32, distance: f32, height: f32, radius: f32) -> f32 {
     let scale = focal_pixels / distance.max(0.5);
-    let pixels = (settings.size * scale).max(settings.least_pixels);
+    let pixels = (settings.size * (height / TALL).min(1.0) * scale).max(settings.least_pixels);
     settings.cover * height * 2.0 * radius * scale * scale / (pixels * pixels)
 }
 

@@ -59,6 +59,7 @@ pub fn picture_pass(
                 &inputs.linear,
                 &inputs.repeating,
                 &maps.soft_dabs,
+                &maps.soft_colors,
             )),
         ),
         Picture::Lines | Picture::Toon => device.create_bind_group(

@@ -66,6 +66,8 @@ pub struct StyleMaps {
     pub wide_lights: TextureView,
     /// Normals under a Gaussian.
     pub soft_normals: TextureView,
+    /// Albedo under a Gaussian, with the share of surfaces as its alpha.
+    pub soft_colors: TextureView,
     /// What is blurred along one axis.
     pub half_blurred: TextureView,
     /// The same of layers.
@@ -165,6 +167,12 @@ impl StyleMaps {
             soft_lights: map("canopy_style_soft_lights"),
             wide_lights: map("canopy_style_wide_lights"),
             soft_normals: map("canopy_style_soft_normals"),
+            soft_colors: view(texture(
+                "canopy_style_soft_colors",
+                MAP_FORMAT,
+                1,
+                if key.layers > 0 { key.size } else { (1, 1) },
+            )),
             half_blurred: map("canopy_style_half_blurred"),
             half_shapes: view(texture("canopy_style_half_shapes", SHAPE_FORMAT, 1, shape_size)),
             shape_slices: (0..key.layers.div_ceil(4)).map(slice).collect(),

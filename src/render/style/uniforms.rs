@@ -58,8 +58,8 @@ pub struct StyleUniform {
     pub tones: f32,
     /// 1: contours of normals scaled by the ambient visibility.
     pub scaled_normals: f32,
-    /// WGSL rounds the size up to 16 bytes.
-    pub padding: f32,
+    /// How far foliage takes on the colour of the scene's own leaves.
+    pub scene: f32,
 }
 
 /// `Layer` of `shaders/style/watercolor.wgsl`.
@@ -139,6 +139,7 @@ impl StyleUniform {
             uniform.paper = palette.paper.0.to_array();
             uniform.ink = palette.ink.0.to_array();
             uniform.distance = palette.distance.0.to_array();
+            uniform.scene = palette.scene;
             uniform.night = Vec3::ONE.lerp(palette.night.0, night(view.exposure)).to_array();
         }
         let mut lines = |width: f32, detail: f32, normals: LineNormals| {
@@ -149,7 +150,7 @@ impl StyleUniform {
         match &drawn.style {
             Style::Photograph => {}
             Style::Watercolour(w) => {
-                lines(1.3, 0.8, LineNormals::Scaled);
+                lines(1.4, 1.0, LineNormals::Scaled);
                 let Watercolour { margin, sketch, air, flow, edges, granulation, wetness, dabs, shadow, .. } = *w;
                 let shadow_softness = w.shadow_softness;
                 uniform = Self {
