@@ -34,7 +34,7 @@
 //! ([`SunRefresh::Immediate`](components::SunRefresh)).
 //!
 //! The modules [`math`], [`scene`] (what a user writes), [`terrain`], [`scatter`], [`plant`], [`bake`], [`light`],
-//! [`lod`], [`trace`] and [`mod@reference`] use neither `App` nor GPU. [`assets`] builds scenes from them, [`render`]
+//! [`style`], [`lod`], [`trace`] and [`mod@reference`] use neither `App` nor GPU. [`assets`] builds scenes from them, [`render`]
 //! draws them, and [`components`] has what a program spawns. ARCHITECTURE.md in the repository shows the path of a tree
 //! from a file to a pixel.
 //!
@@ -62,6 +62,7 @@ pub mod reference;
 pub mod render;
 pub mod scatter;
 pub mod scene;
+pub mod style;
 pub mod terrain;
 pub mod trace;
 
@@ -85,8 +86,8 @@ pub mod prelude {
         lod::{FadeBand, Levels, Representation},
         progress::{Progress, Silent},
         render::components::{
-            CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, ForestUpdates, Ground, LightUpdates,
-            SunShadowSettings, ViewOptions,
+            CanopyCamera, CanopyOrigin, CanopyStyle, CastsCanopyShadow, Daylight, Forest, ForestUpdates, Ground,
+            LightUpdates, SunShadowSettings, ViewOptions,
         },
         render::diagnostics::CanopyDiagnosticsPlugin,
         scene::{Overrides, Scene, SceneSource},

@@ -13,6 +13,7 @@ mod pictures;
 mod plate;
 mod plugins;
 mod shadows;
+mod style;
 mod traps;
 mod world;
 

@@ -12,6 +12,7 @@ use canopy::scene::{
     Anchor, GltfPlants, Ground, GroundFile, GrownForm, GrownPlants, InventoryTrees, Lighting, Overrides, Path,
     PlantSource, Position, ScatteredTrees, Scene, SceneError, Species, Transfer, Trees,
 };
+use canopy::style::{Style, Toon};
 use canopy::terrain::CoordinateSystem;
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
@@ -82,8 +83,8 @@ const FULL: &str = r#"(
         view_distance: 5000,
         terrain_error: 2,
     ),
-)
-"#;
+    style: Watercolour(palette: "sepia", paper: "rough", edges: 1.5),
+)"#;
 
 fn parse(text: &str) -> Result<Scene, SceneError> {
     Scene::parse(text, FilePath::new("folder/full.ron"))
@@ -146,6 +147,8 @@ fn everything_is_read() -> Outcome {
     let path = Path::new(&scene.camera.path).ok_or("no path")?;
     assert_eq!(path.at(5.0), scene.camera.path[1].pose());
     assert_eq!((scene.quality.cascades, scene.quality.near_distance), (3, 40.0));
+    let Style::Watercolour(watercolour) = &scene.style else { return Err("no watercolour".into()) };
+    assert_eq!((watercolour.palette.as_str(), watercolour.edges), ("sepia", 1.5));
     Ok(())
 }
 
@@ -194,6 +197,23 @@ fn a_request_changes_the_way_of_the_sun_and_keeps_the_rest() -> Outcome {
     assert_eq!(transfer(&scene, 0), Some((5, SunLight::Combined)));
     overrides("local")?.apply(&mut scene);
     assert_eq!(scene.species[0].lighting, Some(Lighting::Local));
+    Ok(())
+}
+
+#[test]
+fn a_request_restyles_a_scene_and_gives_its_foliage_a_surface() -> Outcome {
+    let full = parse(FULL)?;
+    let style = |name: &str| Style::named(name).ok_or("no style");
+    // The same style keeps its own values; palette and paper are replaced one by one.
+    let same = Overrides { style: Some(style("watercolour")?), paper: Some("laid".to_owned()), ..Overrides::default() };
+    let Style::Watercolour(kept) = same.applied(full.clone()).style else { return Err("no watercolour".into()) };
+    assert_eq!((kept.palette.as_str(), kept.paper.as_str(), kept.edges), ("sepia", "laid", 1.5));
+    let toon = Overrides { style: Some(style("toon")?), ..Overrides::default() }.applied(full.clone());
+    assert_eq!(toon.style, Style::Toon(Toon::default()));
+    let realigned = |scene: &Scene| scene.species.iter().all(|s| matches!(s.lighting, Some(Lighting::Expressive(_))));
+    assert!(realigned(&toon));
+    let photograph = Overrides { style: Some(Style::Photograph), ..Overrides::default() }.applied(full.clone());
+    assert!(!photograph.style.is_drawn() && photograph.species == full.species && !realigned(&full));
     Ok(())
 }
 
@@ -275,6 +295,7 @@ fn unknown_choices_are_listed() {
     faulty("sequence: Hammersley", "sequence: Halten", 10, &["did you mean `Halton`", "`Random`"]);
     faulty("form: Broadleaf", "form: Palm", 6, &["unknown choice `Palm`", "`Conifer`"]);
     faulty("moon: Astronomical", "moon: New", 6, &["unknown choice `New`", "`None`"]);
+    faulty("style: Watercolour(", "style: Oil(", 7, &["unknown choice `Oil`", "`Lines`", "`Toon`"]);
     faulty("weight: 3,", "leaf: Rubber,", 6, &["unknown choice `Rubber`", "`Leathery`", "`Needle`"]);
 }
 
@@ -344,6 +365,9 @@ fn impossible_values_are_placed() {
     faulty("cascades: 3", "cascades: 5", 10, &["1 to 4"]);
     faulty("msaa: 1", "msaa: 2", 6, &["write 1 (off) or 4"]);
     faulty("terrain_error: 2", "terrain_error: 0", 15, &["pixels"]);
+    faulty("edges: 1.5", "edges: 9", 7, &["`style.edges` is 9", "from 0 to 3"]);
+    faulty("palette: \"sepia\"", "palette: \"sepai\"", 9, &["which is no palette", "did you mean \"sepia\""]);
+    faulty("paper: \"rough\"", "paper: \"ruogh\"", 7, &["which is no paper", "did you mean \"rough\""]);
 }
 
 #[test]

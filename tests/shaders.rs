@@ -21,6 +21,7 @@ use canopy::{
             PlantVertex, TransferUniform, VariantUniform,
         },
         shaders::{ShaderFile, sources},
+        style::uniforms::{BlurUniform, GpuParticle, LayerUniform, ParticleViewUniform, StyleUniform},
         terrain::{GpuTile, GpuTileVertex},
     },
     scatter::PackedTree,
@@ -33,7 +34,7 @@ use naga::{
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 
 /// All that the pipelines switch on or off.
-const DEFINES: [&str; 9] = [
+const DEFINES: [&str; 13] = [
     "FOLIAGE",
     "ALPHA_TO_COVERAGE",
     "NORMAL_MAP",
@@ -43,6 +44,10 @@ const DEFINES: [&str; 9] = [
     "SUN_DETAIL",
     "PLAIN_TOO",
     "DEPTH_FIRST",
+    "STYLED",
+    "OWN_NORMALS",
+    "IDENTITIES",
+    "TOON",
 ];
 
 /// All combinations of [`DEFINES`]; some mean something with transfer only, and crosses have no others with their depth
@@ -53,8 +58,18 @@ fn variants() -> impl Iterator<Item = Vec<&'static str>> {
     });
     let needs = ["TRANSFER_COLOR", "SUN_HARMONICS", "PLAIN_TOO"];
     let never_of_crosses = ["NORMAL_MAP", "TRANSFER_COLOR", "SUN_HARMONICS", "SUN_DETAIL"];
+    // Of the styles, only foliage has a variant, and only without light.
+    let styles = ["STYLED", "OWN_NORMALS", "IDENTITIES", "TOON"];
+    let style_variant = |defines: &[&str]| match defines {
+        ["IDENTITIES"] | ["TOON"] => true,
+        _ => {
+            defines.contains(&"STYLED")
+                && defines.iter().all(|define| ["FOLIAGE", "STYLED", "OWN_NORMALS"].contains(define))
+        }
+    };
     let any_of = |defines: &[&str], some: &[&str]| some.iter().any(|define| defines.contains(define));
     all.filter(move |defines| defines.contains(&"TRANSFER") || !any_of(defines, &needs))
+        .filter(move |defines| !any_of(defines, &styles) || style_variant(defines))
         .filter(|defines| !defines.contains(&"SUN_DETAIL") || defines.contains(&"SUN_HARMONICS"))
         .filter(move |defines| !defines.contains(&"DEPTH_FIRST") || !any_of(defines, &never_of_crosses))
 }
@@ -261,6 +276,7 @@ fn gpu_structs_are_what_the_shaders_think() {
             lobe_limit,
             cover_weight,
             inverse_height,
+            foliage_layer,
         }
     );
     twin!(
@@ -301,6 +317,44 @@ fn gpu_structs_are_what_the_shaders_think() {
             indirect_sun_color,
             indirect_sun_scale,
         }
+    );
+    twin!(
+        layouts,
+        "Style",
+        StyleUniform {
+            anchor,
+            unit,
+            size,
+            map_size,
+            paper,
+            margin,
+            ink,
+            sketch,
+            distance,
+            air,
+            night,
+            flow,
+            edges,
+            granulation,
+            wetness,
+            dabs,
+            shadow,
+            shadow_softness,
+            line_width,
+            detail,
+            hatching,
+            tones,
+            scaled_normals,
+            scene,
+        }
+    );
+    twin!(layouts, "Layer", LayerUniform { threshold, softness, edge, foliage });
+    twin!(layouts, "BlurJob", BlurUniform { step, first_layer });
+    twin!(layouts, "Particle", GpuParticle { position, normal });
+    twin!(
+        layouts,
+        "ParticleView",
+        ParticleViewUniform { size, least_pixels, cover, reach, thresholds, map_size, fade }
     );
     twin!(layouts, "Tree", PackedTree { xz, y, cell, look });
     twin!(layouts, "Ring", Ring { shift, square });
@@ -360,6 +414,11 @@ fn every_bound_struct_has_its_twin_tested() {
         "Tree",
         "Tile",
         "TileVertex",
+        "Style",
+        "Layer",
+        "BlurJob",
+        "Particle",
+        "ParticleView",
         "MeshPosition",
         "Volume",
         "Cluster",

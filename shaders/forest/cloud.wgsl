@@ -8,6 +8,11 @@
 #import canopy::sky::sky_transfer
 #import canopy::stand::{stand_light, in_stand_by_transfer, evaluate_two_bands}
 #import canopy::sun_visibility::{sample_ground, terrain_visibility, cascaded_visibility}
+#ifdef STYLED
+#import canopy::constants::WOOD_LAYER
+#import canopy::instance::{Crown, crown_of}
+#import canopy::style_surface::{StyledSurface, styled_surface, crown_surface, individual}
+#endif
 
 @group(2) @binding(0) var color_textures: texture_2d_array<f32>;
 @group(2) @binding(1) var property_textures: texture_2d_array<f32>;
@@ -32,6 +37,13 @@ struct Varying {
     @location(5) @interpolate(flat) front: vec3<f32>,
     // A packed `Look`.
     @location(6) look: vec4<f32>,
+#ifdef STYLED
+    // A `Crown`.
+    @location(7) @interpolate(flat) crown_center: vec3<f32>,
+    @location(8) @interpolate(flat) crown_inverse_extents: vec2<f32>,
+    // Layer, and a number of the tree.
+    @location(9) @interpolate(flat) identity: vec2<u32>,
+#endif
 }
 
 struct Look {
@@ -81,6 +93,12 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
         out.clip = vec4(0.0, 0.0, 0.5, 1.0);
     }
     out.look = pack_look(Look(threshold, position.from_foot.y, position.from_foot.y / height, tree.tint));
+#ifdef STYLED
+    let crown = crown_of(tree);
+    out.crown_center = crown.center;
+    out.crown_inverse_extents = crown.inverse_extents;
+    out.identity = vec2(variants[tree.variant].foliage_layer, individual(trees[visible[instance]]));
+#endif
     return out;
 }
 
@@ -92,6 +110,34 @@ fn decode_octahedral(e: vec2<f32>) -> vec3<f32> {
     n.y += select(t, -t, n.y >= 0.0);
     return normalize(n);
 }
+
+#ifdef STYLED
+// The surface alone: the styles light it themselves.
+@fragment
+fn styled(in: Varying) -> StyledSurface {
+    let look = unpack_look(in.look);
+    let level = mip_level(in.uv);
+    let texel = textureSampleLevel(color_textures, texture_sampler, in.uv, in.variant, level);
+    if texel.a < look.threshold {
+        discard;
+    }
+    let properties = textureSampleLevel(property_textures, texture_sampler, in.uv, in.variant, level);
+    let local = decode_octahedral(properties.xy);
+    var normal = vec4(normalize(in.right * local.x + in.up * local.y + in.front * local.z), properties.b);
+    let foliage = properties.a > 0.5;
+    let realigned = variants[in.variant].realigned > 0.5;
+#ifdef OWN_NORMALS
+    let away = (dot(normal.xyz, in.relative) > 0.0) & !realigned;
+    normal = vec4(select(normal.xyz, -normal.xyz, away), normal.w);
+#else
+    let crown = crown_surface(in.relative, Crown(in.crown_center, in.crown_inverse_extents));
+    normal = select(normal, crown, foliage & !realigned);
+#endif
+    let albedo = mix(texel.rgb, tint_foliage(texel.rgb, look.tint), properties.a);
+    let identity = vec2(select(WOOD_LAYER, in.identity.x, foliage), in.identity.y);
+    return styled_surface(normal.xyz, select(1.0, normal.w, foliage), look.height, identity, albedo);
+}
+#endif
 
 @fragment
 fn fragment(in: Varying) -> @location(0) vec4<f32> {

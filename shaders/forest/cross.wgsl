@@ -8,6 +8,10 @@
 #import canopy::sky::sky_transfer
 #import canopy::stand::{stand_light, in_stand_by_transfer, evaluate_two_bands}
 #import canopy::sun_visibility::{sample_ground, terrain_visibility, cascaded_visibility}
+#ifdef STYLED
+#import canopy::constants::WOOD_LAYER
+#import canopy::style_surface::{StyledSurface, styled_surface, crown_surface, individual}
+#endif
 
 @group(2) @binding(0) var color_textures: texture_2d_array<f32>;
 @group(2) @binding(1) var property_textures: texture_2d_array<f32>;
@@ -41,6 +45,10 @@ struct Varying {
     // The functions of the sun textures at the key light's direction, times their scale.
     @location(9) @interpolate(flat) sun_basis: vec4<f32>,
     @location(10) @interpolate(flat) more_sun_basis: vec4<f32>,
+#ifdef STYLED
+    // Layer, and a number of the tree.
+    @location(11) @interpolate(flat) identity: vec2<u32>,
+#endif
 }
 
 struct Look {
@@ -107,6 +115,9 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     let to_light = light.key_direction;
     let sun = vec3(dot(to_light, out.right), dot(to_light, out.up), dot(to_light, out.front));
     set_sun_basis(select(sun, sun.xzy, level), &out);
+#ifdef STYLED
+    out.identity = vec2(variants[tree.variant].foliage_layer, individual(trees[visible[index / CROSS_VERTICES]]));
+#endif
     return out;
 }
 
@@ -163,6 +174,30 @@ fn depth(in: Varying) -> @location(0) vec4<f32> {
         discard;
     }
     return vec4(0.0);
+}
+#endif
+
+#ifdef STYLED
+// The surface alone: the styles light it themselves.
+@fragment
+fn styled(in: Varying) -> StyledSurface {
+    let look = unpack_look(in.look);
+    let level = mip_level(in.uv);
+    let texel = textureSampleLevel(color_textures, texture_sampler, in.uv, in.layer, level);
+    if texel.a < look.threshold {
+        discard;
+    }
+    let properties = textureSampleLevel(property_textures, texture_sampler, in.uv, in.layer, level);
+    let local = decode_octahedral(properties.xy);
+    var normal = vec4(normalize(in.right * local.x + in.up * local.y + in.front * local.z), properties.b);
+    let foliage = properties.a > 0.5;
+#ifndef OWN_NORMALS
+    let crown = crown_surface(in.relative, Crown(in.crown_center, in.crown_inverse_extents));
+    normal = select(normal, crown, foliage & (variants[in.layer / PLANES].realigned < 0.5));
+#endif
+    let albedo = mix(texel.rgb, tint_foliage(texel.rgb, look.tint), properties.a);
+    let identity = vec2(select(WOOD_LAYER, in.identity.x, foliage), in.identity.y);
+    return styled_surface(normal.xyz, select(1.0, normal.w, foliage), look.height, identity, albedo);
 }
 #endif
 

@@ -57,6 +57,8 @@ struct Variant {
     cover_weight: f32,
     // The nominal height over its own, times FACTOR_ONE.
     inverse_height: u32,
+    // Layer of its foliage in the styles.
+    foliage_layer: u32,
 }
 
 struct Instance {

@@ -7,6 +7,10 @@
 #import canopy::stand::{StandLight, stand_light, trunk_light}
 #import canopy::sun_visibility::{sample_ground, terrain_visibility, cascaded_visibility, LeafSample, cascaded_leaf_visibility}
 
+#ifdef STYLED
+#import canopy::constants::WOOD_LAYER
+#import canopy::style_surface::{StyledSurface, styled_surface, crown_surface, individual}
+#endif
 #ifdef TRANSFER
 #import canopy::transfer::{light_sides, light_in_stand, indirect_sun}
 #endif
@@ -89,6 +93,10 @@ struct Varying {
     // Distance to where the key light enters the crown, metres.
     @location(9) @interpolate(perspective, centroid) entry_distance: f32,
 #endif
+#ifdef STYLED
+    // Layer, and a number of the tree.
+    @location(10) @interpolate(flat) identity: vec2<u32>,
+#endif
 }
 
 // The light in the stand on this part.
@@ -135,6 +143,18 @@ fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index
     out.front_sun = sun.front;
     out.back_sun = sun.back;
     out.entry_distance = depth_in_crown(position.relative, crown_of(tree), light.key_direction);
+#endif
+#ifdef STYLED
+    out.identity = vec2(WOOD_LAYER, individual(trees[visible[index]]));
+#ifdef FOLIAGE
+    out.identity.x = variants[tree.variant].foliage_layer;
+#ifndef OWN_NORMALS
+    let crown = crown_surface(position.relative, crown_of(tree));
+    let realigned = variants[tree.variant].realigned > 0.5;
+    out.normal = select(crown.xyz, out.normal, realigned);
+    out.look.x = select(crown.w, ambient, realigned);
+#endif
+#endif
 #endif
     return out;
 }
@@ -276,3 +296,29 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     color = tint_level(color);
     return finish(in.relative, color, coverage);
 }
+
+#ifdef STYLED
+// The surface alone: the styles light it themselves.
+@fragment
+fn styled(in: Varying) -> StyledSurface {
+    let look = unpack_look(in.look);
+    let texel = textureSample(color_texture, part_sampler, in.uv);
+    var normal = normalize(in.normal);
+#ifdef FOLIAGE
+    if texel.a < in.threshold {
+        discard;
+    }
+#ifdef OWN_NORMALS
+    normal = select(normal, -normal, (part.realigned < 0.5) & (dot(normal, in.relative) > 0.0));
+#endif
+    let albedo = tint_foliage(texel.rgb * part.base_color, look.tint);
+    return styled_surface(normal, look.ambient_visibility, look.height, in.identity, albedo);
+#else
+    let keep = hash(vec3(in.uv * 97.0, look.height * 31.0));
+    if WHOLE + (1.0 - WHOLE) * keep < in.threshold - 1e-4 {
+        discard;
+    }
+    return styled_surface(normal, 1.0, look.height, in.identity, texel.rgb * part.base_color);
+#endif
+}
+#endif

@@ -6,6 +6,10 @@
 #import canopy::output::finish
 #import canopy::stand::{ground_light, stand_light}
 #import canopy::sun_visibility::{sample_ground, terrain_visibility, cascaded_visibility}
+#ifdef STYLED
+#import canopy::constants::{GROUND_LAYER, FIRST_FOLIAGE_LAYER}
+#import canopy::style_surface::{StyledSurface, styled_surface}
+#endif
 
 struct TileVertex {
     // Metres above the datum: own, and in the next coarser mesh.
@@ -105,3 +109,24 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     }
     return finish(in.relative, shade_matt(surface, visibility, even_sky(surface, stand)), 1.0);
 }
+
+#ifdef STYLED
+// The surface alone: the styles light it themselves. Forest whose trees are not drawn is of the first layer of foliage.
+@fragment
+fn styled(in: Varying) -> StyledSurface {
+    let smooth_normal = normalize(in.normal);
+    let xz = frame.camera.xz + in.relative.xz;
+    let distance = max(length(in.relative), 1e-3);
+    let facing = abs(dot(smooth_normal, in.relative)) / distance;
+    let footprint = distance / (frame.focal_length_pixels * max(facing, 0.05));
+    let ground = sample_ground(in.relative);
+    let uv = (in.relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;
+    let outside = max(max(-uv.x, uv.x - 1.0), max(-uv.y, uv.y - 1.0)) > 0.0;
+    let undrawn = select(ground.undrawn_cover, frame.mean_cover, outside);
+    let cover = undrawn + select(ground.cover, 0.0, outside);
+    let far = undrawn / max(cover, 1e-3);
+    let color = ground_color(xz, 1.0 - smooth_normal.y, cover, far, footprint);
+    let layer = select(GROUND_LAYER, FIRST_FOLIAGE_LAYER, (far > 0.5) & (undrawn > 0.3));
+    return styled_surface(smooth_normal, 1.0, 0.0, vec2(layer, 128u), color.albedo);
+}
+#endif

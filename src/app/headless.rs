@@ -47,7 +47,7 @@ use crate::{
     plugin::CanopyPlugins,
     progress::Progress,
     render::{
-        components::{CanopyCamera, ForestUpdates, LightUpdates, SunShadowSettings},
+        components::{CanopyCamera, CanopyStyle, ForestUpdates, LightUpdates, SunShadowSettings},
         forest::collect_view_counts,
         readback::read_rgb,
         report::{FrameReport, PassOutcome},
@@ -303,6 +303,12 @@ impl Renderer {
         self.shown = Some(stage.show(&mut world.commands()));
         world.flush();
         self.set_shadow(stage.shadow());
+        self.set_style(stage.style.clone());
+    }
+
+    /// Sets the style of the images.
+    pub fn set_style(&mut self, style: CanopyStyle) {
+        self.app.world_mut().entity_mut(self.camera).insert(style);
     }
 
     /// Shows `stage` with its samples per pixel instead of the one that was shown last.

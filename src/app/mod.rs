@@ -40,7 +40,8 @@ pub use info::info;
 pub use interrupt::{Interrupt, listen as listen_to_interrupts, received as interrupt_received};
 pub use parse::{
     ArgumentError, parse_chunk, parse_exposure, parse_flip, parse_frames, parse_lighting, parse_milliseconds,
-    parse_pixels_per_degree, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size,
+    parse_palette, parse_paper, parse_pixels_per_degree, parse_pose, parse_positive, parse_samples, parse_seconds,
+    parse_size, parse_style,
 };
 pub use plan::{Frame, PlanError, RenderPlan};
 pub use profile::{

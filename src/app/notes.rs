@@ -6,7 +6,7 @@ use crate::{assets::Stage, scene::Viewpoint};
 
 /// Pairs of keyword and text for an image of `stage`, seen from `view` in the light of `instant`.
 pub fn notes(stage: &Stage, view: &Viewpoint, instant: DateTime<Utc>) -> Vec<(&'static str, String)> {
-    vec![
+    [
         ("Software", format!("Canopy {}", env!("CARGO_PKG_VERSION"))),
         ("Title", stage.scene.name.clone()),
         ("Scene", stage.scene.label()),
@@ -22,4 +22,7 @@ pub fn notes(stage: &Stage, view: &Viewpoint, instant: DateTime<Utc>) -> Vec<(&'
         ("Seed", stage.scene.seed.to_string()),
         ("Quality", format!("{:?}", stage.scene.quality)),
     ]
+    .into_iter()
+    .chain(stage.scene.style.is_drawn().then(|| ("Style", format!("{:?}", stage.scene.style))))
+    .collect()
 }

@@ -3,7 +3,9 @@
 use super::Selection;
 use crate::{
     bake::lighting::{SunLight, implicit::ImplicitSettings},
+    math::names,
     scene::{Lighting, Pose, Transfer},
+    style::{Palette, Paper, Style},
 };
 
 /// Why an argument is not what it should be.
@@ -15,6 +17,15 @@ pub enum ArgumentError {
     /// Not a kind of light.
     #[error("`{0}` is not a light (expected local, expressive, transfer, leaf-shader or harmonics)")]
     Lighting(String),
+    /// Not a style.
+    #[error("`{0}` is not a style; did you mean `{1}`? (expected photograph, watercolour, lines or toon)")]
+    Style(String, &'static str),
+    /// Not a palette.
+    #[error("{0}")]
+    Palette(String),
+    /// Not a paper.
+    #[error("`{0}` is not a paper; did you mean `{1}`? (expected hot-pressed, cold-pressed, rough, laid or canvas)")]
+    Paper(String, &'static str),
     /// Not an exposure value.
     #[error("`{0}` is not an exposure value (expected EV at ISO 100 from -10 to 25, as in 12.5)")]
     Exposure(String),
@@ -76,6 +87,36 @@ pub fn parse_lighting(text: &str) -> Result<Lighting, ArgumentError> {
         "expressive" => Ok(Lighting::Expressive(ImplicitSettings::default())),
         _ => Err(ArgumentError::Lighting(text.to_owned())),
     }
+}
+
+/// Reads the name of a style, with all its default values.
+///
+/// # Errors
+/// [`ArgumentError::Style`].
+pub fn parse_style(text: &str) -> Result<Style, ArgumentError> {
+    let nearest = || names::nearest(text, Style::NAMES).unwrap_or_default();
+    Style::named(text).ok_or_else(|| ArgumentError::Style(text.to_owned(), nearest()))
+}
+
+/// Reads the name of a palette of the program, or the path of a palette's file, which is read later.
+///
+/// # Errors
+/// [`ArgumentError::Palette`].
+pub fn parse_palette(text: &str) -> Result<String, ArgumentError> {
+    if !Palette::is_file(text) {
+        Palette::named(text).map_err(|error| ArgumentError::Palette(error.to_string()))?;
+    }
+    Ok(text.trim().to_owned())
+}
+
+/// Reads the name of a paper.
+///
+/// # Errors
+/// [`ArgumentError::Paper`].
+pub fn parse_paper(text: &str) -> Result<String, ArgumentError> {
+    let nearest = || names::nearest(text, Paper::ALL.map(Paper::name)).unwrap_or_default();
+    let paper = Paper::named(text).ok_or_else(|| ArgumentError::Paper(text.to_owned(), nearest()))?;
+    Ok(paper.name().to_owned())
 }
 
 /// Reads the number of samples per pixel: 1 or 4, which every device supports.
@@ -210,6 +251,16 @@ mod tests {
         for wrong in ["0x0", "1280", "x", "-1x5", "1280x0", "99999999999x1", "1.5x2", ""] {
             assert_eq!(parse_size(wrong), Err(ArgumentError::Size(wrong.to_owned())));
         }
+    }
+
+    #[test]
+    fn styles_palettes_and_papers() {
+        assert_eq!(parse_style("watercolor"), parse_style("watercolour"));
+        let message =
+            |result: Result<String, ArgumentError>| result.err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(parse_style("line").is_err_and(|error| error.to_string().contains("did you mean `lines`")));
+        assert!(message(parse_palette("sepai")).contains("did you mean `sepia`") && parse_palette("mine.ron").is_ok());
+        assert!(message(parse_paper("ruogh")).contains("did you mean `rough`") && parse_paper("laid").is_ok());
     }
 
     #[test]

@@ -28,6 +28,9 @@ pub enum StageError {
     /// The stand.
     #[error(transparent)]
     Stand(#[from] crate::scatter::ScatterError),
+    /// The palette of the style.
+    #[error(transparent)]
+    Palette(#[from] crate::style::PaletteError),
     /// Sun and sky.
     #[error(transparent)]
     Light(#[from] crate::light::LightError),

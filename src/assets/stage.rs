@@ -15,7 +15,7 @@ use crate::{
     light::sun::Observer,
     progress::Progress,
     render::{
-        components::{Forest, Ground, SunShadowSettings},
+        components::{CanopyStyle, Forest, Ground, SunShadowSettings},
         forest::most_trees,
     },
     scatter::{CoverMap, PackedStand, PlantSize, ScatterError, bounded_cover_map, packed::DEFAULT_CELL_SIZE},
@@ -52,6 +52,8 @@ pub struct Stage {
     pub observer: Observer,
     /// The scene as written.
     pub scene: Scene,
+    /// The style of its pictures, for the camera that takes them.
+    pub style: CanopyStyle,
 }
 
 impl Stage {
@@ -75,6 +77,7 @@ impl Stage {
         progress: &mut dyn Progress,
     ) -> Result<Self, StageError> {
         scene.validate()?;
+        let style = CanopyStyle::new(scene.style.clone())?;
         let started = Instant::now();
         progress.begin("Terrain", 0);
         let terrain = Arc::new(ground::build_terrain(&scene.terrain, progress)?);
@@ -128,7 +131,7 @@ impl Stage {
         };
         let suns = scene.species.iter().zip(&species.variants).flat_map(sun).collect();
         let (stand, plants, variants) = (Arc::new(packed), Arc::new(plants), species.variants);
-        Ok(Self { terrain, stand, plants, variants, suns, cover, surroundings, observer, scene: scene.clone() })
+        Ok(Self { terrain, stand, plants, variants, suns, cover, surroundings, observer, scene: scene.clone(), style })
     }
 
     /// Whether `device` can hold the trees, all of which lie in one storage buffer.

@@ -5,9 +5,11 @@ use std::path::PathBuf;
 use canopy::{
     app::{
         Selection, Sweep, parse_chunk, parse_exposure, parse_flip, parse_frames, parse_lighting, parse_milliseconds,
-        parse_pixels_per_degree, parse_pose, parse_positive, parse_samples, parse_seconds, parse_size,
+        parse_palette, parse_paper, parse_pixels_per_degree, parse_pose, parse_positive, parse_samples, parse_seconds,
+        parse_size, parse_style,
     },
     scene::{Lighting, LocalTime, Pose},
+    style::Style,
 };
 use clap::{Args, Parser, Subcommand};
 
@@ -107,6 +109,21 @@ pub struct CameraArguments {
     pub along: Option<f64>,
 }
 
+/// The style of the pictures.
+#[derive(Clone, Debug, Args)]
+pub struct StyleArguments {
+    /// Draw in a style: photograph, watercolour, lines or toon [default: the scene's].
+    #[arg(long, value_name = "STYLE", value_parser = parse_style)]
+    pub style: Option<Style>,
+    /// Palette of a watercolour or of lines: natural, sepia, cool-to-warm, autumn, indigo, botanical, or a .ron file [default: the
+    /// scene's].
+    #[arg(long, value_name = "PALETTE", value_parser = parse_palette)]
+    pub palette: Option<String>,
+    /// Paper of a watercolour or of lines: hot-pressed, cold-pressed, rough, laid or canvas [default: the scene's].
+    #[arg(long, value_name = "PAPER", value_parser = parse_paper)]
+    pub paper: Option<String>,
+}
+
 /// Arguments of `canopy fly`.
 #[derive(Debug, Args)]
 #[command(after_help = "Keys:
@@ -147,6 +164,9 @@ pub struct Fly {
     /// Let the camera go below the ground.
     #[arg(long)]
     pub underground: bool,
+    /// The style of the pictures.
+    #[command(flatten)]
+    pub style: StyleArguments,
 }
 
 /// Arguments of `canopy render`.
@@ -160,6 +180,8 @@ pub struct Fly {
     canopy render demo.ron --out flight --along 10s --frames 250 --fps 25
   The second of eight machines renders its part of a flight, and nothing that is there already:
     canopy render demo.ron --out flight --frames 250 --chunk 2/8 --skip-existing
+  The same as a watercolour in sepia:
+    canopy render demo.ron --out sepia.png --style watercolour --palette sepia
   A day from a fixed camera:
     canopy render demo.ron --out day.png --frames 96 --from 2026-06-21T04:00-04:00 --to 2026-06-21T22:00-04:00
 Ctrl-C stops after the current image; the same command with --resume renders the others.")]
@@ -190,6 +212,9 @@ pub struct Render {
     /// Last instant of a time-lapse.
     #[arg(long, value_name = "TIME", requires = "from")]
     pub to: Option<LocalTime>,
+    /// The style of the pictures.
+    #[command(flatten)]
+    pub style: StyleArguments,
     /// Render only these frames of the sequence: numbers and ranges.
     #[arg(long, value_name = "10-19,30", value_parser = parse_frames, requires = "frames")]
     pub frames_only: Option<Selection>,

@@ -13,7 +13,8 @@ use clap::CommandFactory;
 use clap::error::ErrorKind;
 
 use super::arguments::{
-    Arguments, Bake, CameraArguments, Common, Compare, Fly, LightChoice, Measured, Profile, Reference, Render, Tune,
+    Arguments, Bake, CameraArguments, Common, Compare, Fly, LightChoice, Measured, Profile, Reference, Render,
+    StyleArguments, Tune,
 };
 
 /// The scene of `canopy fly` without an argument.
@@ -26,7 +27,14 @@ fn overrides(common: &Common) -> Overrides {
         exposure: common.exposure,
         strict: common.strict,
         lighting: common.lighting.clone(),
+        ..Overrides::default()
     }
+}
+
+/// As [`overrides`], with a style.
+fn styled(common: &Common, style: &StyleArguments) -> Overrides {
+    let StyleArguments { style, palette, paper } = style.clone();
+    Overrides { style, palette, paper, ..overrides(common) }
 }
 
 /// The options of a flight.
@@ -38,7 +46,7 @@ pub fn fly_options(fly: Fly, common: &Common) -> FlyOptions {
         view: view(&fly.view),
         clock: fly.clock.unwrap_or(0.0),
         underground: fly.underground,
-        overrides: overrides(common),
+        overrides: styled(common, &fly.style),
         adapter: common.adapter.clone(),
         quiet: common.quiet,
         explain: common.explain,
@@ -55,7 +63,7 @@ pub fn render_options(render: Render, common: &Common) -> Result<RenderOptions, 
         size: render.size,
         selection: render.frames_only.or(render.chunk).unwrap_or_default(),
         resume: render.resume,
-        overrides: overrides(common),
+        overrides: styled(common, &render.style),
         adapter: common.adapter.clone(),
         quiet: common.quiet,
         explain: common.explain,

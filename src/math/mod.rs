@@ -15,6 +15,7 @@
 //! | [`resample`] | images at another size: filtering in linear light with colours weighted by alpha |
 //! | [`compute_once`](mod@compute_once) | shared values that parallel work computes |
 //! | [`digits`] | numbers formatted for people |
+//! | [`names`] | the name that a misspelt one was meant to be |
 //! | [`range`] | the range, steps and unit of a number that people set |
 
 pub mod cholesky;
@@ -26,6 +27,7 @@ mod error;
 pub mod hash;
 pub mod interpolation;
 pub mod mip;
+pub mod names;
 pub mod octahedral;
 pub mod quadrature;
 pub mod radical_inverse;

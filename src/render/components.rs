@@ -7,7 +7,11 @@ use bevy::{
     camera::{Camera3d, Exposure, Hdr, visibility::Visibility},
     core_pipeline::tonemapping::Tonemapping,
     ecs::{
-        component::Component, lifecycle::HookContext, reflect::ReflectComponent, resource::Resource,
+        component::Component,
+        lifecycle::HookContext,
+        query::{With, Without},
+        reflect::ReflectComponent,
+        resource::Resource,
         world::DeferredWorld,
     },
     prelude::{ReflectDefault, ReflectResource},
@@ -26,6 +30,7 @@ use crate::{
     terrain::Terrain,
 };
 
+pub use super::camera_style::{CanopyStyle, DrawnStyle};
 pub use crate::bake::lighting::SunLight;
 
 /// The tone curve for which Canopy's light is made: from the camera's exposed radiance to display values.
@@ -256,6 +261,9 @@ impl Default for ViewOptions {
     }
 }
 
+/// The filter of cameras that Canopy's photographic passes draw: those without a style.
+pub type Photographed = (With<CanopyCamera>, Without<DrawnStyle>);
+
 /// An ordinary Bevy mesh that casts its shadow onto Canopy's trees and ground.
 #[derive(Component, Clone, Copy, Debug, Default, Reflect)]
 #[reflect(Component, Default)]
@@ -269,9 +277,10 @@ impl Plugin for ComponentsPlugin {
         app.add_plugins((
             ExtractComponentPlugin::<CanopyCamera>::default(),
             ExtractComponentPlugin::<ViewOptions>::default(),
+            ExtractComponentPlugin::<CanopyStyle>::default(),
         ))
         .register_type::<(CanopyCamera, CanopyOrigin, SunShadowSettings, ViewOptions, CastsCanopyShadow)>()
-        .register_type::<(Forest, Ground, TreeLists)>()
+        .register_type::<(Forest, Ground, TreeLists, CanopyStyle)>()
         .register_type::<(LightUpdates, ForestUpdates)>()
         .init_resource::<CanopyOrigin>()
         .init_resource::<LightUpdates>()

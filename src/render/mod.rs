@@ -11,13 +11,15 @@
 //!              ├─ (Bevy's own opaque meshes)
 //!              ├─ forest       full models, crosses                  MainPass, after main_opaque_pass_3d
 //!              ├─ terrain      tiles                                 after forest
-//!              └─ sky          the rest of the image                 before main_transparent_pass_3d
+//!              ├─ sky          the rest of the image                 before main_transparent_pass_3d
+//!              └─ style        instead of these, for a styled camera  MainPass, and after tone mapping
 //! ```
 //!
 //! The public system [`sets`] define the order. A pass that produces something for other passes writes it into
 //! [`bindings::SharedTextures`]. No pass refers to the systems of another.
 
 pub mod bindings;
+pub mod camera_style;
 pub mod components;
 pub mod cull;
 pub mod diagnostics;
@@ -36,6 +38,7 @@ pub mod shader_constants;
 pub mod shaders;
 pub mod sky;
 pub mod stand_light;
+pub mod style;
 pub mod sun_shadow;
 pub mod terrain;
 pub mod view;
@@ -89,6 +92,7 @@ impl Plugin for CanopyRenderPlugin {
             mesh_shadow::MeshShadowPlugin,
             terrain::TerrainPassPlugin,
             forest::ForestPassPlugin,
+            style::StylePassPlugin,
         ));
     }
 }

@@ -38,6 +38,8 @@ pub enum CanopyPasses {
     Terrain,
     /// The sky, where nothing else was drawn, before Bevy's transparent meshes.
     Sky,
+    /// The maps of a camera with a style, which has none of the others but the shadow.
+    Style,
 }
 
 /// Orders the sets in the schedules of `render_app`.
@@ -51,7 +53,7 @@ pub(super) fn configure(render_app: &mut SubApp) {
         .configure_sets(Core3d, CanopyPasses::SunShadow.after(Core3dSystems::Prepass).before(Core3dSystems::MainPass))
         .configure_sets(
             Core3d,
-            (CanopyPasses::Forest, CanopyPasses::Terrain, CanopyPasses::Sky)
+            (CanopyPasses::Forest, CanopyPasses::Terrain, CanopyPasses::Sky, CanopyPasses::Style)
                 .chain()
                 .after(main_opaque_pass_3d)
                 .before(main_transparent_pass_3d)

@@ -18,6 +18,7 @@ use crate::{
     light::{atmosphere::SkyView, night, stand},
     lod::{self, level_distance},
     scatter::packed,
+    style::{Paper, anchor, layers},
     terrain::{ground_noise, tiles},
 };
 
@@ -118,6 +119,11 @@ pub fn constants() -> Vec<(&'static str, &'static str, Value)> {
         ("NORMAL_STEPS", "Steps of a packed normal on either side of 0.", packing::STEPS.into()),
         ("NORMAL_LEAST_LENGTH", "Its length where the ambient visibility is 0.", packing::LEAST_LENGTH.into()),
         ("TRANSFER_WORDS", "Words of four coefficients after the first, of all bands.", uint(forest::WORDS)),
+        ("GROUND_LAYER", "Layer of the ground in the styles.", u32::from(layers::GROUND).into()),
+        ("WOOD_LAYER", "Layer of wood in the styles.", u32::from(layers::WOOD).into()),
+        ("FIRST_FOLIAGE_LAYER", "First layer of foliage in the styles.", u32::from(layers::FIRST_FOLIAGE).into()),
+        ("PAPER_SIDE", "Side of a paper's height map in texels.", float(Paper::SIDE)),
+        ("NOISE_SPAN", "Metres after which the styles' noise repeats, a power of two.", anchor::NOISE_SPAN.into()),
         (
             "LIGHT_STRIDE",
             "Vectors from one yaw's light to the next: the first coefficient, then red, green and blue of each word.",

@@ -64,6 +64,10 @@ shader_files! {
     SunVisibility = "common/sun_visibility.wgsl",
     Lighting = "common/lighting.wgsl",
     ForestInstance = "forest/instance.wgsl",
+    StyleSurface = "style/surface.wgsl",
+    Style = "style/style.wgsl",
+    StyleNoise = "style/noise.wgsl",
+    StyleEdges = "style/edges.wgsl",
     ForestTransfer = "forest/transfer.wgsl",
     CullVolume = "cull/volume.wgsl",
     ForestCrossVariant = "forest/cross_variant.wgsl",
@@ -81,6 +85,11 @@ shader_files! {
     GroundNoise = "terrain/ground_noise.wgsl",
     GroundColor = "terrain/ground_color.wgsl",
     Terrain = "terrain/terrain.wgsl",
+    StyleIllumination = "style/illumination.wgsl",
+    StyleBlur = "style/blur.wgsl",
+    StyleParticles = "style/particles.wgsl",
+    StyleWatercolor = "style/watercolor.wgsl",
+    StyleInk = "style/ink.wgsl",
 }
 
 /// Path of the module that [`shader_constants`] writes, next to those of [`ShaderFile`].

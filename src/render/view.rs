@@ -30,7 +30,7 @@ use bevy::{
 use glam::{DVec3, Mat4, Vec2};
 
 use super::{
-    components::{CanopyCamera, ViewOptions},
+    components::{CanopyCamera, DrawnStyle, ViewOptions},
     extract::ExtractedScene,
     sets::CanopyRenderSystems,
 };
@@ -97,6 +97,8 @@ pub struct PreparedView {
     pub exposure: f32,
     /// Options of the camera.
     pub options: ViewOptions,
+    /// Whether it is drawn in a style, without the photographic passes.
+    pub styled: bool,
 }
 
 /// The one view that Canopy draws, if there is one.
@@ -128,6 +130,7 @@ fn prepare_view(
             Option<&ViewOptions>,
             Has<MotionVectorPrepass>,
             Has<DeferredPrepass>,
+            Has<DrawnStyle>,
         ),
         With<CanopyCamera>,
     >,
@@ -143,7 +146,7 @@ fn prepare_view(
             views.len()
         );
     }
-    let Some((entity, view, camera, msaa, options, motion_vectors, deferred)) = views.into_iter().next() else {
+    let Some((entity, view, camera, msaa, options, motion_vectors, deferred, styled)) = views.into_iter().next() else {
         return;
     };
     if motion_vectors {
@@ -184,5 +187,6 @@ fn prepare_view(
         zoom: view.clip_from_view.y_axis.y.abs() * (0.5 * NOMINAL_FIELD_OF_VIEW).tan(),
         exposure: camera.exposure,
         options: options.copied().unwrap_or_default(),
+        styled,
     });
 }

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use ron::error::{Error as RonError, SpannedError};
 
 use super::locate::{Outline, Position};
+use crate::math::names::edit_distance;
 
 /// Mistakes that a message lists; it counts the others.
 const LISTED: usize = 20;
@@ -208,26 +209,6 @@ pub(crate) fn nearest<'a>(found: &str, known: &[&'a str]) -> Option<&'a str> {
         .filter(|(distance, limit, _)| distance <= limit)
         .min_by_key(|(distance, _, _)| *distance)
         .map(|(_, _, name)| name)
-}
-
-fn edit_distance(a: &[char], b: &[char]) -> usize {
-    let width = b.len() + 1;
-    let mut table = vec![0_usize; (a.len() + 1) * width];
-    for i in 0..=a.len() {
-        for j in 0..=b.len() {
-            table[i * width + j] = if i == 0 || j == 0 {
-                i + j
-            } else {
-                let replace = table[(i - 1) * width + j - 1] + usize::from(a[i - 1] != b[j - 1]);
-                let mut best = replace.min(table[(i - 1) * width + j] + 1).min(table[i * width + j - 1] + 1);
-                if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
-                    best = best.min(table[(i - 2) * width + j - 2] + 1);
-                }
-                best
-            }
-        }
-    }
-    table[a.len() * width + b.len()]
 }
 
 #[cfg(test)]

@@ -52,6 +52,7 @@ mod quality;
 mod source;
 mod species;
 mod species_file;
+mod style;
 mod time;
 mod trees;
 
@@ -78,6 +79,7 @@ use std::path::{Path as FilePath, PathBuf};
 use ron::extensions::Extensions;
 use serde::Deserialize;
 
+use crate::style::Style;
 use check::Check;
 
 /// A scene: terrain, trees, location, camera and quality.
@@ -108,6 +110,9 @@ pub struct Scene {
     /// Drawing quality.
     #[serde(default)]
     pub quality: Quality,
+    /// The style of its pictures: `Photograph`, `Watercolour(...)`, `Lines(...)` or `Toon(...)`. Default `Photograph`.
+    #[serde(default)]
+    pub style: Style,
     /// The file that the scene was read from; `None` for a scene that was built in code. Not a field of a scene file.
     #[serde(skip)]
     pub file: Option<PathBuf>,
@@ -142,6 +147,7 @@ impl Scene {
             place,
             camera: Camera::default(),
             quality: Quality::default(),
+            style: Style::default(),
             file: None,
         }
     }
@@ -171,6 +177,7 @@ impl Scene {
         self.place.check(&self.terrain, &mut check);
         self.camera.check(&mut check);
         self.quality.check(&mut check);
+        style::check(&self.style, &mut check);
         check.finish(label)
     }
 
@@ -180,6 +187,7 @@ impl Scene {
         self.terrain.resolve(folder);
         self.trees.resolve(folder);
         self.species.iter_mut().for_each(|species| species.resolve(folder));
+        style::resolve(&mut self.style, folder);
     }
 
     /// Reads and validates a scene file, once and from its beginning to its end, so that it may be a pipe. Relative paths

@@ -1,6 +1,10 @@
 //! Values of a request that replace those of a scene file.
 
 use super::{Lighting, Scene, Trees};
+use crate::{
+    bake::lighting::implicit::ImplicitSettings,
+    style::{LineNormals, Style},
+};
 
 /// Values that replace a scene's own. The default replaces nothing.
 #[derive(Clone, Debug, Default, PartialEq, bevy::reflect::Reflect)]
@@ -17,6 +21,12 @@ pub struct Overrides {
     /// how the sun lights it.
     #[reflect(ignore)]
     pub lighting: Option<Lighting>,
+    /// The style of the pictures. A scene that has this style already keeps its own values.
+    pub style: Option<Style>,
+    /// The palette of the style, if it has one.
+    pub palette: Option<String>,
+    /// The paper of the style, if it has one.
+    pub paper: Option<String>,
 }
 
 impl Overrides {
@@ -34,7 +44,13 @@ impl Overrides {
         if let Trees::Inventory(inventory) = &mut scene.trees {
             inventory.strict |= self.strict;
         }
-        let Some(lighting) = &self.lighting else { return };
+        self.restyle(scene);
+        let Some(lighting) = &self.lighting else {
+            if scene.style.is_drawn() {
+                light_for_style(scene);
+            }
+            return;
+        };
         for species in &mut scene.species {
             let kind = |lighting: &Lighting| std::mem::discriminant(lighting);
             match (&mut species.lighting, lighting) {
@@ -43,5 +59,36 @@ impl Overrides {
                 (own, given) => *own = Some(given.clone()),
             }
         }
+    }
+
+    /// Replaces the style.
+    fn restyle(&self, scene: &mut Scene) {
+        let kind = |style: &Style| std::mem::discriminant(style);
+        if let Some(style) = self.style.as_ref().filter(|style| kind(style) != kind(&scene.style)) {
+            scene.style = style.clone();
+        }
+        if let (Some(palette), Some(own)) = (&self.palette, scene.style.palette_mut()) {
+            own.clone_from(palette);
+        }
+        if let (Some(paper), Some(own)) = (&self.paper, scene.style.paper_mut()) {
+            own.clone_from(paper);
+        }
+    }
+}
+
+/// Gives foliage the normals of its implicit surface, in which the styles see it [Luft 2006, 4.1; Luft 2007, section 4], or its own
+/// for lines that are to show those.
+fn light_for_style(scene: &mut Scene) {
+    let own = match &scene.style {
+        Style::Lines(lines) => lines.normals == LineNormals::Own,
+        Style::Toon(toon) => toon.normals == LineNormals::Own,
+        Style::Photograph | Style::Watercolour(_) => false,
+    };
+    for species in &mut scene.species {
+        species.lighting = Some(match species.lighting.take() {
+            _ if own => Lighting::Local,
+            Some(Lighting::Expressive(settings)) => Lighting::Expressive(settings),
+            _ => Lighting::Expressive(ImplicitSettings::default()),
+        });
     }
 }

@@ -11,7 +11,7 @@ use canopy::{
         FloatingOrigin, FollowsDaylight, ForestPlugin, OriginPlugin, ScenePlugin, SunPlugin, TerrainSettings,
     },
     prelude::*,
-    render::components::{CanopyOrigin, CastsCanopyShadow, ComponentsPlugin, Forest, Ground},
+    render::components::{CanopyOrigin, CanopyStyle, CastsCanopyShadow, ComponentsPlugin, Forest, Ground},
 };
 
 /// An app that knows only the types that Canopy's plugins register.
@@ -54,6 +54,7 @@ fn every_component_is_registered_with_its_parts() {
     let registry = app.world().resource::<AppTypeRegistry>().read();
     component::<CanopyCamera>(&registry);
     component::<CanopyScene>(&registry);
+    component::<CanopyStyle>(&registry);
     component::<CastsCanopyShadow>(&registry);
     component::<FloatingOrigin>(&registry);
     component::<FollowsDaylight>(&registry);

@@ -8,6 +8,7 @@ use bevy::{
     camera::Projection,
     ecs::{
         change_detection::DetectChanges,
+        entity::Entity,
         message::MessageWriter,
         observer::On,
         query::With,
@@ -91,12 +92,13 @@ pub fn start(
     mut commands: Commands,
     request: Res<Request>,
     session: Option<ResMut<Session>>,
-    camera: Single<(&mut Msaa, &mut Projection), With<CanopyCamera>>,
+    camera: Single<(Entity, &mut Msaa, &mut Projection), With<CanopyCamera>>,
     mut window: Option<Single<&mut Window, With<PrimaryWindow>>>,
     mut exit: MessageWriter<AppExit>,
 ) {
     let stage = ready.stage.clone();
-    let (mut msaa, mut projection) = camera.into_inner();
+    let (entity, mut msaa, mut projection) = camera.into_inner();
+    commands.entity(entity).insert(stage.style.clone());
     *msaa = Msaa::from_samples(stage.scene.quality.msaa);
     *projection = camera::projection(stage.scene.camera.field_of_view.to_radians());
     if let Some(window) = &mut window {

@@ -25,7 +25,7 @@ use super::{
     pipelines::{LevelPipelines, targets},
     representation::{ForestLevel, LevelTarget, Relight, Representations},
     transfer::TransferLight,
-    uniforms::variants,
+    uniforms::{foliage_groups, variants},
     upload::{BYTES_PER_FRAME, DeviceWrites, ForestUpload},
 };
 use crate::{
@@ -80,6 +80,8 @@ pub struct GpuForest {
     /// [`VariantUniform`](super::VariantUniform)s.
     pub variants: Buffer,
     leaves: Leaves,
+    /// Layer of foliage in the styles, by variant.
+    groups: Vec<u8>,
     /// Size of each variant.
     pub sizes: Vec<PlantSize>,
     /// The same for culling.
@@ -165,6 +167,11 @@ impl GpuForest {
         })
     }
 
+    /// The layer of foliage (0, 1, ...) of each plant in the styles, by variant.
+    pub fn foliage_groups(&self) -> &[u8] {
+        &self.groups
+    }
+
     /// Distances in metres from the centre of a shadow map at which each level casts into a map of `texel` metres per
     /// texel; `near` are those of the first level. What is drawn nearer in `view` casts nearer too.
     ///
@@ -236,6 +243,7 @@ impl GpuForest {
             variants,
             leaves: Leaves::of(&forest.stand, &forest.plants),
             tree_sizes: sizes.iter().map(TreeSize::from).collect(),
+            groups: foliage_groups(&forest.plants),
             sizes,
             max_scale: forest.stand.cells.iter().map(|cell| cell.max_scale).fold(0.0, f32::max),
             groupings: levels.iter().map(grouping).collect(),
@@ -269,6 +277,7 @@ impl GpuForest {
         upload.gpu.queue.write_buffer(&self.variants, 0, bytemuck::cast_slice(&variants));
         upload.writes.run(&upload.gpu.queue, &mut { u64::MAX });
         self.plants = forest.plants.clone();
+        self.groups = foliage_groups(&self.plants);
     }
 }
 

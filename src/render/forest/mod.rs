@@ -47,10 +47,11 @@ pub use drawn_forests::{DrawnForest, DrawnForests};
 pub use drawn_trees::{DrawnTrees, PageTrees};
 pub use gpu_forest::{GpuForest, GpuForests, ListTarget, MAP_SHARES, most_trees};
 pub use instance_layout::instance_layout;
-pub use instances::{forest_view, instance_bind_group};
+pub use instances::{LevelLook, forest_view, instance_bind_group};
 pub(super) use leaves::Leaves;
 pub use list_slot::{ListSlot, ListWork, PreparedPage};
 pub use lists::{ForestStatistics, LevelStatistics, PreparedForests, collect_view_counts};
+pub(super) use lists::PreparedForest;
 pub use pipelines::LevelPipelines;
 pub use representation::Representations;
 pub use uniforms::{

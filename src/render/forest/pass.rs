@@ -1,7 +1,7 @@
 //! The forest pass of a view.
 
 use bevy::{
-    ecs::{query::With, system::Res},
+    ecs::system::Res,
     render::{
         camera::ExtractedCamera,
         diagnostic::RecordDiagnostics,
@@ -20,12 +20,12 @@ use super::{
 };
 use crate::{
     cull::Share,
-    render::{bindings::FrameBindGroup, components::CanopyCamera, frame_work::FrameWork, view::PreparedFrame},
+    render::{bindings::FrameBindGroup, components::Photographed, frame_work::FrameWork, view::PreparedFrame},
 };
 
 /// Draws every forest into the camera's colour and depth, level by level.
 pub fn forest_pass(
-    view: ViewQuery<(&ViewTarget, &ViewDepthTexture, &ExtractedCamera), With<CanopyCamera>>,
+    view: ViewQuery<(&ViewTarget, &ViewDepthTexture, &ExtractedCamera), Photographed>,
     frame: Res<PreparedFrame>,
     group: Res<FrameBindGroup>,
     forests: Res<GpuForests>,

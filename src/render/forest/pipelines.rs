@@ -116,7 +116,8 @@ fn shade_what_is_seen(pipeline: &mut RenderPipelineDescriptor) {
 
 /// What the view and its shadow maps draw trees into; nothing without a view.
 pub fn targets(scene: &ExtractedScene, frame: &PreparedFrame) -> impl Iterator<Item = LevelTarget> {
-    let view = frame.view.as_ref().map(|view| LevelTarget::View(view.attachment));
-    let shadow = view.is_some() && (scene.shadow.cascades > 0 || scene.mesh_shadows);
+    let photographed = frame.view.as_ref().filter(|view| !view.styled);
+    let view = photographed.map(|view| LevelTarget::View(view.attachment));
+    let shadow = frame.view.is_some() && (scene.shadow.cascades > 0 || scene.mesh_shadows);
     view.into_iter().chain(shadow.then_some(LevelTarget::ShadowMap))
 }

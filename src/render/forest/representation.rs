@@ -107,6 +107,12 @@ pub trait LevelRenderer: Send + Sync + 'static {
     fn depth_pipeline(&self, _features: u32, _format: ViewFormat) -> Option<RenderPipelineDescriptor> {
         None
     }
+
+    /// Whether its shaders can be drawn in a style: under the definition `STYLED` they have a fragment entry point `styled`, which
+    /// returns a `StyledSurface` (`shaders/style/surface.wgsl`); of the other definitions only `FOLIAGE` is kept.
+    fn styled(&self) -> bool {
+        false
+    }
 }
 
 /// Shader definition of the pipelines of a level whose depth is drawn before its light.

@@ -18,6 +18,7 @@ use crate::{
     math::luminance,
     plant::{LeafColors, PlantMaterial, lobe_gain, lobe_peak},
     scatter::PlantSize,
+    style::layers,
 };
 
 /// `ForestView` of `shaders/forest/instance.wgsl`.
@@ -96,6 +97,10 @@ pub struct VariantUniform {
     pub cover_weight: f32,
     /// Its [`inverse_height`].
     pub inverse_height: u32,
+    /// Layer of its foliage in the styles ([`layers`](crate::style::layers)).
+    pub foliage_layer: u32,
+    /// WGSL rounds the size up to 16 bytes.
+    pub padding: [u32; 3],
 }
 
 /// `CrossVariant` of `shaders/forest/cross_variant.wgsl`.
@@ -198,7 +203,16 @@ pub fn indirect_light_color(leaves: &LeafColors) -> Vec3 {
 
 /// The uniforms of each plant.
 pub fn variants(plants: &[BakedPlant], sizes: &[PlantSize]) -> Vec<VariantUniform> {
-    plants.iter().zip(sizes).map(|(plant, size)| variant(plant, size)).collect()
+    let groups = foliage_groups(plants);
+    let layer = |group: &u8| u32::from(layers::FIRST_FOLIAGE) + u32::from(*group);
+    let uniform = |((plant, size), group)| VariantUniform { foliage_layer: layer(group), ..variant(plant, size) };
+    plants.iter().zip(sizes).zip(&groups).map(uniform).collect()
+}
+
+/// The layer of foliage (0, 1, ...) of each plant: those with leaves of one colour share it.
+pub fn foliage_groups(plants: &[BakedPlant]) -> Vec<u8> {
+    let colors: Vec<Vec3> = plants.iter().map(|plant| plant.plant.leaf_colors().reflected).collect();
+    layers::foliage_groups(&colors, layers::MOST_FOLIAGE)
 }
 
 fn variant(plant: &BakedPlant, size: &PlantSize) -> VariantUniform {
@@ -219,6 +233,8 @@ fn variant(plant: &BakedPlant, size: &PlantSize) -> VariantUniform {
         lobe_limit: lobe_peak(gloss.roughness).recip(),
         cover_weight: cover_weight(&plant.lighting),
         inverse_height: inverse_height(size.height),
+        foliage_layer: 0,
+        padding: [0; 3],
     }
 }
 

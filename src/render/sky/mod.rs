@@ -10,7 +10,6 @@ use bevy::{
     asset::Handle,
     core_pipeline::Core3d,
     ecs::{
-        query::With,
         resource::Resource,
         schedule::IntoScheduleConfigs,
         system::{Res, ResMut},
@@ -32,7 +31,7 @@ use bevy::{
 
 use super::{
     bindings::{FrameBindGroup, SharedTextures, frame_layout},
-    components::{CanopyCamera, Daylight},
+    components::{Daylight, Photographed},
     extract::ExtractedScene,
     gpu::opaque_depth,
     light_table::LightTable,
@@ -131,15 +130,18 @@ fn prepare_pipeline(
     mut pipelines: ResMut<SpecializedRenderPipelines<SkyPipeline>>,
     mut current: ResMut<CurrentSkyPipeline>,
 ) {
-    if frame.view.is_some() {
-        report.ran("sky", "behind everything");
+    let photographed = frame.view.as_ref().filter(|view| !view.styled);
+    match (photographed, &frame.view) {
+        (Some(_), _) => report.ran("sky", "behind everything"),
+        (None, Some(_)) => report.skipped("sky", "the view has a style"),
+        (None, None) => {}
     }
-    current.0 = frame.view.as_ref().map(|view| pipelines.specialize(&cache, &pipeline, view.attachment));
+    current.0 = photographed.map(|view| pipelines.specialize(&cache, &pipeline, view.attachment));
 }
 
 /// Draws the sky where nothing else was drawn.
 fn sky_pass(
-    view: ViewQuery<(&ViewTarget, &ViewDepthTexture, &ExtractedCamera), With<CanopyCamera>>,
+    view: ViewQuery<(&ViewTarget, &ViewDepthTexture, &ExtractedCamera), Photographed>,
     frame: Res<FrameBindGroup>,
     pipeline: Res<CurrentSkyPipeline>,
     cache: Res<PipelineCache>,

@@ -24,6 +24,8 @@ use bevy::{
 
 use super::sets::{CanopyPasses, CanopyRenderSystems};
 pub use ground_map::GroundMap;
+pub(super) use pipeline::terrain_layout;
+pub(super) use tiles::GpuTerrain;
 pub use tiles::TerrainStatistics;
 pub use vertex::{GpuTile, GpuTileVertex};
 

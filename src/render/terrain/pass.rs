@@ -1,7 +1,7 @@
 //! The terrain pass of a view.
 
 use bevy::{
-    ecs::{query::With, system::Res},
+    ecs::system::Res,
     render::{
         camera::ExtractedCamera,
         diagnostic::RecordDiagnostics,
@@ -12,11 +12,11 @@ use bevy::{
 };
 
 use super::{pipeline::CurrentTerrainPipeline, tiles::GpuTerrain};
-use crate::render::{bindings::FrameBindGroup, components::CanopyCamera};
+use crate::render::{bindings::FrameBindGroup, components::Photographed};
 
 /// Draws the ground into the camera's colour and depth.
 pub fn terrain_pass(
-    view: ViewQuery<(&ViewTarget, &ViewDepthTexture, &ExtractedCamera), With<CanopyCamera>>,
+    view: ViewQuery<(&ViewTarget, &ViewDepthTexture, &ExtractedCamera), Photographed>,
     frame: Res<FrameBindGroup>,
     terrain: Res<GpuTerrain>,
     pipeline: Res<CurrentTerrainPipeline>,

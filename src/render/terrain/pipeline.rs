@@ -70,5 +70,6 @@ pub fn prepare_pipeline(
     mut pipelines: ResMut<SpecializedRenderPipelines<TerrainPipeline>>,
     mut current: ResMut<CurrentTerrainPipeline>,
 ) {
-    current.0 = frame.view.as_ref().map(|view| pipelines.specialize(&cache, &pipeline, view.attachment));
+    let photographed = frame.view.as_ref().filter(|view| !view.styled);
+    current.0 = photographed.map(|view| pipelines.specialize(&cache, &pipeline, view.attachment));
 }

@@ -130,6 +130,10 @@ impl LevelRenderer for CloudRenderer {
         Vec3::new(0.1, 0.8, 0.9)
     }
 
+    fn styled(&self) -> bool {
+        true
+    }
+
     fn grouping(&self) -> Grouping {
         Grouping::ByVariant
     }

@@ -124,6 +124,10 @@ impl LevelRenderer for CrossRenderer {
         Vec3::new(0.2, 0.35, 1.0)
     }
 
+    fn styled(&self) -> bool {
+        true
+    }
+
     fn grouping(&self) -> Grouping {
         Grouping::Together
     }

@@ -174,6 +174,10 @@ impl LevelRenderer for ModelRenderer {
         Vec3::new(0.15, 0.9, 0.2)
     }
 
+    fn styled(&self) -> bool {
+        true
+    }
+
     fn grouping(&self) -> Grouping {
         Grouping::ByVariant
     }

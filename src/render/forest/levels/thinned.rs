@@ -46,6 +46,10 @@ impl LevelRenderer for ThinnedRenderer {
         Vec3::new(0.9, 0.8, 0.1)
     }
 
+    fn styled(&self) -> bool {
+        true
+    }
+
     fn grouping(&self) -> Grouping {
         self.0.grouping()
     }

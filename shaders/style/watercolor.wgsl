@@ -1,0 +1,195 @@
+// Watercolour: layers of pigment on paper [Luft 2006]. The equations of a layer are those of src/style/wash.rs.
+#import canopy::constants::PAPER_SIDE
+#import canopy::frame::frame
+#import canopy::style::{style, full_screen, FullScreen, airiness}
+#import canopy::style_edges::contour
+#import canopy::style_noise::anchored_noise
+
+struct Layer {
+    // Threshold of the shape, and half the width of its edge.
+    threshold: f32,
+    softness: f32,
+    // Factor on the darkening of rims.
+    edge: f32,
+    // Factor on the shade of crowns, and of dabs.
+    foliage: f32,
+}
+
+@group(1) @binding(1) var depths: texture_depth_2d;
+@group(1) @binding(2) var identities: texture_2d<u32>;
+// Light, pigment of the shadow, depth, length of the normal: as seen, under the Gaussian, and under a wide one.
+@group(1) @binding(3) var lights: texture_2d<f32>;
+@group(1) @binding(4) var soft_lights: texture_2d<f32>;
+@group(1) @binding(5) var wide_lights: texture_2d<f32>;
+@group(1) @binding(6) var soft_normals: texture_2d<f32>;
+// Intensities of the layers, four a slice.
+@group(1) @binding(7) var shapes: texture_2d_array<f32>;
+// Colours by light; a row a layer, then one each for the shadow and the dabs.
+@group(1) @binding(8) var ramps: texture_2d<f32>;
+@group(1) @binding(9) var papers: texture_2d<f32>;
+@group(1) @binding(10) var<storage, read> layers: array<Layer>;
+@group(1) @binding(11) var linear_sampler: sampler;
+@group(1) @binding(12) var paper_sampler: sampler;
+// Intensities of the particles: dark, medium, bright.
+@group(1) @binding(13) var soft_dabs: texture_2d<f32>;
+// Albedo, and how much of a pixel has one.
+@group(1) @binding(14) var soft_colors: texture_2d<f32>;
+
+@vertex
+fn vertex(@builtin(vertex_index) index: u32) -> FullScreen {
+    return full_screen(index);
+}
+
+// Transmittance and alpha of row `row` of the ramps at `t`.
+fn ramp(row: i32, t: f32) -> vec4<f32> {
+    let size = vec2<f32>(textureDimensions(ramps));
+    let at = vec2((0.5 + saturate(t) * (size.x - 1.0)) / size.x, (f32(row) + 0.5) / size.y);
+    return textureSampleLevel(ramps, linear_sampler, at, 0.0);
+}
+
+fn paper_height(page: vec2<f32>) -> f32 {
+    return textureSampleLevel(papers, paper_sampler, page / PAPER_SIDE, 0.0).x;
+}
+
+struct Pigment {
+    coverage: f32,
+    rim: f32,
+    density: f32,
+}
+
+const PAPER_ON_SHAPE: f32 = 0.22;
+const RIM: f32 = 0.38;
+const LUMINANCE: vec3<f32> = vec3(0.2126, 0.7152, 0.0722);
+// The washes of dark and medium foliage.
+const GLAZE: Layer = Layer(0.5, 0.10, 0.9, 1.0);
+
+// The twin of Wash::pigment in src/style/wash.rs.
+fn pigment(intensity: f32, layer: Layer, height: f32, flow: f32) -> Pigment {
+    let raised = intensity + PAPER_ON_SHAPE * (height - 0.5);
+    let coverage = smoothstep(layer.threshold - layer.softness, layer.threshold + layer.softness, raised);
+    let rim = coverage * (1.0 - smoothstep(layer.threshold, layer.threshold + RIM, intensity)) * layer.edge;
+    let density = 1.0 + style.edges * rim + style.granulation * (0.5 - height) + style.flow * flow;
+    return Pigment(coverage, rim, max(density, 0.0));
+}
+
+// Glazing: transmittances multiply.
+fn glaze(under: vec3<f32>, transmittance: vec3<f32>, density: f32, amount: f32) -> vec3<f32> {
+    return mix(under, under * pow(max(transmittance, vec3(1e-3)), vec3(density)), saturate(amount));
+}
+
+@fragment
+fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
+    // The page, in pixels of a picture of 720 lines.
+    let page = in.uv * style.size / style.unit;
+    let height = paper_height(page);
+    // Light that falls onto the paper from the upper left.
+    let relief = paper_height(page - 0.8) - paper_height(page + 0.8);
+
+    // Noise that moves with what is painted.
+    let texel = vec2<i32>(clamp(in.uv * style.map_size, vec2(0.0), style.map_size - 1.0));
+    let seen = textureLoad(depths, texel, 0);
+    let sky = seen <= 0.0;
+    let ndc = vec2(in.uv.x * 2.0 - 1.0, 1.0 - in.uv.y * 2.0);
+    let far = frame.relative_from_clip * vec4(ndc, select(seen, 0.5, sky), 1.0);
+    let direction = normalize(far.xyz);
+    // The sky turns with the view and does not move with the camera: a sphere of 4 km.
+    let relative = select(far.xyz / far.w, direction * 4000.0, sky);
+    let position = relative + select(style.anchor, vec3(0.0), sky);
+    let footprint = length(relative) / frame.focal_length_pixels * style.unit;
+    let broad = anchored_noise(position, footprint * 70.0, 1u);
+    let middle = anchored_noise(position, footprint * 22.0, 2u);
+    let fine = anchored_noise(position, footprint * 6.0, 3u);
+    let finer = anchored_noise(position, footprint * 3.2, 4u);
+    let cloud = anchored_noise(position * vec3(1.0, 1.8, 1.0), footprint * 190.0, 5u);
+
+    // The hand: shapes waver.
+    let waver = (vec2(middle, broad) * (1.8 + 5.0 * style.wetness) + vec2(fine, finer) * 0.5) * style.unit / style.size;
+    let uv = in.uv + waver;
+    let soft = textureSampleLevel(soft_lights, linear_sampler, uv, 0.0);
+    let wide = textureSampleLevel(wide_lights, linear_sampler, uv, 0.0);
+    let at = vec2<i32>(clamp(uv * style.map_size, vec2(0.0), style.map_size - 1.0));
+    let tree = f32(textureLoad(identities, at, 0).y) / 255.0 - 0.5;
+    let air = style.air * airiness(soft.z);
+
+    // Forms stand out against their surroundings: light against its wide mean, and a rim where something nearer ends in front of
+    // something farther [Luft, Colditz, Deussen 2006, unsharp masking of the depth].
+    let form = saturate((mix(soft.x, wide.x, 0.25) + 0.5 * (soft.x - wide.x) - 0.20) / 0.62);
+    let drawn = contour(soft_normals, soft_lights, linear_sampler, uv, style.line_width);
+    let particles = textureSampleLevel(soft_dabs, linear_sampler, uv, 0.0).rgb;
+    // Bright dabs are left out of the washes, as paper that masking fluid has kept.
+    let kept = smoothstep(0.30, 0.62, particles.z + 0.25 * (height - 0.5) - 0.5 * soft.y) * saturate(style.dabs);
+    let step = wide.z - soft.z;
+    let near_rim = smoothstep(0.002, 0.02, step);
+    let behind = smoothstep(0.002, 0.03, -step);
+
+    // The hue of the scene's own leaves and petals.
+    let seen_color = textureSampleLevel(soft_colors, linear_sampler, uv, 0.0);
+    let albedo = seen_color.rgb / max(seen_color.a, 1e-3);
+    let hue = albedo / max(dot(albedo, LUMINANCE), 1e-4);
+
+    var color = style.paper * (1.0 + 0.10 * relief);
+    var foliage = 0.0;
+    var painted = 0.0;
+    for (var k = 0; k < i32(arrayLength(&layers)); k += 1) {
+        let layer = layers[k];
+        let slice = textureSampleLevel(shapes, linear_sampler, uv, k / 4, 0.0);
+        let intensity = slice[k % 4];
+        let wash = pigment(intensity, layer, height, broad * 0.7 + middle * select(0.4, 0.12, k == 0));
+        // The sky's ramp is over its height, and has no form.
+        let t = select(mix(form, 0.45 + 0.55 * form, layer.foliage) + layer.foliage * (0.14 * tree + 0.08 * middle) + (1.0 - layer.foliage) * (0.22 * broad + 0.12 * middle), soft.x, k == 0);
+        let paint = ramp(k, t);
+        // Each crown is mixed anew, warmer or cooler.
+        let mixed = paint.rgb * (1.0 + layer.foliage * tree * vec3(0.20, 0.04, -0.30) + layer.foliage * broad * vec3(0.06, 0.0, -0.10));
+        let own = min(hue * dot(mixed, LUMINANCE), vec3(1.0));
+        let pigmented = mix(mixed, own, style.scene * layer.foliage);
+        let transmittance = mix(saturate(pigmented), style.distance, 0.9 * air * f32(k > 0));
+        let rim = style.edges * min(0.5 * near_rim + 0.2 * behind + 1.2 * drawn, 1.3) * (1.0 - 0.6 * air) * layer.edge;
+        let clear = select(0.0, smoothstep(0.0, 0.55, 0.8 * cloud + 0.35 * broad), k == 0);
+        let thickness = (1.0 - 0.4 * air) * (1.0 + layer.foliage * 0.35 * tree) * (1.0 - 0.5 * kept * layer.foliage) * (1.0 - 0.8 * clear);
+        color = glaze(color, transmittance, (wash.density + rim) * thickness, wash.coverage * paint.a);
+        foliage += layer.foliage * wash.coverage;
+        painted += wash.coverage;
+    }
+    foliage = saturate(foliage);
+
+    // Two more washes of foliage, over where the crowns turn away from the light, and the dabs of near crowns in them: dark, medium
+    // and bright areas, each with its own shape, glazed over each other [Luft 2006, 4.2].
+    let near = 1.0 - smoothstep(0.55, 0.80, soft.z);
+    let row = i32(arrayLength(&layers)) + 1;
+    let glazed = foliage * style.dabs * near * (1.0 - 0.75 * air);
+    let ragged = 0.16 * middle + 0.10 * fine;
+    for (var map = 0; map < 2; map += 1) {
+        let limit = select(0.58, 0.30, map == 0);
+        let area = saturate(0.5 + 2.6 * (limit - form - ragged));
+        let wash = pigment(saturate(area + 0.75 * particles[map]), GLAZE, height, 0.6 * middle);
+        let paint = ramp(row + map, form);
+        let own = min(hue * dot(paint.rgb, LUMINANCE), vec3(1.0));
+        color = glaze(color, mix(paint.rgb, own, 0.7 * style.scene), 0.8 * wash.density + 0.4 * style.edges * drawn, wash.coverage * glazed * paint.a * (1.0 - 0.6 * kept));
+    }
+
+    // The layer of shadows.
+    let shade = soft.y + 0.10 * middle + 0.16 * (height - 0.5);
+    let half_edge = 0.10 + 0.3 * style.wetness;
+    let shadow = smoothstep(0.42 - half_edge, 0.42 + half_edge, shade);
+    let shadow_rim = shadow * (1.0 - smoothstep(0.42, 0.85, shade));
+    let shadow_paint = ramp(i32(arrayLength(&layers)), airiness(soft.z));
+    let shadow_density = 0.85 + 0.35 * style.edges * shadow_rim + style.granulation * (0.5 - height) + 0.3 * style.flow * broad;
+    color = glaze(color, shadow_paint.rgb, max(shadow_density, 0.0), shadow * style.shadow * shadow_paint.a * mix(1.0, 0.45, foliage));
+
+    // The night is one glaze over all.
+    color *= style.night;
+
+    // The pencil drawing, which the paper's hills take.
+    let tremble = vec2(broad, middle) * 1.6 * style.unit / style.size;
+    let sketched = contour(soft_normals, soft_lights, linear_sampler, in.uv + tremble, style.line_width);
+    let grain = smoothstep(0.25, 0.55, height + 0.16 * finer);
+    let pencil = 1.6 * sketched * grain * style.sketch * (0.9 + 0.5 * broad) * (1.0 - 0.7 * air);
+    color = mix(color, style.ink * style.paper, saturate(pencil) * 0.85);
+
+    // The margin: the brush does not end in a straight line.
+    let from_edge = min(min(page.x, page.y), min(style.size.x / style.unit - page.x, style.size.y / style.unit - page.y));
+    let end = style.margin * 720.0 + 5.0 * broad + 3.0 * middle + 6.0 * (height - 0.5);
+    let inside = select(1.0, smoothstep(end - 1.0, end + 1.5, from_edge), style.margin > 0.0);
+    color = mix(style.paper * (1.0 + 0.10 * relief), color, inside);
+    return vec4(saturate(color), 1.0);
+}

@@ -1,0 +1,82 @@
+//! The surfaces that a styled view sees: normal, identifier and albedo of trees and ground, without light. One pass, whatever the
+//! number of layers: layers are made of the identifiers afterwards.
+
+use bevy::{
+    ecs::{query::With, system::Res},
+    render::{
+        diagnostic::RecordDiagnostics,
+        render_resource::{
+            IndexFormat, LoadOp, Operations, PipelineCache, RenderPassDepthStencilAttachment, RenderPassDescriptor,
+            StoreOp,
+        },
+        renderer::{RenderContext, ViewQuery},
+    },
+};
+
+use super::{
+    full_screen::overwritten,
+    pipelines::{LEVEL_TARGET, StylePipelines},
+    targets::StyleTargets,
+};
+use crate::{
+    cull::Share,
+    render::{
+        bindings::FrameBindGroup,
+        components::{CanopyCamera, DrawnStyle},
+        forest::{GpuForests, PreparedForest, PreparedForests},
+        terrain::GpuTerrain,
+    },
+};
+
+/// Draws forests and ground into the maps.
+pub fn surfaces_pass(
+    view: ViewQuery<&DrawnStyle, With<CanopyCamera>>,
+    group: Res<FrameBindGroup>,
+    targets: Res<StyleTargets>,
+    (forests, prepared, terrain): (Res<GpuForests>, Res<PreparedForests>, Res<GpuTerrain>),
+    pipelines: Res<StylePipelines>,
+    cache: Res<PipelineCache>,
+    mut ctx: RenderContext,
+) {
+    let (Some(group), Some(maps)) = (group.of(view.entity()), &targets.0) else { return };
+    let diagnostics = ctx.diagnostic_recorder();
+    let diagnostics = diagnostics.as_deref();
+    let mut pass = ctx.begin_tracked_render_pass(RenderPassDescriptor {
+        label: Some("canopy_style_surfaces"),
+        color_attachments: &[overwritten(&maps.surfaces), overwritten(&maps.identities), overwritten(&maps.colors)],
+        depth_stencil_attachment: Some(RenderPassDepthStencilAttachment {
+            view: &maps.depth,
+            depth_ops: Some(Operations { load: LoadOp::Clear(0.0), store: StoreOp::Store }),
+            stencil_ops: None,
+        }),
+        timestamp_writes: None,
+        occlusion_query_set: None,
+        multiview_mask: None,
+    });
+    let span = diagnostics.pass_span(&mut pass, "canopy_style_surfaces");
+    pass.set_bind_group(0, group, &[]);
+    for (entity, forest) in forests.iter() {
+        let Some(lists) = prepared.get(entity) else { continue };
+        for (index, level) in forest.levels() {
+            for features in level.gpu.features(LEVEL_TARGET) {
+                let id = pipelines.level(level, features);
+                let Some(pipeline) = id.and_then(|id| cache.get_render_pipeline(id)) else { continue };
+                pass.set_render_pipeline(pipeline);
+                for page in lists.pages.iter().filter(|page| page.trees.may_have(index)) {
+                    pass.set_bind_group(1, &page.bind_group, &[PreparedForest::offset(index)]);
+                    level.gpu.draw(&mut pass, features, LEVEL_TARGET, &page.trees.level(index, Share::ALL));
+                }
+            }
+        }
+    }
+    let ground = pipelines.ground().and_then(|id| cache.get_render_pipeline(id));
+    if let (Some(pipeline), Some(tiles)) = (ground, &terrain.bind_group)
+        && terrain.count > 0
+    {
+        pass.set_render_pipeline(pipeline);
+        pass.set_bind_group(1, tiles, &[]);
+        pass.set_index_buffer(terrain.indices.slice(..), IndexFormat::Uint32);
+        pass.draw_indexed(0..terrain.index_count, 0, 0..terrain.count);
+    }
+    span.end(&mut pass);
+}

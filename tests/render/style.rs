@@ -1,0 +1,260 @@
+//! Watercolour, lines and toon.
+
+use std::collections::BTreeSet;
+
+use bevy::ecs::entity::Entity;
+use canopy::{
+    app::{RenderedImage, Renderer},
+    assets::Stage,
+    bake::lighting::BakedLighting,
+    render::components::{CanopyCamera, CanopyStyle},
+    style::{LineNormals, Lines, Style, Toon, Watercolour},
+};
+use glam::DVec2;
+
+use super::{NIGHT, NOON, SIZE, again, draw, renderer, showing};
+use crate::support::{
+    gpu::gpu,
+    image::{difference, keep},
+    stage::{PLACE, build, grove, quality, trees_at, view},
+};
+
+/// One tree near the camera, with normals of its implicit surface.
+fn lone_tree(lighting: &str) -> Stage {
+    let quality = quality(1);
+    build(
+        &format!(
+            "(seed: 7, terrain: Flat(size: 200), species: [(name: \"broadleaf\", plant: Grown(form: Broadleaf, \
+             individuals: 1, triangles: 5000, seed: 1), height: (9, 12), lighting: {lighting})], trees: Inventory(path: \
+             \"trees.csv\"), {PLACE}, {quality})"
+        ),
+        &[("trees.csv", b"x,y\n0,0\n")],
+    )
+    .stage
+}
+
+fn styled(style: Style) -> CanopyStyle {
+    CanopyStyle::new(style).expect("a palette of the program")
+}
+
+fn watercolour(change: impl FnOnce(&mut Watercolour)) -> CanopyStyle {
+    let mut watercolour = Watercolour::default();
+    change(&mut watercolour);
+    styled(Style::Watercolour(watercolour))
+}
+
+/// The tree from the south at noon in a style.
+fn portrait(renderer: &mut Renderer, stage: &Stage, style: CanopyStyle, name: &str) -> RenderedImage {
+    renderer.set_style(style);
+    let picture = draw(renderer, stage, &view(stage, (0.0, 6.0, 15.0), 0.0, 4.0), NOON);
+    keep(&picture, name);
+    picture
+}
+
+fn pixel(picture: &RenderedImage, column: u32, row: u32) -> [u8; 3] {
+    let first = 3 * (row * picture.width + column) as usize;
+    [0, 1, 2].map(|channel| picture.pixels[first + channel])
+}
+
+/// Mean of a channel-wise mean, 0..255, over a part of the image.
+fn brightness(picture: &RenderedImage, columns: std::ops::Range<u32>, rows: std::ops::Range<u32>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for row in rows {
+        for column in columns.clone() {
+            sum += pixel(picture, column, row).iter().map(|value| f64::from(*value)).sum::<f64>() / 3.0;
+            count += 1.0;
+        }
+    }
+    sum / count
+}
+
+#[test]
+fn a_style_that_is_off_costs_nothing() {
+    let gpu = gpu();
+    let stage = lone_tree("Local");
+    let mut renderer = showing(&stage);
+    let plain = portrait(&mut renderer, &stage, CanopyStyle::default(), "style-off");
+    assert!(!renderer.explain().iter().any(|line| line.contains("palette")), "{:?}", renderer.explain());
+    // Without the component it is the same to the bit.
+    let world = renderer.app().world_mut();
+    let camera =
+        world.query_filtered::<Entity, bevy::ecs::query::With<CanopyCamera>>().single(world).expect("a camera");
+    world.entity_mut(camera).remove::<CanopyStyle>();
+    assert!(again(&mut renderer) == plain);
+    // A control: with a style it is another picture, and after it the photograph again.
+    let painted = portrait(&mut renderer, &stage, watercolour(|_| ()), "style-on");
+    assert!(painted != plain && renderer.explain().iter().any(|line| line.contains("palette")));
+    assert!(portrait(&mut renderer, &stage, CanopyStyle::default(), "style-off-again") == plain);
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+#[test]
+fn a_watercolour_has_darkened_rims_paper_and_a_margin() {
+    let gpu = gpu();
+    let stage = lone_tree("Expressive()");
+    let mut renderer = showing(&stage);
+    let bare = |w: &mut Watercolour| {
+        (w.granulation, w.flow, w.dabs, w.sketch, w.shadow) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    };
+    let mut rims = |edges: f32| {
+        let style = watercolour(|w| {
+            bare(w);
+            w.edges = edges;
+        });
+        portrait(&mut renderer, &stage, style, &format!("watercolour-edges-{edges}"))
+    };
+    // Rims make the picture darker where a wash ends; a control without them is not.
+    let (none, strong) = (rims(0.0), rims(3.0));
+    let change = |(none, strong): (&u8, &u8)| i16::from(*strong) - i16::from(*none);
+    let changes = || none.pixels.iter().zip(&strong.pixels).map(change);
+    let darker = changes().filter(|change| *change < -12).count();
+    let lighter = changes().filter(|change| *change > 12).count();
+    assert!(darker > 300 && lighter * 20 < darker, "{darker} darker, {lighter} lighter");
+    // The paper shows in a flat wash of the sky, and not without granulation on a smooth paper.
+    let grain = |picture: &RenderedImage| {
+        let mean = brightness(picture, 10..60, 4..14);
+        let squares = (4..14).flat_map(|row| (10..60).map(move |column| (column, row)));
+        let deviation = |(column, row)| (brightness(picture, column..column + 1, row..row + 1) - mean).powi(2);
+        (squares.map(deviation).sum::<f64>() / 500.0).sqrt()
+    };
+    let rough = watercolour(|w| {
+        bare(w);
+        (w.granulation, w.paper) = (2.0, "rough".to_owned());
+    });
+    let (rough, smooth) = (portrait(&mut renderer, &stage, rough, "watercolour-rough"), &none);
+    assert!(grain(&rough) > 1.5 * grain(smooth), "{} and {}", grain(&rough), grain(smooth));
+    // The margin is paper.
+    let margin = portrait(&mut renderer, &stage, watercolour(|w| w.margin = 0.2), "watercolour-margin");
+    assert!(brightness(&margin, 0..SIZE.0, 0..6) > 235.0 && brightness(&margin, 80..110, 40..60) < 220.0);
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+#[test]
+fn realigned_and_scaled_normals_have_fewer_lines_inside_a_crown() {
+    let gpu = gpu();
+    let (own, realigned) = (lone_tree("Local"), lone_tree("Expressive()"));
+    assert!(matches!(*realigned.plants[0].lighting, BakedLighting::Expressive(_)));
+    let ink = |stage: &Stage, normals: LineNormals, name: &str| {
+        let mut renderer = match Renderer::new((640, 480), None, 1) {
+            Ok(renderer) => renderer,
+            Err(error) => panic!("{error}"),
+        };
+        renderer.show(stage);
+        let style = styled(Style::Lines(Lines { normals, hatching: 0.0, ..Lines::default() }));
+        let picture = portrait(&mut renderer, stage, style, name);
+        // Inside the crown, where there is no silhouette.
+        255.0 - brightness(&picture, 290..340, 160..260)
+    };
+    let own = ink(&own, LineNormals::Own, "lines-own");
+    let aligned = ink(&realigned, LineNormals::Realigned, "lines-realigned");
+    let scaled = ink(&realigned, LineNormals::Scaled, "lines-scaled");
+    let paper = 255.0 - 250.0;
+    assert!(
+        own - paper > 1.5 * (aligned - paper) && aligned > 1.02 * scaled,
+        "{own} own, {aligned} realigned, {scaled} scaled"
+    );
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+#[test]
+fn a_toon_has_few_tones() {
+    let gpu = gpu();
+    let stage = lone_tree("Expressive()");
+    let mut renderer = showing(&stage);
+    let mut colors = |tones: u32| {
+        let style = styled(Style::Toon(Toon { tones, width: 0.0, ..Toon::default() }));
+        let picture = portrait(&mut renderer, &stage, style, &format!("toon-{tones}"));
+        // The sky has no texture: its tones can be counted.
+        (0..20)
+            .flat_map(|row| (0..40).map(move |column| (column, row)))
+            .map(|(c, r)| pixel(&picture, c, r))
+            .collect::<BTreeSet<_>>()
+    };
+    let (few, many) = (colors(2).len(), colors(8).len());
+    // Two tones of the light are four of the sky, with what lies between two of them.
+    assert!(few <= 7 && many > few + 3, "{few} and {many}");
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+#[test]
+fn styles_withstand_nothing_night_and_small_pictures() {
+    let gpu = gpu();
+    let empty = trees_at(&[DVec2::new(0.0, 90.0)], 1).stage;
+    let styles = || {
+        [
+            watercolour(|w| (w.shadow_softness, w.simplification) = (0.0, 0.0)),
+            watercolour(|w| (w.shadow_softness, w.wetness, w.margin) = (20.0, 1.0, 0.3)),
+            styled(Style::Lines(Lines::default())),
+            styled(Style::Toon(Toon::default())),
+        ]
+    };
+    let mut renderer = showing(&empty);
+    for (index, style) in styles().into_iter().enumerate() {
+        renderer.set_style(style);
+        for (time, at) in [("noon", NOON), ("night", NIGHT)] {
+            // Away from the only tree, and straight up.
+            for pitch in [0.0, 90.0] {
+                let picture = draw(&mut renderer, &empty, &view(&empty, (0.0, 2.0, 0.0), 0.0, pitch), at);
+                keep(&picture, &format!("style-{index}-{time}-{pitch}"));
+                assert!(again(&mut renderer) == picture, "a resting picture changes");
+            }
+        }
+    }
+    for size in [(1, 1), (3, 2)] {
+        let mut small = match Renderer::new(size, None, 1) {
+            Ok(renderer) => renderer,
+            Err(error) => panic!("{error}"),
+        };
+        small.show(&empty);
+        for style in styles() {
+            small.set_style(style);
+            let picture = draw(&mut small, &empty, &view(&empty, (0.0, 2.0, 70.0), 180.0, 0.0), NOON);
+            assert_eq!(picture.pixels.len(), (3 * size.0 * size.1) as usize);
+        }
+    }
+    // No scene at all.
+    let mut nothing = renderer_of_nothing();
+    for style in styles() {
+        nothing.set_style(style);
+        assert!(nothing.update().is_ok());
+    }
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+fn renderer_of_nothing() -> Renderer {
+    renderer(1)
+}
+
+/// Mean FLIP of successive frames of an orbit of 1 degree a frame around a grove.
+fn unrest(renderer: &mut Renderer, stage: &Stage, style: CanopyStyle, name: &str) -> f32 {
+    renderer.set_style(style);
+    let frames: Vec<RenderedImage> = (0..4)
+        .map(|frame| {
+            let yaw = f64::from(frame);
+            let (sin, cos) = yaw.to_radians().sin_cos();
+            let picture = draw(renderer, stage, &view(stage, (-26.0 * sin, 7.0, 26.0 * cos), yaw, -4.0), NOON);
+            keep(&picture, &format!("orbit-{name}-{frame}"));
+            picture
+        })
+        .collect();
+    frames.windows(2).map(|pair| difference(&pair[0], &pair[1])).sum::<f32>() / 3.0
+}
+
+#[test]
+fn an_orbit_is_as_calm_in_watercolour_as_in_the_photograph() {
+    let gpu = gpu();
+    let stage = grove(1).stage;
+    let mut renderer = showing(&stage);
+    let photograph = unrest(&mut renderer, &stage, CanopyStyle::default(), "photograph");
+    let painted = unrest(&mut renderer, &stage, watercolour(|_| ()), "watercolour");
+    println!("mean FLIP of successive frames: {photograph} photographed, {painted} painted");
+    assert!(painted <= 1.5 * photograph, "{painted} painted, {photograph} photographed");
+    // A control: an orbit with another paper in every frame is no calm one.
+    let papers = ["rough", "canvas", "laid", "hot-pressed"].map(|paper| {
+        let style = watercolour(|w| (w.paper, w.granulation) = (paper.to_owned(), 3.0));
+        portrait(&mut renderer, &stage, style, &format!("paper-{paper}"))
+    });
+    let restless = papers.windows(2).map(|pair| difference(&pair[0], &pair[1])).sum::<f32>() / 3.0;
+    assert!(restless > 0.5 * painted, "{restless} is no control");
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
