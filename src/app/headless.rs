@@ -166,26 +166,22 @@ fn interrupted(report: &RenderReport, total: usize) -> AppError {
 /// Time limit for shaders and pipelines; far more than they need on the slowest machine.
 const LONGEST_WAIT: Duration = Duration::from_secs(120);
 
-        let mut time = self.draw_once()?;
-        // Lists of trees that were too short have grown, and the frame is drawn again.
-        for _ in 0..MOST_REDRAWS {
-            if !self.lists_were_short() {
-                break;
-            }
-            let again = self.draw_once()?;
-            time = UpdateTime { updates: time.updates + again.updates, ..again };
-        }
-        match self.app.should_exit() {
-            Some(exit) if exit.is_error() => {
-                Err(AppError::Render("the graphics device reported an error (see above)".to_owned()))
-            }
-            _ => Ok(time),
-        }
-    }
+/// How often a frame is drawn again because lists of trees were too short: once is enough, since all that they lack is
+/// counted.
+const MOST_REDRAWS: usize = 3;
 
-    /// Draws one frame with the lists of trees as long as they are.
-    fn draw_once(&mut self) -> Result<UpdateTime, AppError> {
-        let began = Instant::now();
+/// When a frame began and ended.
+#[derive(Clone, Copy, Debug)]
+pub struct UpdateTime {
+    /// Its begin.
+    pub began: Instant,
+    /// When the CPU had submitted all of it.
+    pub submitted: Instant,
+    /// When the device had finished it.
+    pub finished: Instant,
+    /// How often it was drawn: more than once where a pass waited for its pipeline, and then its times say nothing.
+    pub updates: u32,
+}
 
 /// A renderer without a window, driven frame by frame.
 pub struct Renderer {
@@ -366,16 +362,26 @@ impl Renderer {
             self.warm_up()?;
             self.warm = true;
         }
-        time.finished = Instant::now();
-        Ok(time)
+        let mut time = self.draw_once()?;
+        // Lists of trees that were too short have grown, and the frame is drawn again.
+        for _ in 0..MOST_REDRAWS {
+            if !self.lists_were_short() {
+                break;
+            }
+            let again = self.draw_once()?;
+            time = UpdateTime { updates: time.updates + again.updates, ..again };
+        }
+        match self.app.should_exit() {
+            Some(exit) if exit.is_error() => {
+                Err(AppError::Render("the graphics device reported an error (see above)".to_owned()))
+            }
+            _ => Ok(time),
+        }
     }
 
-    /// Takes the counts of the lists that the device made; whether trees are missing in the last frame.
-    fn lists_were_short(&mut self) -> bool {
-        let world = self.app.sub_app_mut(RenderApp).world_mut();
-        let view = world.run_system_cached(collect_view_counts).unwrap_or(false);
-        let casters = world.run_system_cached(collect_caster_counts).unwrap_or(false);
-        view || casters
+    /// Draws one frame with the lists of trees as long as they are.
+    fn draw_once(&mut self) -> Result<UpdateTime, AppError> {
+        let began = Instant::now();
         self.app.update();
         let mut time = UpdateTime { began, submitted: Instant::now(), finished: began, updates: 1 };
         self.follow_device();
@@ -391,8 +397,8 @@ impl Renderer {
         // What the device reported says more than that it could not be waited for.
         self.check_fault()?;
         waited.map_err(|error| AppError::Render(error.to_string()))?;
-<<<<<<< HEAD
-        Ok(())
+        time.finished = Instant::now();
+        Ok(time)
     }
 
     /// Takes the counts of the lists that the device made; whether trees are missing in the last frame.
@@ -401,15 +407,6 @@ impl Renderer {
         let view = world.run_system_cached(collect_view_counts).unwrap_or(false);
         let casters = world.run_system_cached(collect_caster_counts).unwrap_or(false);
         view || casters
-=======
-        time.finished = Instant::now();
-        match self.app.should_exit() {
-            Some(exit) if exit.is_error() => {
-                Err(AppError::Render("the graphics device reported an error (see above)".to_owned()))
-            }
-            _ => Ok(time),
-        }
->>>>>>> slice-measure
     }
 
     /// The first updates upload meshes, textures and shaders, and draw nothing yet.

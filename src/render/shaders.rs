@@ -103,10 +103,16 @@ pub fn sources() -> Vec<(&'static str, Cow<'static, str>)> {
 }
 
 /// Handles of all shaders; they live as long as the app. The default ones are never loaded.
-#[derive(Resource, Clone, Debug, Default)]
+#[derive(Resource, Clone, Debug)]
 pub struct CanopyShaders {
     files: [Handle<Shader>; ShaderFile::ALL.len()],
     constants: Handle<Shader>,
+}
+
+impl Default for CanopyShaders {
+    fn default() -> Self {
+        Self { files: std::array::from_fn(|_| Handle::default()), constants: Handle::default() }
+    }
 }
 
 impl CanopyShaders {

@@ -7,6 +7,7 @@ use crate::{
     assets::Stage,
     lod::Representation,
     progress::Progress,
+    render::components::CanopyStyle,
     scene::{Quality, QualityLevel, Scene},
 };
 
@@ -81,6 +82,7 @@ impl Stages {
             surroundings: stage.surroundings,
             observer: stage.observer,
             scene: scene.clone(),
+            style: CanopyStyle::new(scene.style.clone()).map_err(|error| interrupt::building(error.into()))?,
         })
     }
 }
