@@ -136,7 +136,8 @@ pub struct FrameTime {
     pub frame: f64,
     /// Of it the main world, on the CPU.
     pub cpu_main: Option<f64>,
-    /// Of it the render world, on the CPU, until everything was submitted.
+    /// Of it the render world, on the CPU, until everything was submitted. With a driver that draws while it is submitted to,
+    /// as software drivers do, the device's work too.
     pub cpu_render: Option<f64>,
     /// Sum of all passes on the device.
     pub gpu: Option<f64>,

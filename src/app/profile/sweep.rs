@@ -1,7 +1,7 @@
 //! The points of a profile: the scene as written, and what the sweeps make of it.
 
 use super::{error::ProfileError, settings};
-use crate::scene::Scene;
+use crate::scene::{QualityLevel, Scene};
 
 /// The most points of a profile; more are a typing error.
 const MOST_POINTS: usize = 1_000;
@@ -76,8 +76,21 @@ impl Point {
         if self.settings.is_empty() {
             return "as written".to_owned();
         }
-        let short = |name: &str| name.strip_prefix("quality.").unwrap_or(name).to_owned();
-        self.settings.iter().map(|(name, value)| format!("{}={value}", short(name))).collect::<Vec<_>>().join(", ")
+        let words = |(name, value): &(String, String)| {
+            let value = if name == "quality.levels" { self.levels() } else { value.clone() };
+            format!("{}={value}", name.strip_prefix("quality.").unwrap_or(name))
+        };
+        self.settings.iter().map(words).collect::<Vec<_>>().join(", ")
+    }
+
+    /// The levels of detail in short: `model 40, cross`.
+    fn levels(&self) -> String {
+        let levels = &self.scene.quality.levels;
+        let level = |(index, level): (usize, &QualityLevel)| match index + 1 == levels.len() {
+            true => level.draw.clone(),
+            false => format!("{} {} m", level.draw, level.until),
+        };
+        format!("({})", levels.iter().enumerate().map(level).collect::<Vec<_>>().join(", "))
     }
 }
 
@@ -157,6 +170,9 @@ mod tests {
         let all = ["as written", "near_distance=20, msaa=1", "near_distance=20, msaa=4", "near_distance=60, msaa=1"];
         assert_eq!(labels(Combination::All), all);
         assert_eq!(labels(Combination::Each), ["as written", "near_distance=20", "msaa=1"]);
+        let levels = [sweep("quality.levels=[(draw: \"model\", until: 40), (draw: \"cross\")]")];
+        let found = points(&scene, &levels, Combination::All).unwrap();
+        assert_eq!(found[1].label(), "levels=(model 40 m, cross)");
         let many = sweep(&format!("quality.near_distance={}", vec!["1"; 40].join(",")));
         let cube = [many.clone(), many.clone(), many];
         assert!(matches!(points(&scene, &cube, Combination::All), Err(ProfileError::TooManyPoints { .. })));
