@@ -51,7 +51,7 @@ pub struct Watercolour {
     /// Strength of the layer of shadows, 0 to 2. Default 1.
     #[reflect(@Range::steps(0.0..=2.0, 0.1, 0.02), @"Strength of the layer of shadows.")]
     pub shadow: f32,
-    /// Depth in metres over which shadows begin, δ of the blurred depth test, 0 to 20. Default 1.6.
+    /// Depth in metres over which shadows begin, δ of the blurred depth test, 0 to 20. Default 2.
     #[reflect(@Range::steps(0.0..=20.0, 0.5, 0.1).unit("m"), @"Softness of shadows.")]
     pub shadow_softness: f32,
     /// Strength of the dabs of foliage, 0 to 2. Default 1.
