@@ -353,6 +353,7 @@ fn files_that_are_no_text_are_named() {
         (b"SQLite format 3\0rest", "GeoPackage"),
         (b"\x00\x00\x27\x0a\x00\x00", "shapefile"),
         (b"{\"type\":\"FeatureCollection\",\"features\":[]}", "no features"),
+        (b"{\"type\":\"Feature\",\"geometry\":{\"type\":\"Polygon\",\"coordinates\":[]}}", "Polygon"),
         (b"{\"type\":", "JSON"),
     ] {
         let error = parse_inventory(bytes, "trees", InventoryOptions::default()).expect_err("no table").to_string();
@@ -389,6 +390,7 @@ fn positions_have_many_forms() {
         "coord_x,coord_y\n16.37,48.2\n",
         "E,N\n16.37,48.2\n",
         "geom\nPOINT(16.37 48.2)\nPOINT(500 600)\n",
+        "geom,id\nPOINT(16.37 48.2),1\nPOINT(50.5 60.25),2\nPOINT(0 0),3\n",
     ] {
         let inventory = parse(text);
         assert_eq!(inventory.coordinates, Coordinates::Planar, "{text}");
@@ -521,6 +523,43 @@ fn what_is_no_living_tree_is_left_out() {
 }
 
 #[test]
+fn letters_of_forest_plots_tell_the_dead() {
+    let inventory = parse("x,y,status\n1,2,A\n3,4,D\n5,6,A\n");
+    assert_eq!(inventory.rows.len(), 2);
+    says(&inventory, &["1 dead trees"]);
+    assert_eq!(parse("x,y,condition\n1,2,B\n3,4,D\n5,6,C\n").rows.len(), 3, "grades are no letters of life");
+}
+
+#[test]
+fn one_year_and_one_variant_are_shown() {
+    let options = |year: Option<i32>| InventoryOptions { year, ..InventoryOptions::default() };
+    let text = "x,y,year,dbh_cm\n1,2,2000,10\n5,6,2000,11\n1,2,2010,15\n5,6,2010,16\n9,9,2020,5\n1,2,2020,20\n";
+    let read = |year: Option<i32>| parse_inventory(text.as_bytes(), "t", options(year)).expect("an inventory");
+    let thick = |inventory: &Inventory| {
+        inventory.rows.iter().map(|row| (100.0 * row.dbh_m.unwrap_or(0.0)).round()).collect::<Vec<_>>()
+    };
+    assert_eq!(thick(&read(None)), [5.0, 20.0]);
+    assert_eq!(thick(&read(Some(2000))), [10.0, 11.0]);
+    assert_eq!(thick(&read(Some(2015))), [15.0, 16.0]);
+    assert_eq!(thick(&read(Some(1900))), [10.0, 11.0]);
+    says(&read(None), &["of the years 2000, 2010, 2020 in `year`, 2020 is shown", "--year"]);
+    // Years of planting are no surveys.
+    assert_eq!(parse("x,y,year\n1,2,1990\n3,4,2001\n5,6,2005\n").rows.len(), 3);
+    assert_eq!(parse("x,y,Pflanzjahr\n1,2,1990\n1,3,2001\n").rows.len(), 2);
+    assert_eq!(parse("x;y;Aufnahmejahr\n1;2;1990\n1;3;2001\n").rows.len(), 1);
+
+    let text = "x,y,scenario\n1,2,before\n3,4,before\n1,2,after\n";
+    let read =
+        |variant| parse_inventory(text.as_bytes(), "t", InventoryOptions { variant, ..InventoryOptions::default() });
+    assert_eq!(read(None).expect("an inventory").rows.len(), 2);
+    assert_eq!(read(Some("After")).expect("an inventory").rows.len(), 1);
+    says(
+        &read(Some("never")).expect("an inventory"),
+        &["of the variants before, after", "there is no `never`", "--variant"],
+    );
+}
+
+#[test]
 fn names_of_species_are_joined_and_found() {
     let species = |text: &str| parse(text).rows[0].species.clone().unwrap_or_default();
     assert_eq!(species("x,y,genus,species\n1,2,Quercus,robur\n"), "Quercus robur");
@@ -608,7 +647,7 @@ fn degrees_and_metres_meet_on_any_terrain() {
     let degrees = "File(path: \"degrees.asc\", coordinates: Geographic)";
     let flat = "Flat(size: 400)";
     let lonlat = "lon,lat\n15.0003,48.7002\n15.0006,48.7006\n";
-    let metres = "x,y\n500020,5394040\n500050,5394100\n";
+    let metres = "x,y\n500020,5394130\n500050,5394170\n";
     for (terrain, table, anchor, place) in [
         (utm, lonlat, "Terrain", ""),
         (utm, lonlat, "TerrainCentre", ""),
@@ -642,6 +681,8 @@ fn a_stand_outside_names_both_extents_and_the_anchors_that_fit() {
     }
     let error = described("Flat(size: 50)", "x,y\n500,0\n900,900\n", "TerrainCentre", "latitude: 1, longitude: 1");
     assert!(error.expect_err("outside").contains("no other `anchor`"));
+    let exchanged = described(utm, "y,x\n500020,5394040\n500050,5394100\n", "Terrain", "").expect_err("outside");
+    assert!(exchanged.contains("if x and y were exchanged"), "{exchanged}");
     // Most outside is a warning with the same words.
     let text = described("Flat(size: 100)", "x,y\n0,0\n90,90\n95,99\n", "TerrainCentre", "latitude: 1, longitude: 1");
     let text = text.expect("one tree stands");

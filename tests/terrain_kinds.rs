@@ -172,7 +172,7 @@ fn scale_offset_and_unit_of_the_band_are_applied() {
     let marked = raster(16, 2, shorts(|at| if at < 5 { -32_768 } else { (10.0 * ground(at)) as i16 }))
         .set(42112, metadata(&[("scale", "0.1")]))
         .set(42113, Text("-32768".to_owned()));
-    let warnings = heights(marked, 282.0, 380.0);
+    let warnings = heights(marked, 282.6, 380.0);
     assert!(warnings.contains(&Warning::HolesFilled { filled: 5, total: COLUMNS * ROWS }), "{warnings:?}");
 }
 
@@ -240,7 +240,7 @@ fn zero_may_be_white_without_turning_heights_over() {
 fn marks_beside_sound_heights_become_holes_with_a_warning() {
     for mark in [-9999.0, -32_767.0, -32_768.0, 0.0, -3.4e38, f32::MIN, 9999.0] {
         let image = raster(32, 3, floats(|at| if at % 7 == 0 { mark } else { ground(at) }));
-        let warnings = heights(image, 280.0, 380.0);
+        let warnings = heights(image, 280.5, 380.0);
         assert!(
             warnings.len() == 2 && matches!(warnings[1], Warning::HolesFilled { filled: 28, .. }),
             "{mark}: {warnings:?}"
@@ -252,7 +252,7 @@ fn marks_beside_sound_heights_become_holes_with_a_warning() {
     // In feet, too.
     let feet = raster(32, 3, floats(|at| if at % 7 == 0 { -9999.0 } else { ground(at) / 0.3048 }))
         .set(42112, metadata(&[("unittype", "ft")]));
-    heights(feet, 280.0, 380.0);
+    heights(feet, 280.5, 380.0);
 }
 
 #[test]

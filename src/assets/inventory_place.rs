@@ -43,6 +43,8 @@ pub fn read_and_place(
             dbh_unit: trees.dbh_unit,
             height_unit: trees.height_unit,
             positions,
+            year: trees.year,
+            variant: trees.variant.as_deref(),
             strict: trees.strict,
         };
         read_inventory(&trees.path, options)
@@ -207,8 +209,17 @@ pub fn fitting_anchors(scene: &Scene, trees: &InventoryTrees, inventory: &Invent
     Anchor::ALL.into_iter().filter(fits).collect()
 }
 
+/// Whether the trees would stand on the terrain if x and y of their file were exchanged.
+fn fits_exchanged(placement: &Placement, inventory: &Inventory, terrain: &Terrain) -> bool {
+    let inside = inventory.rows.iter().filter(|row| {
+        let place = placement.local(terrain, row.y, row.x);
+        place.is_finite() && terrain.contains(place.x, place.z)
+    });
+    !inventory.rows.is_empty() && 10 * inside.count() >= 9 * inventory.rows.len()
+}
+
 /// What the inventory and the terrain cover in the coordinates of their files, for messages.
-pub fn file_extents(inventory: &Inventory, terrain: &Terrain) -> Option<String> {
+pub fn file_extents(placement: &Placement, inventory: &Inventory, terrain: &Terrain) -> Option<String> {
     let reference = terrain.reference()?;
     let half = 0.5 * terrain.extent();
     let (low, high) = (reference.to_file(-half.x, half.y), reference.to_file(half.x, -half.y));
@@ -216,9 +227,14 @@ pub fn file_extents(inventory: &Inventory, terrain: &Terrain) -> Option<String> 
     let digits = |degrees: bool| if degrees { 5 } else { 0 };
     let file = digits(reference.system() == CoordinateSystem::Geographic);
     let table = digits(inventory.coordinates == Coordinates::Geographic);
+    let exchanged = if fits_exchanged(placement, inventory, terrain) {
+        "; they would stand on it if x and y were exchanged: look at the names of the columns"
+    } else {
+        ""
+    };
     Some(format!(
         " (in the files' own coordinates: trees x {:.table$} to {:.table$}, y {:.table$} to {:.table$}; terrain x {:.file$} to \
-         {:.file$}, y {:.file$} to {:.file$})",
+         {:.file$}, y {:.file$} to {:.file$}{exchanged})",
         least.x, most.x, least.y, most.y, low.x, high.x, low.y, high.y
     ))
 }

@@ -188,7 +188,7 @@ fn count_inside(
             east: (west, east),
             north: (south, north),
             terrain: terrain.extent().to_array(),
-            covers: inventory_place::file_extents(inventory, terrain),
+            covers: inventory_place::file_extents(placement, inventory, terrain),
             fits: inventory_place::fitting_anchors(scene, trees, inventory, terrain),
         });
     }
@@ -333,7 +333,7 @@ fn from_inventory(
                  centre, and the terrain is {:.0} m x {:.0} m{}; {}",
                 size.x,
                 size.y,
-                inventory_place::file_extents(inventory, terrain).unwrap_or_default(),
+                inventory_place::file_extents(placement, inventory, terrain).unwrap_or_default(),
                 anchors(&fits)
             ),
             progress,

@@ -69,6 +69,12 @@ pub struct Common {
     /// else it follows the light at the camera].
     #[arg(long, global = true, value_name = "EV", value_parser = parse_exposure, allow_hyphen_values = true)]
     pub exposure: Option<f64>,
+    /// Show this year of an inventory of repeated surveys [default: the scene's, or the last].
+    #[arg(long, global = true, value_name = "YEAR")]
+    pub year: Option<i32>,
+    /// Show this variant or scenario of an inventory with several [default: the scene's, or the first].
+    #[arg(long, global = true, value_name = "NAME")]
+    pub variant: Option<String>,
     /// Refuse an inventory with rows that cannot be used, instead of leaving them out with a warning.
     #[arg(long, global = true)]
     pub strict: bool,

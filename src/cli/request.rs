@@ -26,6 +26,8 @@ fn overrides(common: &Common) -> Overrides {
         msaa: common.msaa,
         exposure: common.exposure,
         strict: common.strict,
+        year: common.year,
+        variant: common.variant.clone(),
         lighting: common.lighting.clone(),
         ..Overrides::default()
     }

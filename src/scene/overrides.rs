@@ -15,6 +15,10 @@ pub struct Overrides {
     pub msaa: Option<u32>,
     /// Exposure value at ISO 100 to keep, -10 to 25.
     pub exposure: Option<f64>,
+    /// The year of inventories of repeated surveys.
+    pub year: Option<i32>,
+    /// The variant or scenario of inventories with several.
+    pub variant: Option<String>,
     /// Refuses inventories with rows that cannot be used, where the scene would leave them out.
     pub strict: bool,
     /// The lighting of all species. A species that already has this kind of lighting keeps its own values, except for
@@ -43,6 +47,10 @@ impl Overrides {
         scene.camera.exposure = self.exposure.or(scene.camera.exposure);
         if let Trees::Inventory(inventory) = &mut scene.trees {
             inventory.strict |= self.strict;
+            inventory.year = self.year.or(inventory.year);
+            if let Some(variant) = &self.variant {
+                inventory.variant = Some(variant.clone());
+            }
         }
         self.restyle(scene);
         let Some(lighting) = &self.lighting else {

@@ -87,6 +87,12 @@ pub struct InventoryTrees {
     /// with a warning, mostly `Metres`.
     #[serde(default)]
     pub height_unit: Option<LengthUnit>,
+    /// The year of a table of repeated surveys. Default: its last; of years without rows the one before.
+    #[serde(default)]
+    pub year: Option<i32>,
+    /// The variant or scenario of a table that has several. Default: its first.
+    #[serde(default)]
+    pub variant: Option<String>,
     /// Refuses a table with any row or size that cannot be used, instead of leaving it out with a warning. Default false.
     #[serde(default)]
     pub strict: bool,
@@ -156,6 +162,8 @@ impl InventoryTrees {
             path: path.into(),
             dbh_unit: None,
             height_unit: None,
+            year: None,
+            variant: None,
             strict: false,
             anchor: Anchor::default(),
             coordinates: None,

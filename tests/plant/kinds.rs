@@ -152,6 +152,37 @@ fn hulls_and_ground_are_told_apart_by_name() {
 }
 
 #[test]
+fn trees_side_by_side_are_mentioned() {
+    let bytes = edited(|json| {
+        json["nodes"] =
+            json!([{"mesh": 0, "name": "Oak A"}, {"mesh": 0, "name": "Oak B", "translation": [9.0, 0.0, 0.0]}]);
+        json["scenes"] = json!([{"nodes": [0, 1]}]);
+    });
+    let (plant, warnings) = load(&bytes);
+    assert_eq!(triangles(&plant), 2 * WHOLE);
+    says(&warnings, &["2 trees side by side (Oak A, Oak B)", "node: [\"Oak A\"]"]);
+    let one = load_with(&bytes, &GltfOptions { node: vec!["Oak A".to_owned()], ..GltfOptions::default() });
+    assert!(triangles(&one.0) == WHOLE && one.1.is_empty(), "{:?}", one.1);
+    // The parts of one tree are not.
+    let parts = edited(|json| {
+        json["nodes"] = json!([{"mesh": 0, "name": "A"}, {"mesh": 0, "name": "B", "translation": [0.5, 0.0, 0.0]}]);
+        json["scenes"] = json!([{"nodes": [0, 1]}]);
+    });
+    assert!(load(&parts).1.is_empty());
+}
+
+#[test]
+fn billboards_beside_a_tree_are_levels_of_it() {
+    let bytes = edited(|json| {
+        json["nodes"] = json!([{"mesh": 0, "name": "Oak"}, {"mesh": 0, "name": "Oak_Billboard"}]);
+        json["scenes"] = json!([{"nodes": [0, 1]}]);
+    });
+    let (plant, warnings) = load(&bytes);
+    assert_eq!(triangles(&plant), WHOLE);
+    says(&warnings, &["coarser levels of detail", "Oak_Billboard"]);
+}
+
+#[test]
 fn the_caller_names_what_is_the_tree() {
     let bytes = edited(|json| {
         json["nodes"] =
@@ -351,7 +382,7 @@ fn files_beside_it_are_found_under_many_spellings() {
         r"Textures\\Leaf A.png",
         r"textures\\LEAF%20a.PNG",
         r".\\Textures\\Leaf A.png",
-        r"C:\\models\\Textures\\100%25.png",
+        r"C:\\models\\Textures\\100%2525.png",
         "100%25.png",
     ] {
         let mut glb = Glb {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Affine2, Mat2, Vec2, Vec3};
 use gltf::json::Value;
 use gltf::json::material::{AlphaMode, Material, NormalTexture};
-use gltf::json::texture::Info;
+use gltf::json::texture::{Info, WrappingMode};
 use gltf::json::validation::Checked;
 use image::{ImageReader, Limits, RgbaImage};
 
@@ -28,6 +28,8 @@ pub(super) struct Surface {
     pub uv_set: u32,
     /// Transform of those coordinates (KHR_texture_transform).
     pub uv_transform: Affine2,
+    /// Whether its sampler does not repeat the texture.
+    pub clamped: bool,
 }
 
 impl Surface {
@@ -149,6 +151,7 @@ pub(super) fn read(
         material,
         uv_set: base.as_ref().map_or(0, |base| base.uv_set),
         uv_transform: base.as_ref().map_or(Affine2::IDENTITY, |base| base.transform),
+        clamped: base.as_ref().is_some_and(|base| is_clamped(document, base.texture)),
     };
     if let Some(normal) = &source.normal_texture {
         let own = Reference::of_normal(normal);
@@ -210,6 +213,14 @@ fn mention_cut_out(
         }
         _ => {}
     }
+}
+
+/// Whether the sampler of a texture ends it at its border or mirrors it.
+fn is_clamped(document: &Document, texture: usize) -> bool {
+    let sampler = document.root.textures.get(texture).and_then(|texture| texture.sampler);
+    let sampler = sampler.and_then(|sampler| document.root.samplers.get(sampler.value()));
+    let repeats = |mode: &Checked<WrappingMode>| matches!(mode, Checked::Valid(WrappingMode::Repeat));
+    sampler.is_some_and(|sampler| !(repeats(&sampler.wrap_s) && repeats(&sampler.wrap_t)))
 }
 
 /// What people call a texture: the name or the file of its image.

@@ -275,6 +275,7 @@ fn gather(
     if up_is_z {
         placed.iter_mut().for_each(|placed| upright::turn(&mut placed.piece.mesh));
     }
+    upright::mention_several(&document.root, &placements, &placed, warnings);
 
     let mut parts: BTreeMap<(Option<usize>, [u32; 3]), (Surface, PlantMesh)> = BTreeMap::new();
     for Placed { material, piece, .. } in placed {

@@ -130,6 +130,12 @@ pub(super) fn read(
         let message = format!("{slivers} of {} triangles have no area; left out", triangles.len());
         warnings.push(WarningKind::Repaired, location, message);
     }
+    let beyond = |uv: &Vec2| uv.min_element() < -0.01 || uv.max_element() > 1.01;
+    if surface.clamped && builder.mesh.uvs.iter().any(beyond) {
+        let message =
+            format!("the texture of '{}' is not repeated beyond its border in the file; here it is", surface.name);
+        warnings.push(WarningKind::Ignored, location, message);
+    }
     if broken_uvs > 0 {
         let message = format!("{broken_uvs} texture coordinates are not finite; set to 0");
         warnings.push(WarningKind::Repaired, location, message);

@@ -42,6 +42,11 @@ pub(super) fn level(name: &str) -> Option<u32> {
     })
 }
 
+/// Whether a name is that of the picture of a tree for far away, the coarsest of its levels.
+pub(super) fn is_billboard(name: &str) -> bool {
+    words(name).iter().any(|word| ["billboard", "billboards", "impostor", "imposter"].contains(&word.as_str()))
+}
+
 /// Whether a name is that of a collision hull, as game engines write it: `UCX_oak`, `oak-col`, `Collider`.
 pub(super) fn is_hull(name: &str) -> bool {
     let words = words(name);
@@ -148,8 +153,10 @@ pub(super) fn keep_tree(
     }
     let finest = levels.iter().flatten().min().copied();
     let coarser = |placement: &Placement| {
-        names(root, placement).find_map(level).zip(finest).is_some_and(|(level, finest)| level > finest)
+        let numbered = names(root, placement).find_map(level).zip(finest).is_some_and(|(level, finest)| level > finest);
+        numbered || names(root, placement).any(is_billboard)
     };
+    let count = count.min(kept.len());
     let coarse: Vec<String> = kept.iter().filter(|placement| coarser(placement)).map(|p| label(root, p)).collect();
     if !coarse.is_empty() && coarse.len() < count {
         kept.retain(|placement| !coarser(placement));
@@ -181,9 +188,7 @@ pub(super) fn is_ground((least, most): (Vec3, Vec3), (low, high): (Vec3, Vec3), 
     let size = most - least;
     let width = size.x.min(size.z);
     let height = high.y - low.y;
-    size.y <= FLAT * width.max(f32::MIN_POSITIVE)
-        && most.y <= low.y.max(least.y) + LOW * height
-        && width >= 0.2 * height
+    size.y <= FLAT * width.max(f32::MIN_POSITIVE) && most.y <= low.y + LOW * height && width >= 0.2 * height
 }
 
 #[cfg(test)]

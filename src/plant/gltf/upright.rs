@@ -9,6 +9,7 @@ use glam::Vec3;
 
 use super::error::{WarningKind, Warnings};
 use super::material::Surface;
+use super::nodes::Placement;
 use super::{GltfOptions, Placed, UpAxis};
 use crate::plant::{PartKind, PlantMesh};
 
@@ -68,6 +69,59 @@ fn seems_to_lie(placed: &[Placed], surfaces: &BTreeMap<Option<usize>, Surface>) 
     let along = leaves - end;
     // One end, not several branches around.
     spread < 0.3 * farthest && along.z > 3.0 * along.y.abs() && along.z > 3.0 * along.x.abs()
+}
+
+/// Warns of a file that seems to hold several trees side by side: branches of its nodes of about the same height that stand
+/// apart. They are drawn as one plant.
+pub(super) fn mention_several(
+    root: &gltf::json::Root,
+    placements: &[Placement],
+    placed: &[Placed],
+    warnings: &mut Warnings,
+) {
+    // The first level at which the nodes part.
+    let depth = (0..4).find(|depth| {
+        let mut nodes = placements.iter().map(|placement| placement.path.get(*depth));
+        let first = nodes.next().flatten();
+        first.is_some() && nodes.any(|node| node != first)
+    });
+    let Some(depth) = depth else { return };
+    let mut groups: BTreeMap<usize, (Vec3, Vec3)> = BTreeMap::new();
+    for placed in placed {
+        let node = placements.get(placed.placement).and_then(|placement| placement.path.get(depth));
+        if let Some((node, (low, high))) = node.zip(bounds(std::iter::once(placed))) {
+            let group = groups.entry(*node).or_insert((low, high));
+            *group = (group.0.min(low), group.1.max(high));
+        }
+    }
+    let tallest = groups.values().map(|(low, high)| high.y - low.y).fold(0.0, f32::max);
+    let foot = groups.values().map(|(low, _)| low.y).fold(f32::INFINITY, f32::min);
+    let trees: Vec<(usize, (Vec3, Vec3))> = groups
+        .into_iter()
+        .filter(|(_, (low, high))| high.y - low.y > 0.4 * tallest && low.y - foot < 0.1 * tallest)
+        .collect();
+    // Trees side by side stand farther apart than a third of their width.
+    let apart = |a: &(Vec3, Vec3), b: &(Vec3, Vec3)| {
+        let (middle, width) = (0.5 * (a.0 + a.1) - 0.5 * (b.0 + b.1), 0.5 * ((a.1 - a.0) + (b.1 - b.0)));
+        middle.x.abs() > 0.7 * width.x || middle.z.abs() > 0.7 * width.z
+    };
+    let all_apart = trees.iter().enumerate().all(|(at, (_, a))| trees.iter().skip(at + 1).all(|(_, b)| apart(a, b)));
+    if trees.len() < 2 || !all_apart {
+        return;
+    }
+    let names: Vec<String> = trees
+        .iter()
+        .map(|(node, _)| {
+            root.nodes.get(*node).and_then(|node| node.name.clone()).unwrap_or_else(|| format!("node {node}"))
+        })
+        .collect();
+    let message = format!(
+        "the file seems to hold {} trees side by side ({}); they are drawn as one plant: choose one with `node: [\"{}\"]`",
+        names.len(),
+        super::roles::shortened(&names),
+        names.first().map_or("", String::as_str)
+    );
+    warnings.push(WarningKind::Missing, "/nodes", message);
 }
 
 /// Turns a mesh with z up: what was up along z is up along y, to the east stays to the east.

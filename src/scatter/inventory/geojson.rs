@@ -44,6 +44,18 @@ pub(super) fn read(bytes: &[u8], name: &str) -> Result<(Table, PlaceColumns), Sc
             names.push(key.clone());
         }
     }
+    let kind = |feature: &Value| {
+        let geometry = feature.get("geometry")?;
+        geometry.get("type").and_then(Value::as_str).map(str::to_owned)
+    };
+    if features.iter().all(|feature| feature.get("geometry").and_then(position).is_none()) {
+        let kind = features.iter().find_map(kind).unwrap_or_else(|| "without geometry".to_owned());
+        let message = format!(
+            "none of its {} features is a point (the first: {kind}): export the trees as points",
+            features.len()
+        );
+        return Err(refused(1, message));
+    }
     let (mut rows, mut degrees) = (Vec::with_capacity(features.len()), true);
     for (feature, line) in features.iter().zip(1u64..) {
         let mut cells = vec![String::new(); names.len()];

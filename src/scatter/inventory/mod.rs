@@ -23,6 +23,7 @@ mod cells;
 mod geojson;
 mod names;
 mod place;
+mod select;
 mod sizes;
 mod species;
 mod text;
@@ -35,6 +36,7 @@ use super::{BadValue, ScatterError};
 use cells::{is_missing, length};
 use names::NoTree;
 use place::PlaceColumns;
+use select::Selection;
 use sizes::{SizeColumns, Sizes};
 use species::SpeciesColumns;
 use text::{Row, Table};
@@ -95,13 +97,17 @@ impl LengthUnit {
 
 /// What the file of an inventory may leave open.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct InventoryOptions {
+pub struct InventoryOptions<'a> {
     /// Unit of a dbh column whose name and cells have no unit; `None`: it is guessed from the values (mostly centimetres).
     pub dbh_unit: Option<LengthUnit>,
     /// Unit of a height column whose name and cells have no unit; `None`: it is guessed from the values (mostly metres).
     pub height_unit: Option<LengthUnit>,
     /// The kind of positions to use where a table has both; `None`: the first kind in the order of the page above.
     pub positions: Option<Coordinates>,
+    /// The year of a repeated survey; `None`: the last one. Of years without rows the one before.
+    pub year: Option<i32>,
+    /// The variant or scenario of a table that has several; `None`: the first one.
+    pub variant: Option<&'a str>,
     /// Refuses a file with any row that cannot be used, instead of leaving it out with a note.
     pub strict: bool,
 }
@@ -208,11 +214,14 @@ impl Bad {
 struct Reading<'a> {
     table: Table,
     name: &'a str,
-    options: InventoryOptions,
+    options: InventoryOptions<'a>,
     place: PlaceColumns,
+    selection: Selection,
     sizes: Sizes,
     species: SpeciesColumns,
     status: Vec<usize>,
+    /// Those whose cells are letters: A for a living tree, D for a dead one.
+    coded: Vec<usize>,
     notes: Vec<String>,
     /// All cells that cannot be used.
     bad: Bad,
@@ -233,18 +242,20 @@ impl<'a> Reading<'a> {
         table: Table,
         stated: Option<PlaceColumns>,
         name: &'a str,
-        options: InventoryOptions,
+        options: InventoryOptions<'a>,
     ) -> Result<Self, ScatterError> {
         let place = match stated {
             Some(place) => place,
             None => place::find(&table.header, &table.rows, table.decimal_comma, options.positions, name)?,
         };
         let species = SpeciesColumns::find(&table, name)?;
+        let selection = Selection::find(&table, &place, options);
         let is_status = |index: &usize| {
             let meaning = table.header.get(*index).and_then(names::meaning);
             meaning.is_some_and(|meaning| meaning.quantity == names::Quantity::Status)
         };
-        let status = (0..table.header.len()).filter(is_status).collect();
+        let status: Vec<usize> = (0..table.header.len()).filter(is_status).collect();
+        let coded = status.iter().copied().filter(|column| has_letter_codes(&table, *column)).collect();
         let in_usa = is_in_usa(&table, &place);
         let sizes = sizes::find(&table, options, in_usa, name)?;
         Ok(Self {
@@ -252,9 +263,11 @@ impl<'a> Reading<'a> {
             name,
             options,
             place,
+            selection,
             sizes,
             species,
             status,
+            coded,
             notes: Vec::new(),
             bad: Bad::default(),
             places: Bad::default(),
@@ -268,7 +281,8 @@ impl<'a> Reading<'a> {
     }
 
     fn finish(mut self) -> Result<Inventory, ScatterError> {
-        let rows = std::mem::take(&mut self.table.rows);
+        let mut rows = std::mem::take(&mut self.table.rows);
+        rows.retain(|row| self.selection.keeps(&row.cells));
         let mut trees = Vec::with_capacity(rows.len());
         for row in &rows {
             if let Some(kind) = self.not_a_tree(&row.cells) {
@@ -283,6 +297,7 @@ impl<'a> Reading<'a> {
         let columns = self.columns();
         self.say_what_was_left_out(&columns);
         let mut notes = std::mem::take(&mut self.table.notes);
+        notes.append(&mut self.selection.notes);
         notes.append(&mut self.sizes.notes);
         notes.append(&mut self.species.notes);
         notes.append(&mut self.notes);
@@ -318,6 +333,9 @@ impl<'a> Reading<'a> {
             if let Some(kind) = names::no_tree(cell).or_else(|| names::flagged(name, cell)) {
                 return Some(kind);
             }
+            if self.coded.contains(column) && cell.eq_ignore_ascii_case("d") {
+                return Some(NoTree::Dead);
+            }
         }
         self.species.cells(cells).find_map(names::no_tree)
     }
@@ -348,7 +366,7 @@ impl<'a> Reading<'a> {
                 }
                 None => {
                     *unreadable = true;
-                    self.no_place(row.line, column, cell, "is not a number");
+                    self.no_place(row.line, column, cell, not_a_number(cell));
                 }
                 Some(number) => match self.place.limit(axis) {
                     Some((largest, reason)) if !(0.0..=largest).contains(&number.abs()) => {
@@ -473,6 +491,9 @@ impl<'a> Reading<'a> {
             if let Some(place) = self.place.meaning(index) {
                 return Some(place.to_owned());
             }
+            if let Some(choice) = self.selection.meaning(index) {
+                return Some(choice.to_owned());
+            }
             if let Some(species) = self.species.meaning(index) {
                 return Some(species.to_owned());
             }
@@ -554,6 +575,30 @@ impl<'a> Reading<'a> {
             text.push_str("; none holds the species, so all trees are of one (name such a column species)");
         }
         Some(text)
+    }
+}
+
+/// Whether the cells of a column are letters with A (alive) or L (living) and D (dead) among them, as in forest plots.
+fn has_letter_codes(table: &Table, column: usize) -> bool {
+    let (mut alive, mut dead) = (false, false);
+    for cell in table.rows.iter().filter_map(|row| row.cells.get(column)).filter(|cell| !is_missing(cell)) {
+        if cell.len() > 2 {
+            return false;
+        }
+        alive |= cell.eq_ignore_ascii_case("a") || cell.eq_ignore_ascii_case("l");
+        dead |= cell.eq_ignore_ascii_case("d");
+    }
+    alive && dead
+}
+
+/// What is wrong with a cell that is no number.
+fn not_a_number(cell: &str) -> &'static str {
+    let digits = |text: &str| text.bytes().filter(u8::is_ascii_digit).count() * 2 > text.len();
+    let several = cell.matches(['.', ',', '\'', ' ', '\u{a0}', '\u{202f}']).count() > 1;
+    if digits(cell) && several && !cell.contains(char::is_alphabetic) {
+        "is not a number: write it without separators of thousands"
+    } else {
+        "is not a number"
     }
 }
 

@@ -260,14 +260,20 @@ fn are_degrees(rows: &[Row], x: usize, y: usize, decimal_comma: bool) -> bool {
 fn one_cell(header: &StringRecord, rows: &[Row], column: usize) -> Option<PlaceColumns> {
     let name = header.get(column)?;
     let cells = || rows.iter().filter_map(|row| row.cells.get(column)).filter(|cell| !cell.is_empty()).take(LOOKED_AT);
-    let (mut read, mut all, mut degrees) = (0usize, 0usize, true);
+    let (mut read, mut all, mut degrees, mut fine) = (0usize, 0usize, true, 0usize);
     for cell in cells() {
         all += 1;
         if let Some((x, y)) = both(cell, names::may_be_place(name)) {
             read += 1;
             degrees &= x.abs() <= 360.0 && y.abs() <= 90.0;
+            // Degrees have many decimals, metres of a plot few; a pair without a form of its own is latitude and longitude.
+            let decimals = cell
+                .split(|c: char| !(c.is_ascii_digit() || c == '.'))
+                .any(|number| number.split_once('.').is_some_and(|(_, part)| part.len() >= 3));
+            fine += usize::from(decimals || !cell.to_ascii_uppercase().contains("POINT"));
         }
     }
+    let degrees = degrees && (2 * fine >= read || all < 3);
     let coordinates = if degrees { Coordinates::Geographic } else { Coordinates::Planar };
     (read > 0 && read * 10 >= all * 9).then_some(PlaceColumns::One { column, coordinates })
 }

@@ -60,8 +60,17 @@ pub(super) fn read(source: &Source) -> Result<Raster, TerrainError> {
     let keys = GeoKeys::read(source, &mut decoder)?;
     let (grid, south_up) = read_grid(source, &mut decoder, columns, rows, keys.point)?;
     let window = source.window(&grid)?;
-    let missing = read_missing(&mut decoder);
-    let metadata = read_text(&mut decoder, GDAL_METADATA).map(|text| BandMetadata::parse(&text)).unwrap_or_default();
+    let beside = side_files::auxiliary(source);
+    let missing = read_missing(&mut decoder).or(beside.missing);
+    let mut metadata =
+        read_text(&mut decoder, GDAL_METADATA).map(|text| BandMetadata::parse(&text)).unwrap_or_default();
+    if metadata == BandMetadata::default() {
+        metadata = BandMetadata {
+            scale: beside.scale.unwrap_or(1.0),
+            offset: beside.offset.unwrap_or(0.0),
+            unit: beside.unit,
+        };
+    }
     // Rows are stored from the north or, rarely, from the south.
     let stored = if south_up { Window { row: rows - window.row - window.rows, ..window } } else { window };
     let band = |band: usize| Plane { columns, rows, window: stored, bands: bands.stored(band) };

@@ -52,8 +52,45 @@ pub(super) fn is_straight([width, a, b, height]: [f64; 4]) -> bool {
 
 /// The coordinate system that a `.prj` file states, if it is understood.
 pub(super) fn system(source: &Source) -> Option<CoordinateSystem> {
-    let (_, text) = text(source, &["prj", "PRJ"])?;
-    of_wkt(&text)
+    let stated = text(source, &["prj", "PRJ"]).and_then(|(_, text)| of_wkt(&text));
+    stated.or_else(|| auxiliary(source).system)
+}
+
+/// What GDAL keeps of the first band in a file `.aux.xml` beside the raster.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Auxiliary {
+    pub scale: Option<f64>,
+    pub offset: Option<f64>,
+    pub unit: Option<String>,
+    pub missing: Option<f64>,
+    pub system: Option<CoordinateSystem>,
+}
+
+/// The auxiliary file of a raster.
+pub(super) fn auxiliary(source: &Source) -> Auxiliary {
+    text(source, &["aux.xml"]).map(|(_, text)| Auxiliary::parse(&text)).unwrap_or_default()
+}
+
+impl Auxiliary {
+    fn parse(text: &str) -> Self {
+        let element = |within: &str, name: &str| -> Option<String> {
+            let start = within.find(&format!("<{name}"))?;
+            let (_, rest) = within.get(start..)?.split_once('>')?;
+            let value = rest.split(&format!("</{name}")).next()?.trim();
+            let value = value.replace("&quot;", "\"").replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&");
+            (!value.is_empty()).then_some(value)
+        };
+        let band = text.find("<PAMRasterBand").and_then(|at| text.get(at..)).unwrap_or("");
+        let band = band.split("</PAMRasterBand").next().unwrap_or("");
+        let number = |name: &str| element(band, name)?.parse::<f64>().ok();
+        Self {
+            scale: number("Scale").filter(|scale| scale.is_finite() && *scale != 0.0),
+            offset: number("Offset").filter(|offset| offset.is_finite()),
+            unit: element(band, "UnitType"),
+            missing: number("NoDataValue"),
+            system: element(text, "SRS").and_then(|wkt| of_wkt(&wkt)),
+        }
+    }
 }
 
 /// The system of a text in WKT or in the words of PROJ.4.
@@ -137,6 +174,22 @@ mod tests {
             Some(true)
         );
         assert_eq!(of_wkt("nothing"), None);
+    }
+
+    #[test]
+    fn auxiliary_files_of_gdal_are_read() {
+        let text = "<PAMDataset>\n<SRS dataAxisToSRSAxisMapping=\"1,2\">PROJCS[&quot;x&quot;,AUTHORITY[&quot;EPSG&quot;,\
+                    &quot;25832&quot;]]</SRS><PAMRasterBand band=\"1\"><NoDataValue le_hex_endian=\"0\">-9.99900000000000E+03\
+                    </NoDataValue><UnitType>ft</UnitType><Offset>5</Offset><Scale>0.5</Scale></PAMRasterBand></PAMDataset>";
+        let expected = Auxiliary {
+            scale: Some(0.5),
+            offset: Some(5.0),
+            unit: Some("ft".to_owned()),
+            missing: Some(-9999.0),
+            system: Some(CoordinateSystem::Utm { zone: 32, south: false }),
+        };
+        assert_eq!(Auxiliary::parse(text), expected);
+        assert_eq!(Auxiliary::parse("<PAMDataset><PAMRasterBand"), Auxiliary::default());
     }
 
     #[test]
