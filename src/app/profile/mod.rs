@@ -333,7 +333,10 @@ impl<'a> Work<'a> {
                 let settings = ComparisonSettings { half: half.as_ref(), ..ComparisonSettings::default() };
                 let compared = compare(&truth, &test, &settings).map_err(failed)?;
                 if self.is_shown(number) {
-                    save_map(&compared.map, truth.size(), &folder.join(format!("{}-error.png", view.name)))?;
+                    let map =
+                        self.options.out.join("errors").join(format!("{index:03}")).join(format!("{}.png", view.name));
+                    save_map(&compared.map, truth.size(), &map)?;
+                    record.map = Some(relative(&map, &self.options.out));
                 }
                 record.error = Some(compared.comparison);
                 if let Some((earlier, earlier_truth)) = before.as_ref().filter(|_| self.options.views.is_flight()) {
@@ -427,9 +430,10 @@ fn write(path: &Path, bytes: &[u8]) -> Result<(), AppError> {
         .map_err(|source| AppError::Write { path: path.to_owned(), source })
 }
 
-/// `file` as it is named from `folder`, if it lies in it.
+/// `file` as it is named from `folder`; one that does not lie in it by its whole path.
 fn relative(file: &Path, folder: &Path) -> String {
-    file.strip_prefix(folder).unwrap_or(file).display().to_string()
+    let elsewhere = || std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
+    file.strip_prefix(folder).map_or_else(|_| elsewhere(), Path::to_owned).display().to_string()
 }
 
 fn step(views: &[ProfileView]) -> Option<f64> {

@@ -47,8 +47,8 @@ pub fn page(report: &ProfileReport, folder: &Path, count: usize) -> Result<Strin
         views.iter().map(|view| report.views[*view].reference.as_deref().and_then(&image)).collect();
     let pictures = |point: &super::PointRecord, error: bool| -> Vec<Option<String>> {
         let name = |view: &usize| {
-            let file = &point.pictures.get(*view)?.file;
-            image(&if error { file.replace(".png", "-error.png") } else { file.clone() })
+            let picture = point.pictures.get(*view)?;
+            if error { image(picture.map.as_deref()?) } else { image(&picture.file) }
         };
         views.iter().map(name).collect()
     };

@@ -150,6 +150,8 @@ pub struct FrameTime {
 pub struct PictureRecord {
     /// The image, relative to the report.
     pub file: String,
+    /// The map of its errors, for the views that the page shows.
+    pub map: Option<String>,
     /// Trees and triangles by level of detail, from near to far.
     pub levels: Vec<LevelCount>,
     /// Tiles of the ground.

@@ -107,7 +107,7 @@ pub fn tune(options: &TuneOptions, progress: &mut dyn Progress) -> Result<Tuned,
         if best == 0 {
             let reached = reaches(now, options.goal);
             if !reached {
-                return Err(ProfileError::NoAnswer(no_answer(options.goal, now)).into());
+                return Err(ProfileError::NoAnswer(no_answer(options.goal, now, &candidates)).into());
             }
             let tuned = Tuned { scene: centre, time: now.time, error: now.error, steps, file };
             let text = tuned.block(options, &report);
@@ -123,14 +123,23 @@ pub fn tune(options: &TuneOptions, progress: &mut dyn Progress) -> Result<Tuned,
         .into())
 }
 
-fn no_answer(goal: Goal, now: Measured) -> String {
+fn no_answer(goal: Goal, now: Measured, candidates: &[(usize, Measured)]) -> String {
+    // Neighbours that seem faster, with an interval that says nothing.
+    let unsure =
+        candidates.iter().filter(|(_, one)| one.ratio.is_some_and(|(value, _, high)| value < 1.0 && high >= 1.0));
+    let unsure = match (goal, unsure.count()) {
+        (Goal::Budget(_), count @ 1..) => {
+            format!("; {count} neighbours may be faster, but their times spread too much to say so: give more --rounds")
+        }
+        _ => String::new(),
+    };
     match goal {
         Goal::Budget(budget) => format!(
-            "no settings draw 95 of 100 frames within {budget} ms here; the fastest that were found take {:.2} ms",
+            "no settings were found that draw 95 of 100 frames within {budget} ms here; the last ones take {:.2} ms{unsure}",
             now.time
         ),
         Goal::Error(error) => {
-            format!("no settings have a mean FLIP of at most {error}; the least that was found is {:.4}", now.error)
+            format!("no settings were found with a mean FLIP of at most {error}; the last ones have {:.4}", now.error)
         }
     }
 }
