@@ -17,23 +17,22 @@ struct Layer {
 
 @group(1) @binding(1) var depths: texture_depth_2d;
 @group(1) @binding(2) var identities: texture_2d<u32>;
-// Light, pigment of the shadow, depth, length of the normal: as seen, under the Gaussian, and under a wide one.
-@group(1) @binding(3) var lights: texture_2d<f32>;
-@group(1) @binding(4) var soft_lights: texture_2d<f32>;
-@group(1) @binding(5) var wide_lights: texture_2d<f32>;
-@group(1) @binding(6) var soft_normals: texture_2d<f32>;
+// Light, pigment of the shadow, depth, length of the normal: under the Gaussian, and under a wide one.
+@group(1) @binding(3) var soft_lights: texture_2d<f32>;
+@group(1) @binding(4) var wide_lights: texture_2d<f32>;
+@group(1) @binding(5) var soft_normals: texture_2d<f32>;
 // Intensities of the layers, four a slice.
-@group(1) @binding(7) var shapes: texture_2d_array<f32>;
+@group(1) @binding(6) var shapes: texture_2d_array<f32>;
 // Colours by light; a row a layer, then one each for the shadow and the dabs.
-@group(1) @binding(8) var ramps: texture_2d<f32>;
-@group(1) @binding(9) var papers: texture_2d<f32>;
-@group(1) @binding(10) var<storage, read> layers: array<Layer>;
-@group(1) @binding(11) var linear_sampler: sampler;
-@group(1) @binding(12) var paper_sampler: sampler;
+@group(1) @binding(7) var ramps: texture_2d<f32>;
+@group(1) @binding(8) var papers: texture_2d<f32>;
+@group(1) @binding(9) var<storage, read> layers: array<Layer>;
+@group(1) @binding(10) var linear_sampler: sampler;
+@group(1) @binding(11) var paper_sampler: sampler;
 // Intensities of the particles: dark, medium, bright.
-@group(1) @binding(13) var soft_dabs: texture_2d<f32>;
+@group(1) @binding(12) var soft_dabs: texture_2d<f32>;
 // Albedo, and how much of a pixel has one.
-@group(1) @binding(14) var soft_colors: texture_2d<f32>;
+@group(1) @binding(13) var soft_colors: texture_2d<f32>;
 
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> FullScreen {
@@ -129,7 +128,6 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
 
     var color = style.paper * (1.0 + 0.10 * relief);
     var foliage = 0.0;
-    var painted = 0.0;
     for (var k = 0; k < i32(arrayLength(&layers)); k += 1) {
         let layer = layers[k];
         let slice = textureSampleLevel(shapes, linear_sampler, uv, k / 4, 0.0);
@@ -148,7 +146,6 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
         let thickness = (1.0 - 0.4 * air) * (1.0 + layer.foliage * 0.35 * tree) * (1.0 - 0.5 * kept * layer.foliage) * (1.0 - 0.8 * clear);
         color = glaze(color, transmittance, (wash.density + rim) * thickness, wash.coverage * paint.a);
         foliage += layer.foliage * wash.coverage;
-        painted += wash.coverage;
     }
     foliage = saturate(foliage);
 
@@ -166,6 +163,8 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
         let own = min(hue * dot(paint.rgb, LUMINANCE), vec3(1.0));
         color = glaze(color, mix(paint.rgb, own, 0.7 * style.scene), 0.8 * wash.density + 0.4 * style.edges * drawn, wash.coverage * glazed * paint.a * (1.0 - 0.6 * kept));
     }
+    let bright = ramp(row + 2, form);
+    color = glaze(color, bright.rgb, 1.0, kept * glazed * bright.a);
 
     // The layer of shadows.
     let shade = soft.y + 0.10 * middle + 0.16 * (height - 0.5);

@@ -44,7 +44,7 @@ impl ParticleSettings {
     /// fair sample: a tree that is drawn with fewer drops the last ones. None without vertices.
     pub fn particles(&self, vertices: &[Vec3], normals: &[Vec3], height: f32, seed: u64) -> Vec<Particle> {
         let vertex_count = vertices.len().min(normals.len());
-        if vertex_count == 0 || !(height > 0.0) {
+        if vertex_count == 0 || height.is_nan() || height <= 0.0 {
             return Vec::new();
         }
         let reach = self.spread * height.sqrt();

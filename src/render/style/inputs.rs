@@ -238,6 +238,6 @@ mod tests {
             assert_eq!(rows.len(), layers.max(1) as usize + 4);
             assert!(rows.iter().all(|row| row.len() == RAMP_STEPS && row.iter().all(|color| color.is_finite())));
         }
-        assert!(MOST_BLURS >= 2 * (5 + 256 / 4));
+        const { assert!(MOST_BLURS >= 2 * (5 + 256 / 4)) };
     }
 }

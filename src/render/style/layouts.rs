@@ -94,7 +94,6 @@ pub fn picture_layout(picture: Picture) -> BindGroupLayoutDescriptor {
                 map(),
                 map(),
                 map(),
-                map(),
                 texture_2d_array(TextureSampleType::Float { filterable: true }),
                 map(),
                 map(),

@@ -48,7 +48,6 @@ pub fn picture_pass(
                 inputs.uniform.as_entire_binding(),
                 &maps.depth,
                 &maps.identities,
-                &maps.lights,
                 &maps.soft_lights,
                 &maps.wide_lights,
                 &maps.soft_normals,
