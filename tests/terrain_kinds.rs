@@ -5,6 +5,7 @@ use std::path::Path;
 
 use canopy::terrain::{
     CoordinateSystem, GeoReference, ReadOptions, Terrain, TerrainError, Warning, read_terrain, read_terrain_bytes,
+    read_terrain_tiles,
 };
 use glam::DVec2;
 
@@ -348,7 +349,7 @@ fn zstandard_is_read_and_others_are_named() {
     let packed = |data: Vec<u8>| compress_to_vec(&data[..], CompressionLevel::Fastest);
     let plain = read(&tiff(&[float_raster()])).expect("a terrain").0;
     let image = raster(32, 3, packed(floats(ground))).set(259, Short(vec![50_000]));
-    let (terrain, warnings) = read(&tiff(&[image.clone()])).expect("a terrain");
+    let (terrain, warnings) = read(&tiff(std::slice::from_ref(&image))).expect("a terrain");
     assert_eq!((terrain.field().heights(), warnings), (plain.field().heights(), Vec::new()));
     // Several strips, with differences between neighbours.
     let mut strips =
@@ -422,6 +423,68 @@ fn files_beside_a_raster_say_where_it_lies() {
     let (terrain, warnings) = read_terrain(&path, &ReadOptions::default()).expect("a terrain");
     assert_eq!(warnings, []);
     assert_eq!(terrain.reference().map(GeoReference::system), Some(CoordinateSystem::Utm { zone: 33, south: false }));
+}
+
+#[test]
+fn tiles_of_one_raster_are_one_terrain() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let write = |name: &str, bytes: &[u8]| {
+        let path = folder.path().join(name);
+        fs::write(&path, bytes).expect("a temporary file");
+        path
+    };
+    // Heights are the easting of a cell's middle minus 500,000 plus a tenth of the northing below 5,400,000.
+    let tile = |east: f64, south: f64| {
+        let value = move |at: usize| {
+            let (column, row) = (at % COLUMNS, at / COLUMNS);
+            (east + 10.0 * column as f64 + 5.0 + 0.1 * (south + 10.0 * row as f64 + 5.0)) as f32
+        };
+        raster(32, 3, floats(value)).set(33922, Double(vec![0.0, 0.0, 0.0, 500_000.0 + east, 5_400_000.0 - south, 0.0]))
+    };
+    let (wide, high) = (10.0 * COLUMNS as f64, 10.0 * ROWS as f64);
+    let paths = [("a.tif", 0.0, 0.0), ("b.tif", wide, 0.0), ("c.tif", 0.0, high), ("d.tif", wide, high)]
+        .map(|(name, east, south)| write(name, &tiff(&[tile(east, south)])));
+    let check = |terrain: &Terrain| {
+        let field = terrain.field();
+        assert_eq!((field.columns(), field.rows()), (2 * COLUMNS, 2 * ROWS));
+        for (column, row) in [(0, 0), (COLUMNS + 3, 2), (5, ROWS + 4), (2 * COLUMNS - 1, 2 * ROWS - 1)] {
+            let expected = 10.0 * column as f32 + 5.0 + 0.1 * (10.0 * row as f32 + 5.0);
+            assert!((field.heights()[row * field.columns() + column] - expected).abs() < 1e-3);
+        }
+    };
+    let (terrain, warnings) = read_terrain_tiles(&paths, &ReadOptions::default()).expect("a terrain");
+    assert_eq!(warnings, []);
+    check(&terrain);
+    let sources: String = ["a", "b", "c", "d"]
+        .iter()
+        .map(|name| {
+            format!("<SimpleSource><SourceFilename relativeToVRT=\"1\">{name}.tif</SourceFilename></SimpleSource>")
+        })
+        .collect();
+    let vrt = format!(
+        "<VRTDataset rasterXSize=\"32\"><VRTRasterBand dataType=\"Float32\" band=\"1\">{sources}</VRTRasterBand></VRTDataset>"
+    );
+    let path = write("all.vrt", vrt.as_bytes());
+    check(&read_terrain(&path, &ReadOptions::default()).expect("a terrain").0);
+    // A crop reads what it needs; a gap is filled.
+    let crop = canopy::terrain::Crop { west: 500_100.0, south: 5_399_990.0, east: 500_250.0, north: 5_400_000.0 };
+    let options = ReadOptions { crop: Some(crop), ..ReadOptions::default() };
+    let (terrain, _) = read_terrain(&path, &options).expect("a terrain");
+    assert!(terrain.field().columns() >= 14, "{}", terrain.field().columns());
+    let (_, warnings) = read_terrain_tiles(&paths[..3], &ReadOptions::default()).expect("a terrain");
+    assert_eq!(warnings, [Warning::HolesFilled { filled: COLUMNS * ROWS, total: 4 * COLUMNS * ROWS }]);
+
+    let odd = write("odd.tif", &tiff(&[tile(wide + 4.0, 0.0)]));
+    let other = write("other.tif", &tiff(&[tile(wide, 0.0).set(34735, keys(&[[1024, 0, 1, 1], [3072, 0, 1, 32632]]))]));
+    for (path, words) in [(odd, "one grid"), (other, "coordinate system")] {
+        let error =
+            read_terrain_tiles(&[paths[0].clone(), path], &ReadOptions::default()).expect_err("not one").to_string();
+        assert!(error.contains(words) && error.contains("gdalwarp"), "{error}");
+    }
+    assert!(read_terrain_tiles(&[], &ReadOptions::default()).is_err());
+    for text in ["<VRTDataset></VRTDataset>", "<VRTDataset subClass=\"VRTWarpedDataset\">", "<VRTDataset"] {
+        assert!(read_terrain(&write("bad.vrt", text.as_bytes()), &ReadOptions::default()).is_err(), "{text}");
+    }
 }
 
 #[test]

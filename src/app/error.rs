@@ -125,7 +125,7 @@ pub enum AppError {
     },
     /// A file of unknown kind.
     #[error(
-        "{}: this is not a plant (.glb, .gltf), terrain (.tif, .asc, .hgt, .png), inventory (.csv, .tsv, .geojson, .json) or \
+        "{}: this is not a plant (.glb, .gltf), terrain (.tif, .asc, .hgt, .vrt, .png), inventory (.csv, .tsv, .geojson, .json) or \
          scene (.ron) file",
         path.display()
     )]

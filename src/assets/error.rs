@@ -79,9 +79,9 @@ pub enum StageError {
         /// Size of the terrain from west to east and from north to south, metres.
         terrain: [f64; 2],
         /// Both extents in the coordinates of their files, where these are of one kind.
-        covers: Option<String>,
+        covers: Option<Box<str>>,
         /// Anchors with which the trees would stand on the terrain.
-        fits: Vec<Anchor>,
+        fits: Box<[Anchor]>,
     },
     /// Too many plants for one forest.
     #[error(

@@ -1,6 +1,6 @@
 //! The ground of a scene: from a file, an image, noise, or flat.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::DVec2;
 
@@ -8,7 +8,9 @@ use super::StageError;
 use crate::{
     progress::Progress,
     scene,
-    terrain::{HeightField, NoiseKind, NoiseTerrain, ReadOptions, Surroundings, Terrain, read_terrain},
+    terrain::{
+        HeightField, NoiseKind, NoiseTerrain, ReadOptions, Surroundings, Terrain, read_terrain, read_terrain_tiles,
+    },
 };
 
 /// Builds the ground of a scene; decisions of the readers become warnings.
@@ -32,7 +34,16 @@ pub fn build_terrain(ground: &scene::Ground, progress: &mut dyn Progress) -> Res
                 surroundings: file.surroundings,
                 ..ReadOptions::default()
             };
-            let terrain = read(&file.path, options, progress)?;
+            let terrain = if file.tiles.is_empty() {
+                read(&file.path, options, progress)?
+            } else {
+                let paths: Vec<PathBuf> = std::iter::once(&file.path).chain(&file.tiles).cloned().collect();
+                let (terrain, warnings) = read_terrain_tiles(&paths, &options)?;
+                for warning in warnings {
+                    progress.warn(&format!("{} and {} tiles: {warning}", file.path.display(), file.tiles.len()));
+                }
+                terrain
+            };
             exaggerated(terrain, file.exaggeration)?
         }
         scene::Ground::Image(image) => {

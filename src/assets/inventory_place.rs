@@ -168,7 +168,7 @@ impl Placement {
                 .reference()
                 .and_then(|reference| {
                     let (latitude, longitude) = from.to_earth(DVec2::new(x, y))?;
-                    let file = to.from_earth(longitude, latitude)?;
+                    let file = to.coordinates_of(longitude, latitude)?;
                     Some(reference.to_local(file.x, file.y))
                 })
                 .map_or(DVec3::NAN, on_ground),

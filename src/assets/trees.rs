@@ -69,7 +69,7 @@ pub enum WoodBeyond {
 enum Source<'a> {
     None,
     Rules(&'a ScatteredTrees),
-    Inventory(&'a InventoryTrees, Inventory, Placement),
+    Inventory(&'a InventoryTrees, Inventory, Box<Placement>),
 }
 
 impl<'a> StandPlan<'a> {
@@ -85,7 +85,7 @@ impl<'a> StandPlan<'a> {
             Trees::Inventory(trees) => {
                 let (inventory, placement) = read_and_place(scene, trees, terrain)?;
                 let count = count_inside(scene, trees, &inventory, &placement, terrain)? as f64;
-                (Source::Inventory(trees, inventory, placement), count)
+                (Source::Inventory(trees, inventory, Box::new(placement)), count)
             }
         };
         let surroundings = match &source {
@@ -150,7 +150,7 @@ impl<'a> StandPlan<'a> {
             Source::None => Ok(Stand::default()),
             Source::Rules(rules) => scatter(self.scene, rules, plan, sizes, self.terrain, self.surroundings, progress),
             Source::Inventory(trees, inventory, placement) => {
-                from_inventory(self.scene, (trees, inventory, placement), plan, sizes, self.terrain, progress)
+                from_inventory(self.scene, (trees, inventory, placement.as_ref()), plan, sizes, self.terrain, progress)
             }
         }
     }
@@ -188,8 +188,8 @@ fn count_inside(
             east: (west, east),
             north: (south, north),
             terrain: terrain.extent().to_array(),
-            covers: inventory_place::file_extents(placement, inventory, terrain),
-            fits: inventory_place::fitting_anchors(scene, trees, inventory, terrain),
+            covers: inventory_place::file_extents(placement, inventory, terrain).map(String::into_boxed_str),
+            fits: inventory_place::fitting_anchors(scene, trees, inventory, terrain).into_boxed_slice(),
         });
     }
     Ok(count)

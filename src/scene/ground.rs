@@ -26,6 +26,10 @@ pub enum Ground {
 pub struct GroundFile {
     /// The file, relative to the scene file. Required.
     pub path: PathBuf,
+    /// Further files of the same raster, which lie on its grid: `path` and these are one terrain. Default: none. A virtual raster
+    /// (`.vrt`) names its tiles itself.
+    #[serde(default)]
+    pub tiles: Vec<PathBuf>,
     /// The part to use, `(west: ..., south: ..., east: ..., north: ...)` in the file's own coordinates: degrees for
     /// geographic files, metres (or feet) for projected ones. Default: all of it.
     #[serde(default)]
@@ -122,6 +126,7 @@ impl GroundFile {
     pub fn new(path: impl Into<PathBuf>) -> Self {
         Self {
             path: path.into(),
+            tiles: Vec::new(),
             crop: None,
             coordinates: None,
             surroundings: Surroundings::default(),
@@ -230,7 +235,10 @@ impl Ground {
 
     pub(super) fn resolve(&mut self, folder: &Path) {
         match self {
-            Self::File(file) => file.path = folder.join(&file.path),
+            Self::File(file) => {
+                file.path = folder.join(&file.path);
+                file.tiles.iter_mut().for_each(|tile| *tile = folder.join(&tile));
+            }
             Self::Image(image) => image.path = folder.join(&image.path),
             Self::Noise(_) | Self::Flat(_) => {}
         }
@@ -240,6 +248,9 @@ impl Ground {
 impl GroundFile {
     fn check(&self, check: &mut Check) {
         check.path("terrain.path", &self.path);
+        for (number, tile) in self.tiles.iter().enumerate() {
+            check.path(&format!("terrain.tiles[{number}]"), tile);
+        }
         check.number("terrain.exaggeration", self.exaggeration, 0.01..=100.0, "");
         match self.coordinates {
             Some(CoordinateSystem::Utm { zone, .. }) => {

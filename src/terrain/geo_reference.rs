@@ -232,7 +232,7 @@ impl GeoReference {
     /// Local metres (x: east, y: south) of a place on earth, in degrees of WGS84; `None` where the coordinate system does not
     /// say where it lies, or the place is far outside it. Longitudes may be given in either convention (-84 or 276).
     pub fn local_of(&self, longitude: f64, latitude: f64) -> Option<DVec2> {
-        let file = SystemMap::new(self.system)?.from_earth(longitude, latitude)?;
+        let file = SystemMap::new(self.system)?.coordinates_of(longitude, latitude)?;
         Some(self.to_local(file.x, file.y))
     }
 
@@ -258,7 +258,7 @@ impl GeoReference {
 /// A coordinate system between its coordinates and places on earth.
 pub struct SystemMap {
     system: CoordinateSystem,
-    projection: Option<Projection>,
+    projection: Option<Box<Projection>>,
 }
 
 impl std::fmt::Debug for SystemMap {
@@ -271,7 +271,7 @@ impl SystemMap {
     /// The map of a system; `None` if it does not say where on earth it lies.
     pub fn new(system: CoordinateSystem) -> Option<Self> {
         let projection = match system {
-            CoordinateSystem::Projected { epsg, .. } => Some(Projection::from_epsg(epsg?)?),
+            CoordinateSystem::Projected { epsg, .. } => Some(Box::new(Projection::from_epsg(epsg?)?)),
             CoordinateSystem::Local => return None,
             _ => None,
         };
@@ -295,7 +295,7 @@ impl SystemMap {
 
     /// Coordinates (x east, y north, in the system's unit) of a place in degrees of WGS84; `None` for places far outside the
     /// system. Longitudes may be given in either convention (-84 or 276).
-    pub fn from_earth(&self, longitude: f64, latitude: f64) -> Option<DVec2> {
+    pub fn coordinates_of(&self, longitude: f64, latitude: f64) -> Option<DVec2> {
         if !(longitude.is_finite() && latitude.abs() <= 90.0) {
             return None;
         }
@@ -306,7 +306,7 @@ impl SystemMap {
             }
             CoordinateSystem::Utm { zone, south } => geographic_to_utm(longitude, latitude, zone, south)?,
             CoordinateSystem::Projected { metres_per_unit, .. } => {
-                self.projection.as_ref()?.from_earth(wrapped(longitude), latitude, metres_per_unit)?
+                self.projection.as_ref()?.coordinates_of(wrapped(longitude), latitude, metres_per_unit)?
             }
             CoordinateSystem::Local => return None,
         };

@@ -29,5 +29,5 @@ pub use extended_grid::Surroundings;
 pub use geo_reference::{CoordinateSystem, GeoReference, SystemMap};
 pub use height_field::{HeightField, MAX_HEIGHT, MAX_SAMPLES};
 pub use noise::{NoiseKind, NoiseTerrain};
-pub use read::{Crop, ImageScale, ReadOptions, read_terrain, read_terrain_bytes};
+pub use read::{Crop, ImageScale, ReadOptions, read_terrain, read_terrain_bytes, read_terrain_tiles};
 pub use surface::Terrain;

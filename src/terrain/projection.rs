@@ -200,7 +200,7 @@ impl Projection {
     }
 
     /// Coordinates in units of `metres_per_unit` metres of a place in degrees.
-    pub fn from_earth(&self, longitude: f64, latitude: f64, metres_per_unit: f64) -> Option<DVec2> {
+    pub fn coordinates_of(&self, longitude: f64, latitude: f64, metres_per_unit: f64) -> Option<DVec2> {
         let own = metres_per_unit / self.system.to_meter();
         let mut place = (longitude.to_radians(), latitude.to_radians(), 0.0);
         transform(&self.earth, &self.system, &mut place).ok()?;
@@ -252,7 +252,7 @@ mod tests {
             let point = DVec2::from(point);
             let (north, east) = projection.to_earth(point, metres_per_unit).expect("a place");
             assert!((north - latitude).abs() < 3e-3 && (east - longitude).abs() < 3e-3, "{code}: {north}, {east}");
-            let back = projection.from_earth(east, north, metres_per_unit).expect("coordinates");
+            let back = projection.coordinates_of(east, north, metres_per_unit).expect("coordinates");
             assert!((back - point).length() < 0.05, "{code}: {back}");
         }
     }

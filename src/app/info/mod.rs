@@ -14,7 +14,7 @@ use std::path::Path;
 use super::error::AppError;
 use page::Page;
 
-/// Describes the plant (.glb, .gltf), terrain (.tif, .tiff, .asc, .hgt, .png), inventory (.csv, .tsv, .geojson, .json), scene or species
+/// Describes the plant (.glb, .gltf), terrain (.tif, .tiff, .asc, .hgt, .vrt, .png), inventory (.csv, .tsv, .geojson, .json), scene or species
 /// (.ron) in `path`: some lines of text, each ended by a newline. A pipe holds a scene.
 ///
 /// # Errors
@@ -26,7 +26,7 @@ pub fn info(path: &Path) -> Result<String, AppError> {
     match ending.as_str() {
         "glb" | "gltf" => plant::describe_file(&mut page, path)?,
         "png" => terrain::describe_image(&mut page, path)?,
-        "tif" | "tiff" | "asc" | "hgt" => terrain::describe_file(&mut page, path)?,
+        "tif" | "tiff" | "asc" | "hgt" | "vrt" => terrain::describe_file(&mut page, path)?,
         "csv" | "tsv" | "geojson" | "json" => inventory::describe_file(&mut page, path)?,
         "ron" => scene::describe_file(&mut page, path)?,
         // A pipe, such as `/dev/stdin`, has no name that could say more; a scene can be read from it.

@@ -96,7 +96,7 @@ fn attributes(data: &[u8], count: usize, stride: usize) -> Option<Vec<u8>> {
     let tail = data.len().checked_sub(stride.max(32))?.max(1);
     let mut last = data.get(data.len() - stride..)?.to_vec();
     let mut reader = Reader { data: data.get(..tail)?, at: 1 };
-    let block = (BLOCK_BYTES / stride & !(GROUP - 1)).clamp(GROUP, MOST_IN_BLOCK);
+    let block = ((BLOCK_BYTES / stride) & !(GROUP - 1)).clamp(GROUP, MOST_IN_BLOCK);
     let mut out = vec![0; count.checked_mul(stride)?];
     let mut deltas = vec![0u8; block];
     for start in (0..count).step_by(block) {
@@ -176,7 +176,7 @@ fn triangles(data: &[u8], count: usize) -> Option<Vec<u32>> {
         return None;
     }
     let codes = data.get(1..1 + count / 3)?;
-    let end = data.len().checked_sub(16).filter(|end| *end >= 1 + count / 3)?;
+    let end = data.len().checked_sub(16).filter(|end| *end > count / 3)?;
     let table = data.get(end..)?;
     let mut reader = Reader { data: data.get(..end)?, at: 1 + count / 3 };
     let mut fifos = Fifos { vertices: [u32::MAX; 16], edges: [(u32::MAX, u32::MAX); 16], vertex: 0, edge: 0 };

@@ -50,8 +50,8 @@ pub use instance_layout::instance_layout;
 pub use instances::{LevelLook, forest_view, instance_bind_group};
 pub(super) use leaves::Leaves;
 pub use list_slot::{ListSlot, ListWork, PreparedPage};
-pub use lists::{ForestStatistics, LevelStatistics, PreparedForests, collect_view_counts};
 pub(super) use lists::PreparedForest;
+pub use lists::{ForestStatistics, LevelStatistics, PreparedForests, collect_view_counts};
 pub use pipelines::LevelPipelines;
 pub use representation::Representations;
 pub use uniforms::{

@@ -192,7 +192,9 @@ impl ForestParticles {
         let uniform = forest_view(forest, view.camera, Some(LevelLook::default()));
         gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
         self.visible.resize_with(forest.page_count(), || GrowingBuffer::new(&gpu.device, "canopy_particle_trees"));
-        (0..forest.page_count()).filter_map(|page| self.choose_in(gpu, entity, forest, page, view, settings, focal)).collect()
+        (0..forest.page_count())
+            .filter_map(|page| self.choose_in(gpu, entity, forest, page, view, settings, focal))
+            .collect()
     }
 
     /// The same of one page.
@@ -209,8 +211,7 @@ impl ForestParticles {
         let of = &forest.forest;
         let camera = view.camera - of.origin;
         let (shape, members) = forest.page_trees(page)?;
-        let drawn =
-            Drawn { page: shape, grid: of.stand.grid, groupings: &GROUPINGS, variants: forest.sizes.len() };
+        let drawn = Drawn { page: shape, grid: of.stand.grid, groupings: &GROUPINGS, variants: forest.sizes.len() };
         let levels = Levels::only(Representation::MODEL);
         let volume = Volume::view(&drawn, camera, &view.frustum, &levels, FADE.end.min(of.view_distance));
         let near = select(shape, members, &forest.tree_sizes, &GROUPINGS, &volume);

@@ -1,6 +1,6 @@
 //! Tree inventories: tables of text or GeoJSON with one tree a row.
 //!
-//! Columns are found by their names, in any order, in the words of the large public tables ([`names`] has them), and by
+//! Columns are found by their names, in any order, in the words of the large public tables (`names.rs` has them), and by
 //! what their cells hold:
 //!
 //! | quantity | names, for instance | unit |

@@ -203,7 +203,7 @@ fn has_position(line: &str, separator: Option<u8>) -> bool {
     place::pair_by_name(&split).is_some()
         || cells.len() > 2
             && cells.iter().filter(|cell| named(cell)).count() * 4 > cells.len() * 3
-            && cells.iter().any(|cell| names::may_be_place(cell))
+            && cells.iter().any(names::may_be_place)
 }
 
 /// The most frequent separator in the header, outside quotes; blanks if there is none and several words, else a comma.

@@ -171,7 +171,7 @@ fn mask_of(directory: &Directory, input: &mut Input) -> Option<usize> {
 fn hide(heights: &mut [f32], shown: &[f32]) -> usize {
     let mut hidden = 0;
     for (height, shown) in heights.iter_mut().zip(shown) {
-        if !(*shown > 0.0) && !height.is_nan() {
+        if (shown.is_nan() || *shown <= 0.0) && !height.is_nan() {
             *height = f32::NAN;
             hidden += 1;
         }

@@ -5,12 +5,14 @@
 //! | GeoTIFF, BigTIFF | from its GeoKeys, or the `.tfw` and `.prj` beside it: degrees, UTM, national systems by EPSG code, any projection in metres or feet | 8 to 64 bit integers and floats, one band and its alpha or mask, scale, offset and unit of GDAL |
 //! | ESRI ASCII grid | from the `.prj` beside it, else local metres, or degrees if the numbers look like it | text |
 //! | SRTM `.hgt` | degrees, from the file's name (`N36W085.hgt`) | 16 bit, 1201², 3601², 7201² or 1801 x 3601 |
+//! | virtual raster `.vrt`, lists of tiles | that of the tiles | those of the tiles, on one grid |
 //! | PNG, 16 bit greyscale | metres from [`ReadOptions::image_scale`] | from the same |
 
 mod ascii_grid;
 mod geotiff;
 mod hgt;
 mod image;
+mod mosaic;
 mod sentinels;
 mod side_files;
 
@@ -20,6 +22,8 @@ use std::io::{BufRead, BufReader, Cursor, Read, Seek};
 use std::path::Path;
 
 use glam::DVec2;
+
+pub use mosaic::read_terrain_tiles;
 
 use super::holes::fill_holes;
 use super::{CoordinateSystem, GeoReference, HeightField, MAX_SAMPLES, Surroundings, Terrain, TerrainError, Warning};
@@ -75,13 +79,18 @@ pub struct ImageScale {
 /// See [`TerrainError`]: a file that cannot be read, has an unknown format, is broken, has no data, has no known
 /// coordinate system, or has fewer than two rows or columns. No input makes this function panic.
 pub fn read_terrain(path: &Path, options: &ReadOptions) -> Result<(Terrain, Vec<Warning>), TerrainError> {
+    let (length, start) = open(path)?;
+    Source { path, length, bytes: None, options }.read(&start)
+}
+
+/// Length and first bytes of a file.
+fn open(path: &Path) -> Result<(u64, Vec<u8>), TerrainError> {
     let io = |source| TerrainError::Io { path: path.to_owned(), source };
     let mut file = File::open(path).map_err(io)?;
     let length = file.metadata().map_err(io)?.len();
     let mut start = Vec::new();
     file.by_ref().take(512).read_to_end(&mut start).map_err(io)?;
-    drop(file);
-    Source { path, length, bytes: None, options }.read(&start)
+    Ok((length, start))
 }
 
 /// Reads a terrain from the bytes of a file, as [`read_terrain`] reads the file itself. `name` is the name of the file:
@@ -119,18 +128,23 @@ struct Source<'a> {
 impl<'a> Source<'a> {
     /// Reads the file, whose first bytes are `start`.
     fn read(&self, start: &[u8]) -> Result<(Terrain, Vec<Warning>), TerrainError> {
-        let raster = if geotiff::recognises(start) {
-            geotiff::read(self)?
-        } else if image::recognises(start) {
-            image::read(self)?
-        } else if ascii_grid::recognises(start) {
-            ascii_grid::read(self)?
-        } else if hgt::recognises(self.length) {
-            hgt::read(self)?
-        } else {
-            return Err(TerrainError::UnknownFormat { path: self.path.to_owned() });
-        };
+        let raster = if mosaic::recognises(start) { mosaic::read(self)? } else { self.raster(start)? };
         raster.into_terrain(self)
+    }
+
+    /// The samples of a file that is one raster.
+    fn raster(&self, start: &[u8]) -> Result<Raster, TerrainError> {
+        if geotiff::recognises(start) {
+            geotiff::read(self)
+        } else if image::recognises(start) {
+            image::read(self)
+        } else if ascii_grid::recognises(start) {
+            ascii_grid::read(self)
+        } else if hgt::recognises(self.length) {
+            hgt::read(self)
+        } else {
+            Err(TerrainError::UnknownFormat { path: self.path.to_owned() })
+        }
     }
 
     /// Opens the bytes for reading on demand: a window of a large file does not need the whole file.
