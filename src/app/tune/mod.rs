@@ -248,6 +248,8 @@ impl Tuned {
                     let levels: Vec<String> = self.scene.quality.levels.iter().map(level).collect();
                     lines.push(format!("    levels: [{}],", levels.join(", ")));
                 }
+                // A scene file leaves out what is automatic.
+                Some(_) if setting.value == super::profile::AUTOMATIC => {}
                 Some(field) => lines.push(format!("    {field}: {},", setting.value)),
                 None => {}
             }
