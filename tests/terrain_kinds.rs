@@ -467,7 +467,7 @@ fn tiles_of_one_raster_are_one_terrain() {
     let path = write("all.vrt", vrt.as_bytes());
     check(&read_terrain(&path, &ReadOptions::default()).expect("a terrain").0);
     // A crop reads what it needs; a gap is filled.
-    let crop = canopy::terrain::Crop { west: 500_100.0, south: 5_399_990.0, east: 500_250.0, north: 5_400_000.0 };
+    let crop = canopy::terrain::Crop { west: 500_100.0, south: 5_399_950.0, east: 500_250.0, north: 5_400_000.0 };
     let options = ReadOptions { crop: Some(crop), ..ReadOptions::default() };
     let (terrain, _) = read_terrain(&path, &options).expect("a terrain");
     assert!(terrain.field().columns() >= 14, "{}", terrain.field().columns());
