@@ -96,6 +96,7 @@ impl<'a> StandPlan<'a> {
     }
 
     /// The inventory that was read, if the scene has one.
+    #[cfg(feature = "program")]
     pub fn inventory(&self) -> Option<&Inventory> {
         match &self.source {
             Source::Inventory(_, inventory, _) => Some(inventory),
