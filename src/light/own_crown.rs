@@ -54,7 +54,8 @@ impl OwnCrown {
 
     /// `to_rim`: horizontal distance to the side of the cylinder.
     fn entry(&self, depth: f32, tangent: f32, to_rim: f32) -> Entry {
-        let tangent = tangent.max(1e-3);
+        // Steeper than this is straight up.
+        let tangent = tangent.clamp(1e-3, 1e4);
         let below = (depth - self.length).max(0.0) / tangent;
         let inside = (to_rim.min(depth / tangent) - below).max(0.0);
         let path = inside * (1.0 + tangent * tangent).sqrt();

@@ -43,7 +43,7 @@ fn ratio(own: Interval, other: Interval) -> Option<Interval> {
     Some(Interval { value, low: value * (-reach).exp(), high: value * reach.exp() })
 }
 
-/// As [`rows`]; fails if a combination takes more than `limit` times as long, and surely longer than before.
+/// Compares each combination of a report with that of the baseline; fails if one takes more than `limit` times as long, and surely longer than before.
 ///
 /// # Errors
 /// [`ProfileError::NothingInCommon`], [`ProfileError::Slower`] with what was compared.
