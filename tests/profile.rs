@@ -86,6 +86,16 @@ fn a_profile_has_times_errors_a_front_and_a_page_and_can_be_gone_on_with() -> Ou
     let same = call("4", &["--resume", "--baseline", &baseline])?;
     assert_eq!(same.status.code(), Some(0), "{}", said(&same));
     assert!(String::from_utf8(same.stdout)?.contains("1.000"));
+    // A report that lost a point by hand is none to go on with; it once ended in a panic.
+    let json = out.join("report.json");
+    let kept = std::fs::read(&json)?;
+    let mut shorter: serde_json::Value = serde_json::from_slice(&kept)?;
+    shorter["points"].as_array_mut().ok_or("no points")?.pop();
+    std::fs::write(&json, serde_json::to_vec(&shorter)?)?;
+    let edited = call("4", &["--resume"])?;
+    assert_eq!(edited.status.code(), Some(1));
+    assert!(said(&edited).contains("has a report of another profile"), "{}", said(&edited));
+    std::fs::write(&json, kept)?;
     let other = call("4", &["--resume", "--seed", "5"])?;
     assert_eq!(other.status.code(), Some(1));
     assert!(said(&other).contains("has a report of another profile"), "{}", said(&other));

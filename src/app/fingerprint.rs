@@ -2,7 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::scene::{Ground, GrownForm, PlantSource, Scene, Trees};
+use crate::{
+    scene::{Ground, GrownForm, PlantSource, Scene, Trees},
+    style::Palette,
+};
 
 /// 32 hexadecimal digits that follow from the scene's values, the content of the files that it names, and the version of the
 /// program, but not from the names of files and folders. Files that these files name in turn (a glTF file's textures) have no
@@ -14,6 +17,10 @@ pub fn fingerprint(scene: &Scene) -> String {
     for path in paths(&mut bare) {
         hash(&mut hasher, path);
         *path = PathBuf::new();
+    }
+    if let Some(palette) = bare.style.palette_mut().filter(|palette| Palette::is_file(palette)) {
+        hash(&mut hasher, Path::new(palette.as_str()));
+        palette.clear();
     }
     hasher.update(format!("{} {bare:?}", env!("CARGO_PKG_VERSION")).as_bytes());
     hasher.finalize().to_hex()[..32].to_owned()
@@ -56,11 +63,19 @@ fn paths(scene: &mut Scene) -> Vec<&mut PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{GltfPlants, Species};
+    use crate::{
+        scene::{GltfPlants, Species},
+        style::{Style, Watercolour},
+    };
+
+    fn folder_of(folder: &Path, name: &str) -> PathBuf {
+        folder.join(name).join("palette.ron")
+    }
 
     #[test]
     fn a_scene_is_known_by_its_values_and_the_content_of_its_files() -> std::io::Result<()> {
         let folder = tempfile::tempdir()?;
+        let folder_path = folder.path().to_owned();
         let scene = |name: &str| {
             let plant = GltfPlants::new([folder.path().join(name)]);
             Scene { species: vec![Species::new("oak", plant)], ..Scene::default() }
@@ -73,6 +88,18 @@ mod tests {
         std::fs::write(folder.path().join("b.glb"), "two")?;
         assert_ne!(first, fingerprint(&scene("b.glb")));
         assert_ne!(first, fingerprint(&scene("none.glb")));
+
+        // Once a palette counted by the place of its file, not by its pigments.
+        let painted = |folder: &str| {
+            let palette = folder_of(&folder_path, folder).to_string_lossy().into_owned();
+            Scene { style: Style::Watercolour(Watercolour { palette, ..Watercolour::default() }), ..Scene::default() }
+        };
+        for (name, text) in [("x", "(one)"), ("y", "(one)"), ("z", "(two)")] {
+            std::fs::create_dir(folder_path.join(name))?;
+            std::fs::write(folder_of(&folder_path, name), text)?;
+        }
+        let first = fingerprint(&painted("x"));
+        assert!(first == fingerprint(&painted("y")) && first != fingerprint(&painted("z")));
         Ok(())
     }
 }

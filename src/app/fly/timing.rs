@@ -28,7 +28,10 @@ use bevy::{
 };
 use wgpu::{DeviceType, SubmissionIndex};
 
-use crate::render::{forest::ForestStatistics, terrain::TerrainStatistics};
+use crate::{
+    measure::{percentile, sorted},
+    render::{forest::ForestStatistics, terrain::TerrainStatistics},
+};
 
 /// Number of frames in the overlay's percentiles.
 pub const WINDOW: usize = 120;
@@ -57,10 +60,8 @@ impl FrameTimes {
 
     /// The time in seconds that a share (0 to 1) of the frames does not exceed (nearest rank); `None` without frames.
     pub fn percentile(&self, share: f64) -> Option<f64> {
-        let mut sorted: Vec<f64> = self.times.iter().copied().collect();
-        sorted.sort_by(f64::total_cmp);
-        let rank = (share.clamp(0.0, 1.0) * sorted.len() as f64).ceil() as usize;
-        sorted.get(rank.max(1) - 1).copied()
+        let times: Vec<f64> = self.times.iter().copied().collect();
+        percentile(&sorted(&times), share)
     }
 
     /// Number of frames that the percentiles know.

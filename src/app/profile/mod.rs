@@ -155,7 +155,15 @@ pub fn profile(
     options: &ProfileOptions,
     progress: &mut dyn Progress,
 ) -> Result<(ProfileReport, ReportFiles), AppError> {
-    let scene = profiled_scene(&options.scene, &options.overrides)?;
+    profile_of(profiled_scene(&options.scene, &options.overrides)?, options, progress)
+}
+
+/// The same of a scene that has its overrides; those of `options` count no more.
+pub(super) fn profile_of(
+    scene: Scene,
+    options: &ProfileOptions,
+    progress: &mut dyn Progress,
+) -> Result<(ProfileReport, ReportFiles), AppError> {
     let points = points(&scene, &options.sweeps, options.combination)?;
     // Views off the path and references that are missing are found before the long work; heights do not matter for that.
     let early = options.views.of(&scene, &|_, _| 0.0)?;
@@ -243,7 +251,9 @@ impl<'a> Work<'a> {
         let json = ReportFiles::in_folder(&options.out).json;
         let report = if options.resume && json.exists() {
             let mut earlier = read_report(&json)?;
-            if earlier.fingerprint != whole {
+            // A report that was edited may have fewer points and views than its settings say.
+            let counts = (earlier.points.len(), earlier.views.len());
+            if earlier.fingerprint != whole || counts != (points.len(), views.len()) {
                 return Err(ProfileError::Another(options.out.clone()).into());
             }
             earlier.method.rounds = options.rounds;

@@ -125,7 +125,7 @@ pub struct Asked<'a> {
 /// [`ProfileError::Missing`].
 pub fn given_files(given: &Path, views: &[ProfileView]) -> Result<Vec<PathBuf>, ProfileError> {
     let file = |view: &ProfileView| {
-        let candidates = ["png", "exr", "jpg"].map(|ending| given.join(format!("{}.{ending}", view.name)));
+        let candidates = ["png", "jpg"].map(|ending| given.join(format!("{}.{ending}", view.name)));
         candidates.into_iter().find(|file| file.is_file())
     };
     let missing: Vec<String> = views.iter().filter(|view| file(view).is_none()).map(|view| view.name.clone()).collect();

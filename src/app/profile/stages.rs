@@ -7,7 +7,6 @@ use crate::{
     assets::Stage,
     lod::Representation,
     progress::Progress,
-    render::components::CanopyStyle,
     scene::{Quality, QualityLevel, Scene},
 };
 
@@ -82,7 +81,7 @@ impl Stages {
             surroundings: stage.surroundings,
             observer: stage.observer,
             scene: scene.clone(),
-            style: CanopyStyle::new(scene.style.clone()).map_err(|error| interrupt::building(error.into()))?,
+            style: stage.style.clone(),
         })
     }
 }

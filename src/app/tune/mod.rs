@@ -13,8 +13,8 @@ use std::path::PathBuf;
 
 use self::ladder::{ladders, neighbours};
 use super::{
-    AppError, Combination, ProfileError, ProfileOptions, ProfileReport, ReferenceKind, Sweep, profile, profiled_scene,
-    set_setting, settings_of,
+    AppError, Combination, ProfileError, ProfileOptions, ProfileReport, ReferenceKind, Sweep, profile::profile_of,
+    profiled_scene, set_setting, settings_of,
 };
 use crate::{
     files,
@@ -89,7 +89,7 @@ pub fn tune(options: &TuneOptions, progress: &mut dyn Progress) -> Result<Tuned,
             step + 1,
             sweeps.iter().map(|sweep| sweep.values.len()).sum::<usize>()
         ));
-        let (report, _) = profile(&step_options(options, &centre, sweeps, step), progress)?;
+        let (report, _) = profile_of(centre.clone(), &step_options(options, &centre, sweeps, step), progress)?;
         let candidates = candidates(&report)?;
         let now = candidates[0].1;
         let best = best(&candidates, options.goal);
