@@ -126,7 +126,7 @@ pub enum StageError {
 /// Which anchors would fit, for messages.
 pub(super) fn anchors(fits: &[Anchor]) -> String {
     match fits {
-        [] => "no other `anchor` would put them there: correct the inventory's `anchor`".to_owned(),
+        [] => "no other `anchor` would put them there".to_owned(),
         fits => {
             let names: Vec<String> = fits.iter().map(|anchor| format!("`anchor: {anchor:?}`")).collect();
             format!("they would stand on it with {}", names.join(" or "))

@@ -1,10 +1,25 @@
-//! The name that a misspelt one was meant to be.
+//! Names that people write: their words, and what a misspelt one was meant to be.
 
 /// The name of `known` with the least edit distance from `name`, whatever their case; of equally near ones the first.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let letters = |name: &str| name.trim().to_lowercase().chars().collect::<Vec<_>>();
     let found = letters(name);
     known.into_iter().min_by_key(|known| edit_distance(&found, &letters(known)))
+}
+
+/// The words of a name, each made plain (its case, its accents): runs of letters and digits, split also where a small letter
+/// meets a capital one.
+pub fn words(name: &str, plain: impl Fn(&str) -> String) -> Vec<String> {
+    let mut split = String::with_capacity(name.len() + 4);
+    let mut before = ' ';
+    for c in name.chars() {
+        if c.is_uppercase() && before.is_lowercase() {
+            split.push(' ');
+        }
+        split.push(c);
+        before = c;
+    }
+    plain(&split).split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_owned).collect()
 }
 
 /// Number of insertions, deletions, substitutions and swaps of neighbours that turn `a` into `b` [Damerau 1964].

@@ -118,6 +118,17 @@ fn only_the_finest_level_of_detail_is_drawn() {
         assert_eq!(triangles(&plant), WHOLE);
         says(&warnings, &["1 coarser levels of detail (MSFT_lod)"]);
     }
+    // A hull of the finest level is none of the levels: both coarser ones were drawn inside each other.
+    let names = ["UCX_Oak_LOD0", "Oak_LOD1", "Oak_LOD2"];
+    let nodes: Vec<Value> = names.iter().map(|name| json!({"mesh": 0, "name": name})).collect();
+    let bytes = edited(|json| {
+        json["nodes"] = json!(nodes);
+        json["scenes"] = json!([{"nodes": [0, 1, 2]}]);
+    });
+    let (plant, warnings) = load(&bytes);
+    assert_eq!(triangles(&plant), WHOLE);
+    says(&warnings, &["collision hulls", names[0]]);
+    says(&warnings, &["coarser levels of detail", names[2]]);
     // A file of one level is that tree, whatever its name.
     let (plant, warnings) = load(&edited(|json| json["nodes"] = json!([{"mesh": 0, "name": "Oak_LOD2"}])));
     assert!(triangles(&plant) == WHOLE && warnings.is_empty(), "{warnings:?}");

@@ -238,7 +238,8 @@ impl Document<'_> {
         };
         let begin = number("byteOffset").unwrap_or(0);
         // A compressed byte stands for some hundred at most.
-        let most = length.saturating_mul(1024).min(MOST_DECODED);
+        let used: usize = self.decoded.values().map(Vec::len).sum();
+        let most = length.saturating_mul(1024).min(MOST_DECODED.saturating_sub(used));
         if count.checked_mul(stride).is_none_or(|bytes| bytes > most) {
             return Err(damaged("claims more than its bytes can hold"));
         }

@@ -124,10 +124,7 @@ pub(super) fn read(
     let mut material = PlantMaterial {
         base_color: Vec3::new(unit(factor[0]), unit(factor[1]), unit(factor[2])),
         base_color_texture: texture,
-        normal_texture: None,
-        alpha_cutoff: 0.5,
-        transmission: Vec3::ZERO,
-        gloss: Gloss::MATT,
+        ..PlantMaterial::default()
     };
     if kind == PartKind::Foliage {
         material.gloss = options.gloss.unwrap_or(Gloss::LEAF).sanitized();

@@ -129,6 +129,17 @@ fn local_transform(node: &Node, location: &str, warnings: &mut Warnings) -> Resu
     Ok(DMat4::from_scale_rotation_translation(scale, rotation, vector(node.translation, DVec3::ZERO)))
 }
 
+/// What normals are transformed by: the cofactor matrix, which is the inverse transpose times the determinant. It exists for
+/// singular transforms, too.
+pub(super) fn cofactor(transform: &DMat4) -> DMat3 {
+    let linear = DMat3::from_mat4(*transform);
+    DMat3::from_cols(
+        linear.y_axis.cross(linear.z_axis),
+        linear.z_axis.cross(linear.x_axis),
+        linear.x_axis.cross(linear.y_axis),
+    )
+}
+
 /// Transforms `mesh` by `transform`. Normals are transformed by the inverse transpose, and triangles are reversed if
 /// the transform mirrors.
 ///
@@ -136,12 +147,7 @@ fn local_transform(node: &Node, location: &str, warnings: &mut Warnings) -> Resu
 /// their number.
 pub(super) fn apply(mesh: &mut PlantMesh, transform: &DMat4, location: &str) -> Result<usize, Fault> {
     let linear = DMat3::from_mat4(*transform);
-    // The cofactor matrix is the inverse transpose times the determinant. It exists for singular transforms, too.
-    let cofactor = DMat3::from_cols(
-        linear.y_axis.cross(linear.z_axis),
-        linear.z_axis.cross(linear.x_axis),
-        linear.x_axis.cross(linear.y_axis),
-    );
+    let cofactor = cofactor(transform);
     let mirrored = linear.determinant() < 0.0;
     let facing = if mirrored { -1.0 } else { 1.0 };
     for position in &mut mesh.positions {

@@ -7,29 +7,16 @@ use gltf::json::{Root, Value, scene::Node};
 use super::GltfOptions;
 use super::error::{WarningKind, Warnings};
 use super::nodes::Placement;
+use crate::math;
 
 /// Thickness over width up to which a mesh is flat.
 const FLAT: f32 = 0.02;
 /// Share of the plant's height, from its lowest point, in which ground lies.
 const LOW: f32 = 0.1;
 
-/// The words of a name, in lower case: runs of letters and digits, split where a small letter meets a capital one.
+/// The words of a name, in lower case.
 fn words(name: &str) -> Vec<String> {
-    let mut split = String::with_capacity(name.len() + 4);
-    let mut before = ' ';
-    for c in name.chars() {
-        if c.is_uppercase() && before.is_lowercase() {
-            split.push(' ');
-        }
-        split.push(c);
-        before = c;
-    }
-    split
-        .to_lowercase()
-        .split(|c: char| !c.is_alphanumeric())
-        .filter(|word| !word.is_empty())
-        .map(str::to_owned)
-        .collect()
+    math::names::words(name, str::to_lowercase)
 }
 
 /// The level of detail that a name states: 2 of `Oak_LOD2`, `oak lod 2`, `LOD02_bark`.
@@ -135,8 +122,6 @@ pub(super) fn keep_tree(
     }
     kept.retain(|placement| !listed(placement, &options.ignore));
 
-    let count = kept.len();
-    let levels: Vec<Option<u32>> = kept.iter().map(|placement| names(root, placement).find_map(level)).collect();
     let hull = |placement: &Placement| {
         let node = placement.path.last().and_then(|node| root.nodes.get(*node)).and_then(|node| node.name.as_deref());
         let mesh = root.meshes.get(placement.mesh).and_then(|mesh| mesh.name.as_deref());
@@ -151,14 +136,13 @@ pub(super) fn keep_tree(
             warnings.push(WarningKind::Ignored, "/nodes", message);
         }
     }
-    let finest = levels.iter().flatten().min().copied();
+    let finest = kept.iter().filter_map(|placement| names(root, placement).find_map(level)).min();
     let coarser = |placement: &Placement| {
         let numbered = names(root, placement).find_map(level).zip(finest).is_some_and(|(level, finest)| level > finest);
         numbered || names(root, placement).any(is_billboard)
     };
-    let count = count.min(kept.len());
     let coarse: Vec<String> = kept.iter().filter(|placement| coarser(placement)).map(|p| label(root, p)).collect();
-    if !coarse.is_empty() && coarse.len() < count {
+    if !coarse.is_empty() && coarse.len() < kept.len() {
         kept.retain(|placement| !coarser(placement));
         let message = format!("coarser levels of detail, which are not drawn: {}", shortened(&coarse));
         warnings.push(WarningKind::Ignored, "/nodes", message);

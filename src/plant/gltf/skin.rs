@@ -3,7 +3,7 @@
 //! [glTF 2.0 specification, sections 3.7.2.2 "Morph Targets" and 3.7.3 "Skins"]. A skinned vertex is the weighted mean of the
 //! vertex moved by each of its joints; the node of the mesh does not count.
 
-use glam::{DMat3, DMat4, DVec3, Vec3};
+use glam::{DMat4, DVec3, Vec3};
 use gltf::json::accessor::Type;
 use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
@@ -11,6 +11,7 @@ use gltf::json::validation::Checked;
 use super::accessor::{Elements, read_any};
 use super::container::Document;
 use super::error::{Fault, WarningKind, Warnings};
+use super::nodes::cofactor;
 
 /// What moves the vertices of a mesh.
 #[derive(Default)]
@@ -109,12 +110,7 @@ pub(super) fn apply(
         let matrix = matrix * (1.0 / total);
         moved(points, vertex, |point| matrix.transform_point3(point));
         if let Some(normals) = normals.as_deref_mut() {
-            let linear = DMat3::from_mat4(matrix);
-            let cofactor = DMat3::from_cols(
-                linear.y_axis.cross(linear.z_axis),
-                linear.z_axis.cross(linear.x_axis),
-                linear.x_axis.cross(linear.y_axis),
-            );
+            let cofactor = cofactor(&matrix);
             moved(normals, vertex, |normal| (cofactor * normal).normalize_or_zero());
         }
     }

@@ -69,6 +69,9 @@ pub(super) fn read(bytes: &[u8], name: &str) -> Result<(Table, PlaceColumns), Sc
                 *cell = text(value);
             }
         }
+        // A file with many properties, few of them on each tree, would keep the empty ones of every row.
+        let filled = cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
+        cells.truncate(filled.max(2));
         rows.push(Row { line, cells: StringRecord::from(cells) });
     }
     let geographic = degrees || matches!(system, Some(4326 | 4258 | 4269));

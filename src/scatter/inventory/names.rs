@@ -4,6 +4,7 @@
 //! the words are looked up. Compound words (`Stammumfang`, `boomhoogte`) are found by their parts.
 
 use super::LengthUnit;
+use crate::math;
 
 /// Letters without accents, in lower case: `Höhe` becomes `hohe`.
 pub(super) fn folded(text: &str) -> String {
@@ -28,18 +29,9 @@ pub(super) fn folded(text: &str) -> String {
     plain
 }
 
-/// The words of a name: runs of letters and digits, split also where a small letter meets a capital one.
+/// The words of a name, [folded].
 pub(super) fn words(name: &str) -> Vec<String> {
-    let mut split = String::with_capacity(name.len() + 4);
-    let mut before = ' ';
-    for c in name.chars() {
-        if c.is_uppercase() && before.is_lowercase() {
-            split.push(' ');
-        }
-        split.push(c);
-        before = c;
-    }
-    folded(&split).split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_owned).collect()
+    math::names::words(name, folded)
 }
 
 /// A quantity that a column may hold.

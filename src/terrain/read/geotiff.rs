@@ -143,7 +143,8 @@ impl Bands {
         let count = directory.value(input, 0, 277).unwrap_or(1);
         let extra = directory.values(input, 0, 338);
         Self {
-            count: usize::try_from(count).unwrap_or(1).max(1),
+            // No more are accepted; where a tag stands twice, the decoder may have taken the other one.
+            count: if count == 2 { 2 } else { 1 },
             index: 0,
             apart: directory.value(input, 0, 284) == Some(2),
             alpha: count == 2 && matches!(extra.last(), Some(1 | 2)),

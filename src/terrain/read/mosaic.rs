@@ -15,7 +15,7 @@ const MOST_TILES: usize = 10_000;
 /// Largest deviation of a tile from the common grid, in cells.
 const TOLERANCE: f64 = 0.25;
 
-/// Reads several tiles of one raster, in the order of preference where they overlap. Tiles outside the crop are not read.
+/// Reads several tiles of one raster, in the order of preference where they overlap. Tiles outside the crop are left out.
 ///
 /// # Errors
 /// Those of [`read_terrain`](super::read_terrain), of the first tile that cannot be read; [`TerrainError::Unsupported`] for

@@ -10,6 +10,8 @@ use crate::terrain::projection::{self, Kind};
 
 /// Largest side file that is read, in bytes.
 const LARGEST: u64 = 64 << 10;
+/// The deepest brackets of a definition that is parsed.
+const DEEPEST: usize = 32;
 
 /// The text of the first of these files that exists beside the raster.
 fn text(source: &Source, endings: &[&str]) -> Option<(PathBuf, String)> {
@@ -108,7 +110,25 @@ pub(super) fn of_wkt(text: &str) -> Option<CoordinateSystem> {
     if text.contains("Mercator_Auxiliary_Sphere") || text.contains("Pseudo-Mercator") {
         return Some(CoordinateSystem::WebMercator);
     }
+    // The parser descends into brackets without a limit of its own. Real definitions have some six levels.
+    if text.len() as u64 > LARGEST || depth(text) > DEEPEST {
+        return None;
+    }
     of_definition(&proj4wkt::wkt_to_projstring(&with_known_methods(text)).ok()?)
+}
+
+/// How deep the brackets of a text are nested.
+fn depth(text: &str) -> usize {
+    let (mut depth, mut deepest) = (0usize, 0usize);
+    for byte in text.bytes() {
+        match byte {
+            b'[' | b'(' => depth += 1,
+            b']' | b')' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        deepest = deepest.max(depth);
+    }
+    deepest
 }
 
 /// The text with the names of EPSG for the methods that ArcGIS names otherwise.
@@ -148,6 +168,14 @@ fn authority(text: &str) -> Option<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The parser of definitions once descended until the stack was used up.
+    #[test]
+    fn deep_brackets_are_no_system() {
+        for open in ["A[", "PROJCS[\"a\",", "A("] {
+            assert_eq!(of_wkt(&open.repeat(30_000)), None);
+        }
+    }
 
     #[test]
     fn systems_are_read_from_wkt() {

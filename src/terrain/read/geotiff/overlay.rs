@@ -45,9 +45,13 @@ impl<'a> Overlay<'a> {
                 }
             }
             let compression = directory.value(&mut overlay.inner, *image, COMPRESSION).unwrap_or(1);
-            match compression {
-                ZSTANDARD => overlay.unpack(source, directory, *image)?,
-                _ => check_compression(source, compression)?,
+            let prepared = match compression {
+                ZSTANDARD => overlay.unpack(source, directory, *image),
+                _ => check_compression(source, compression),
+            };
+            // The heights are in the first image. A mask that cannot be read is reported where it is read.
+            if *image == 0 {
+                prepared?;
             }
         }
         overlay.inner.seek(SeekFrom::Start(0)).map_err(|error| source.malformed("start of file", error, FETCH))?;
