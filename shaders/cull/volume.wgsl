@@ -5,7 +5,7 @@
 #import canopy::constants::{POSITION_STEPS, CELL_BITS, SCALE_SHIFT, SCALE_BITS, MAX_LEVELS, MAX_PLANES}
 #import canopy::constants::{COORDINATE_LIMIT, PLANE_SLACK, ENDLESS_DROP, SQUARE_LIMIT, CLUSTER_KEYS}
 #import canopy::constants::{FACTOR_ONE, FACTOR_LIMIT}
-#import canopy::instance::{Tree, distance_factor}
+#import canopy::instance::{Tree, distance_factor, scale_of_code}
 
 // A distance: what is nearer has a smaller sum of squares, after the shift.
 struct Ring {
@@ -130,8 +130,7 @@ fn ground_position(tree: Tree) -> vec2<i32> {
 
 // An upper bound of a tree's scale, times 256.
 fn scale_bound(look: u32) -> u32 {
-    let octaves = 8u * extractBits(look, SCALE_SHIFT, SCALE_BITS) + 8u;
-    return (((4096u + (octaves & 4095u)) << (octaves >> 12u)) >> 8u) + 1u;
+    return scale_of_code(extractBits(look, SCALE_SHIFT, SCALE_BITS)) + 1u;
 }
 
 fn size_units(steps: u32, scale: u32, factor: u32) -> i32 {

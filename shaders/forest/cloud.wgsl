@@ -1,4 +1,5 @@
 // Planes of billboard clouds [Franzke 2005, 4.3]: six pulled vertices a plane, an instance a tree.
+#import canopy::octahedral::decode_octahedral
 #import canopy::cloud_plane::{CloudVariant, planes, plane_corner, plane_uv}
 #import canopy::constants::{ISOTROPIC_LEVELS, LIGHT_SCALE, AMBIENT_FITTED, WHOLE, FADE_SPAN, GONE}
 #import canopy::frame::{frame, light}
@@ -100,15 +101,6 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     out.identity = vec2(variants[tree.variant].foliage_layer, individual(trees[visible[instance]]));
 #endif
     return out;
-}
-
-fn decode_octahedral(e: vec2<f32>) -> vec3<f32> {
-    let f = e * 2.0 - 1.0;
-    var n = vec3(f.x, f.y, 1.0 - abs(f.x) - abs(f.y));
-    let t = max(-n.z, 0.0);
-    n.x += select(t, -t, n.x >= 0.0);
-    n.y += select(t, -t, n.y >= 0.0);
-    return normalize(n);
 }
 
 #ifdef STYLED

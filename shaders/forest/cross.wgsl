@@ -1,4 +1,5 @@
 // Crossed billboards [Franzke 2005, 4.3]: two upright planes and a level one, eighteen pulled vertices a tree.
+#import canopy::octahedral::decode_octahedral
 #import canopy::constants::{CROSS_VERTICES, PLANES, ISOTROPIC_LEVELS, LIGHT_SCALE, SUN_SCALE, WHOLE, FADE_SPAN, GONE}
 #import canopy::cross_variant::cross_variants
 #import canopy::frame::{frame, light}
@@ -154,15 +155,6 @@ fn set_sun_basis(sun: vec3<f32>, out: ptr<function, Varying>) {
     let high = 2.0 * abs(sun.y) - 1.0;
     (*out).sun_basis = SUN_SCALE * vec4(1.0, high, sun.x, sun.z);
     (*out).more_sun_basis = SUN_SCALE * vec4(sun.x * high, sun.z * high, sun.x * sun.z, sun.x * sun.x - sun.z * sun.z);
-}
-
-fn decode_octahedral(e: vec2<f32>) -> vec3<f32> {
-    let f = e * 2.0 - 1.0;
-    var n = vec3(f.x, f.y, 1.0 - abs(f.x) - abs(f.y));
-    let t = max(-n.z, 0.0);
-    n.x += select(t, -t, n.x >= 0.0);
-    n.y += select(t, -t, n.y >= 0.0);
-    return normalize(n);
 }
 
 #ifdef DEPTH_FIRST

@@ -150,11 +150,16 @@ fn depth_in_crown(relative: vec3<f32>, crown: Crown, to_light: vec3<f32>) -> f32
     return max(sqrt(max(inside, 0.0)) - middle, 0.0) / square;
 }
 
+// The scale of a code, times 256; octaves are interpolated linearly. CPU twin: src/scatter/packed.rs.
+fn scale_of_code(code: u32) -> u32 {
+    let octaves = 8u * code + 8u;
+    return ((4096u + (octaves & 4095u)) << (octaves >> 12u)) >> 8u;
+}
+
 // Factor on the distance of a tree by its size and place, times FACTOR_ONE. CPU twin: src/lod/level_distance.rs.
 fn distance_factor(tree: Tree, inverse_height: u32) -> u32 {
     let code = extractBits(tree.look, SCALE_SHIFT, SCALE_BITS);
-    let octaves = 8u * (u32(SCALE_STEPS) - code) + 8u;
-    let inverse_scale = ((4096u + (octaves & 4095u)) << (octaves >> 12u)) >> 8u;
+    let inverse_scale = scale_of_code(u32(SCALE_STEPS) - code);
     let place = mix32(tree.xz ^ mix32(extractBits(tree.cell, 0u, 2u * CELL_BITS)));
     let shift = LEAST_SHIFT + ((3u * (place >> 26u)) >> 1u);
     let factor = min(inverse_scale * inverse_height / FACTOR_ONE, 2u * GREATEST_FACTOR) * shift / FACTOR_ONE;

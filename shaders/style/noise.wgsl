@@ -3,17 +3,11 @@
 #define_import_path canopy::style_noise
 
 #import canopy::constants::NOISE_SPAN
-
-fn mix_bits(value: u32) -> u32 {
-    var h = value;
-    h = (h ^ (h >> 16u)) * 0x7feb352du;
-    h = (h ^ (h >> 15u)) * 0x846ca68bu;
-    return h ^ (h >> 16u);
-}
+#import canopy::hash::mix32
 
 fn lattice(cell: vec3<i32>, seed: u32) -> f32 {
     let c = vec3<u32>(cell);
-    let h = mix_bits(c.x * 0x8da6b343u + c.y * 0xd8163841u + c.z * 0xcb1ab31fu + seed);
+    let h = mix32(c.x * 0x8da6b343u + c.y * 0xd8163841u + c.z * 0xcb1ab31fu + seed);
     return f32(h >> 8u) / 8388608.0 - 1.0;
 }
 

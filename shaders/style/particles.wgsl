@@ -1,5 +1,7 @@
 // Particles of near crowns in three intensity maps [Luft 2006, 4.2]: dark in red, medium in green, bright in blue, added up.
 // src/style/particles.rs makes them and has the equations.
+#import canopy::hash::mix32
+#import canopy::octahedral::decode_octahedral_y
 #import canopy::frame::{frame, light}
 #import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position}
 #import canopy::style::{FARTHEST, NEAREST, landscape_depth}
@@ -42,20 +44,8 @@ struct Varying {
     @location(2) @interpolate(flat) class_color: vec3<f32>,
 }
 
-fn decode_octahedral(packed: u32) -> vec3<f32> {
-    let e = unpack2x16snorm(packed);
-    var n = vec3(e.x, 1.0 - abs(e.x) - abs(e.y), e.y);
-    let t = max(-n.y, 0.0);
-    n.x += select(t, -t, n.x >= 0.0);
-    n.z += select(t, -t, n.z >= 0.0);
-    return normalize(n);
-}
-
 fn hash(index: u32) -> f32 {
-    var h = index * 0x9e3779b1u;
-    h = (h ^ (h >> 16u)) * 0x7feb352du;
-    h = (h ^ (h >> 15u)) * 0x846ca68bu;
-    return f32((h ^ (h >> 16u)) >> 8u) / 16777216.0;
+    return f32(mix32(index * 0x9e3779b1u) >> 8u) / 16777216.0;
 }
 
 // Pixels of the maps across a dab of a plant `height` metres high at a distance.
@@ -96,7 +86,7 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     out.clip = frame.clip_from_relative * vec4(center, 1.0);
     out.clip += vec4(turned * grown * dab_pixels(distance, size.x) / settings.map_size * out.clip.w, 0.0, 0.0);
     out.corner = corner;
-    let facing = dot(rotate(decode_octahedral(particle.normal), tree.yaw), light.key_direction);
+    let facing = dot(rotate(decode_octahedral_y(particle.normal), tree.yaw), light.key_direction);
     let dark = facing <= settings.thresholds.x;
     let bright = facing > settings.thresholds.y;
     out.class_color = vec3(f32(dark), f32(!(dark | bright)), f32(bright));

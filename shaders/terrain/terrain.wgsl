@@ -1,11 +1,12 @@
 // The ground: tiles that morph into each other (src/terrain/tiles), coloured by slope, canopy cover and noise.
+#import canopy::octahedral::decode_octahedral_y
 #import canopy::constants::TILE_SIDE
 #import canopy::frame::{frame, light, shadow}
-#import canopy::ground_color::ground_color
+#import canopy::ground_color::{GroundColor, ground_color}
 #import canopy::lighting::{Surface, shade_matt, even_sky}
 #import canopy::output::finish
 #import canopy::stand::{ground_light, stand_light}
-#import canopy::sun_visibility::{sample_ground, terrain_visibility, cascaded_visibility}
+#import canopy::sun_visibility::{GroundSample, sample_ground, terrain_visibility, cascaded_visibility}
 #ifdef STYLED
 #import canopy::constants::{GROUND_LAYER, FIRST_FOLIAGE_LAYER}
 #import canopy::style_surface::{StyledSurface, styled_surface}
@@ -43,15 +44,6 @@ struct Varying {
     @location(1) normal: vec3<f32>,
 }
 
-fn decode_octahedral(packed: u32) -> vec3<f32> {
-    let e = unpack2x16snorm(packed);
-    var n = vec3(e.x, 1.0 - abs(e.x) - abs(e.y), e.y);
-    let t = max(-n.y, 0.0);
-    n.x += select(t, -t, n.x >= 0.0);
-    n.z += select(t, -t, n.z >= 0.0);
-    return normalize(n);
-}
-
 @vertex
 fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: u32) -> Varying {
     let tile = tiles[instance];
@@ -64,22 +56,34 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     var out: Varying;
     out.relative = vec3(xz.x, height - tile.camera_height, xz.y);
     out.clip = frame.clip_from_relative * vec4(out.relative, 1.0);
-    out.normal = mix(decode_octahedral(v.normal), decode_octahedral(v.parent_normal), k);
+    out.normal = mix(decode_octahedral_y(v.normal), decode_octahedral_y(v.parent_normal), k);
     return out;
 }
 
 // Mean depth in the canopy of what is seen of it from above, 0..1.
 const CROWN_DEPTH: f32 = 0.1;
 
-@fragment
-fn fragment(in: Varying) -> @location(0) vec4<f32> {
-    let smooth_normal = normalize(in.normal);
+// What is seen of the ground at a fragment.
+struct Seen {
+    // Its normal without noise.
+    normal: vec3<f32>,
+    ground: GroundSample,
+    // Whether it lies outside of the ground map.
+    outside: bool,
+    // Fractions of the canopy cover: all of it, that of trees that are not drawn, and the latter's share of the former.
+    cover: f32,
+    undrawn: f32,
+    far: f32,
+    color: GroundColor,
+}
+
+fn seen_at(in: Varying) -> Seen {
+    let normal = normalize(in.normal);
     let xz = frame.camera.xz + in.relative.xz;
     let distance = max(length(in.relative), 1e-3);
     // Width of a pixel on the slope, where it is widest.
-    let facing = abs(dot(smooth_normal, in.relative)) / distance;
+    let facing = abs(dot(normal, in.relative)) / distance;
     let footprint = distance / (frame.focal_length_pixels * max(facing, 0.05));
-
     let ground = sample_ground(in.relative);
     let uv = (in.relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;
     let outside = max(max(-uv.x, uv.x - 1.0), max(-uv.y, uv.y - 1.0)) > 0.0;
@@ -87,25 +91,28 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let undrawn = select(ground.undrawn_cover, frame.mean_cover, outside);
     let cover = undrawn + select(ground.cover, 0.0, outside);
     let far = undrawn / max(cover, 1e-3);
-    let color = ground_color(xz, 1.0 - smooth_normal.y, cover, far, footprint);
+    return Seen(normal, ground, outside, cover, undrawn, far, ground_color(xz, 1.0 - normal.y, cover, far, footprint));
+}
 
+@fragment
+fn fragment(in: Varying) -> @location(0) vec4<f32> {
+    let seen = seen_at(in);
     var surface: Surface;
-    surface.albedo = color.albedo;
-    surface.normal = normalize(smooth_normal + vec3(color.tilt.x, 0.0, color.tilt.y));
+    surface.albedo = seen.color.albedo;
+    surface.normal = normalize(seen.normal + vec3(seen.color.tilt.x, 0.0, seen.color.tilt.y));
     surface.transmission = vec3(0.0);
-    surface.ambient_visibility = color.ambient_visibility;
     // What is seen as crowns is lit as their tops are.
-    surface.ambient_visibility = mix(surface.ambient_visibility, 0.85, far);
-    let shade_cover = select(ground.surrounding_cover, 0.0, outside);
+    surface.ambient_visibility = mix(seen.color.ambient_visibility, 0.85, seen.far);
+    let shade_cover = select(seen.ground.surrounding_cover, 0.0, seen.outside);
 
     let stand = ground_light(shade_cover);
-    var visibility = select(terrain_visibility(ground, 0.0), 1.0, outside);
+    var visibility = select(terrain_visibility(seen.ground, 0.0), 1.0, seen.outside);
     if visibility > 0.0 {
-        let cascades = cascaded_visibility(in.relative, smooth_normal, 1.0, in.clip.xy);
+        let cascades = cascaded_visibility(in.relative, seen.normal, 1.0, in.clip.xy);
         // Beyond the maps: the fraction of light that passes between the crowns.
         let passed = mix(stand.key_transmittance, cascades.visibility, cascades.weight);
         // A canopy is rough: in low light its crowns shade each other near their tops, as those of drawn trees do.
-        visibility *= mix(passed, stand_light(cover, CROWN_DEPTH).key_transmittance, far);
+        visibility *= mix(passed, stand_light(seen.cover, CROWN_DEPTH).key_transmittance, seen.far);
     }
     return finish(in.relative, shade_matt(surface, visibility, even_sky(surface, stand)), 1.0);
 }
@@ -114,19 +121,8 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
 // The surface alone: the styles light it themselves. Forest whose trees are not drawn is of the first layer of foliage.
 @fragment
 fn styled(in: Varying) -> StyledSurface {
-    let smooth_normal = normalize(in.normal);
-    let xz = frame.camera.xz + in.relative.xz;
-    let distance = max(length(in.relative), 1e-3);
-    let facing = abs(dot(smooth_normal, in.relative)) / distance;
-    let footprint = distance / (frame.focal_length_pixels * max(facing, 0.05));
-    let ground = sample_ground(in.relative);
-    let uv = (in.relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;
-    let outside = max(max(-uv.x, uv.x - 1.0), max(-uv.y, uv.y - 1.0)) > 0.0;
-    let undrawn = select(ground.undrawn_cover, frame.mean_cover, outside);
-    let cover = undrawn + select(ground.cover, 0.0, outside);
-    let far = undrawn / max(cover, 1e-3);
-    let color = ground_color(xz, 1.0 - smooth_normal.y, cover, far, footprint);
-    let layer = select(GROUND_LAYER, FIRST_FOLIAGE_LAYER, (far > 0.5) & (undrawn > 0.3));
-    return styled_surface(smooth_normal, 1.0, 0.0, vec2(layer, 128u), color.albedo);
+    let seen = seen_at(in);
+    let layer = select(GROUND_LAYER, FIRST_FOLIAGE_LAYER, (seen.far > 0.5) & (seen.undrawn > 0.3));
+    return styled_surface(seen.normal, 1.0, 0.0, vec2(layer, 128u), seen.color.albedo);
 }
 #endif

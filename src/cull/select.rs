@@ -230,8 +230,9 @@ mod tests {
                 .into_iter()
                 .all(|(normal, half)| reach(normal, min - cascade.center, max - cascade.center) >= -half);
                 let falls = |seen: &SeenShadows| {
-                    let (middle, radius) = (0.5 * (min + max), 0.5 * (max - min).length() + seen.margin);
-                    let length = (middle.y + radius - seen.lowest).max(0.0) / cascade.direction.y.max(LOWEST_SINE);
+                    let middle = 0.5 * (min + max);
+                    let drop = (max.y + seen.margin - seen.lowest).max(0.0);
+                    let length = drop / cascade.direction.y.max(LOWEST_SINE);
                     let end = middle - cascade.direction * length;
                     frustum.planes().iter().all(|plane| {
                         let normal = plane.xyz().as_dvec3();

@@ -28,7 +28,7 @@ use crate::{
     },
     scatter::{
         CellGrid, PackedTree,
-        packed::{CELL_BITS, POSITION_STEPS, SCALE_BITS, SCALE_SHIFT},
+        packed::{CELL_BITS, POSITION_STEPS, SCALE_BITS, SCALE_SHIFT, scale_of_code},
     },
 };
 
@@ -535,12 +535,9 @@ fn signed_cell(cell: u32, axis: usize) -> i32 {
     (cell << (32 - CELL_BITS - first)) as i32 >> (32 - CELL_BITS)
 }
 
-/// An upper bound of a tree's scale, times 256: at most 6.2 % above it. Octaves are interpolated linearly.
+/// An upper bound of a tree's scale, times 256: at most 6.2 % above it.
 fn scale_bound(look: u32) -> u32 {
-    let code = look >> SCALE_SHIFT & ((1 << SCALE_BITS) - 1);
-    // 1/4096 octaves, rounded up.
-    let octaves = 8 * code + 8;
-    ((4096 + (octaves & 4095)) << (octaves >> 12) >> 8) + 1
+    scale_of_code(look >> SCALE_SHIFT & ((1 << SCALE_BITS) - 1)) + 1
 }
 
 /// What is known of a cluster without a look at its trees.

@@ -13,7 +13,7 @@ use crate::{
     math::hash,
     scatter::{
         PackedTree,
-        packed::{CELL_BITS, SCALE_BITS, SCALE_SHIFT},
+        packed::{CELL_BITS, SCALE_BITS, SCALE_SHIFT, scale_of_code},
     },
 };
 
@@ -42,9 +42,7 @@ pub fn inverse_height(height: f32) -> u32 {
 /// `inverse_height` is that of its plant.
 pub fn distance_factor(tree: &PackedTree, inverse_height: u32) -> u32 {
     let code = tree.look >> SCALE_SHIFT & SCALE_MASK;
-    // The scale is even in the logarithm; octaves are interpolated linearly.
-    let octaves = 8 * (SCALE_MASK - code) + 8;
-    let inverse_scale = ((4096 + (octaves & 4095)) << (octaves >> 12)) >> 8;
+    let inverse_scale = scale_of_code(SCALE_MASK - code);
     let place = hash::mix32(tree.xz ^ hash::mix32(tree.cell & CELL_MASK));
     let shift = LEAST_SHIFT + ((3 * (place >> 26)) >> 1);
     let factor = (inverse_scale * inverse_height / FACTOR_ONE).min(2 * GREATEST_FACTOR) * shift / FACTOR_ONE;

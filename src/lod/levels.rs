@@ -157,14 +157,6 @@ impl Levels {
     pub fn draws(&self, level: usize, distance: f32) -> bool {
         self.threshold(level, distance) < GONE
     }
-
-    /// The level that is drawn alone, and whole, at all distances from `near` to `far` metres, if there is one.
-    pub fn sole_level(&self, near: f64, far: f64) -> Option<usize> {
-        (0..self.len()).find(|&level| {
-            self.fade_in(level).is_none_or(|fade| near > f64::from(fade.end))
-                && self.fade_out(level).is_none_or(|fade| far < f64::from(fade.start))
-        })
-    }
 }
 
 #[cfg(test)]
@@ -204,20 +196,6 @@ mod tests {
             let levels = Levels::model_and_cross(band);
             prop_assert!(levels.draws(0, 0.99 * band.start) && !levels.draws(1, 0.99 * band.start));
             prop_assert!(!levels.draws(0, 1.01 * band.end) && levels.draws(1, 1.01 * band.end));
-        }
-
-        #[test]
-        fn a_sole_level_is_the_only_one_and_whole(
-            levels in three_levels(), near in 0.0f32..2e4, depth in 0.0f32..500.0, share in 0.0f32..=1.0,
-        ) {
-            let far = near + depth;
-            if let Some(level) = levels.sole_level(f64::from(near), f64::from(far)) {
-                let distance = near + share * depth;
-                for other in 0..levels.len() {
-                    prop_assert_eq!(levels.draws(other, distance), other == level);
-                }
-                prop_assert_eq!(levels.threshold(level, distance), WHOLE);
-            }
         }
     }
 

@@ -79,6 +79,15 @@ pub const SCALE_OCTAVES: f32 = 8.0;
 /// Steps of the tint on either side of 0.
 pub const TINT_STEPS: f32 = ((1 << (TINT_BITS - 1)) - 1) as f32;
 
+/// The scale of a code, times 256: the same whole number on every device. Octaves are interpolated linearly, so it is up to
+/// 6.2 % too large. Times the scale of the opposite code (`SCALE_STEPS - code`) it is about 1.
+/// `shaders/forest/instance.wgsl` has the same function.
+pub const fn scale_of_code(code: u32) -> u32 {
+    // 1/4096 octaves, rounded up.
+    let octaves = 8 * code + 8;
+    ((4096 + (octaves & 4095)) << (octaves >> 12)) >> 8
+}
+
 /// The lowest `bits` bits.
 const fn mask(bits: u32) -> u32 {
     (1 << bits) - 1

@@ -17,12 +17,6 @@ pub fn visibility(map: f32, fragment: f32, delta: f32, shift: f32) -> f32 {
     smooth_step(-delta, delta, map - fragment + shift)
 }
 
-/// Light (0..1) at a fragment by the same test in light space: 1 where lit [Luft 2006, eq. 5]. The pigment of the shadow
-/// layer is 1 less this.
-pub fn shadow_light(map: f32, fragment: f32, delta: f32, shift: f32) -> f32 {
-    visibility(map, fragment, delta, shift)
-}
-
 /// A linear depth (0..1) as four 8-bit channels, each for a quarter of the range [Luft 2006, eq. 3].
 pub fn encode(depth: f32) -> [u8; 4] {
     let code = |bias: f32| crate::math::color::unorm8((4.0 * depth - bias).clamp(0.0, 1.0));

@@ -10,13 +10,11 @@
 //! | [`depth`] | the blurred depth test and the coding of depth in four channels [Luft 2006, 2] |
 //! | [`wash`] | one layer of watercolour: shape, edge, pigment, glazing |
 //! | [`particles`] | the particles of a crown: how many, where, how large, in which intensity map [Luft 2006, 4.2] |
-//! | [`intensity`] | intensity maps made from a colour texture [Luft 2006, 4.3] |
 //! | [`anchor`](mod@anchor) | where noise is fixed to the scene |
 //! | [`layers`] | which plants share a layer |
 
 pub mod anchor;
 pub mod depth;
-pub mod intensity;
 pub mod layers;
 pub mod palette;
 pub mod paper;

@@ -93,7 +93,7 @@ impl<'a> DrawnTrees<'a> {
     }
 
     /// Number of draw calls so far.
-    pub(super) fn calls(&self) -> u64 {
+    pub fn calls(&self) -> u64 {
         self.calls.get()
     }
 }

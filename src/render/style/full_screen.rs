@@ -43,8 +43,8 @@ pub fn full_screen(
     }
 }
 
-/// A colour attachment whose old content does not matter.
-pub fn overwritten(view: &TextureView) -> Option<RenderPassColorAttachment<'_>> {
+/// A colour attachment that begins at 0.
+pub fn cleared(view: &TextureView) -> Option<RenderPassColorAttachment<'_>> {
     Some(RenderPassColorAttachment {
         view,
         depth_slice: None,
@@ -65,7 +65,7 @@ pub fn draw(
     let diagnostics = diagnostics.as_deref();
     let mut pass = ctx.begin_tracked_render_pass(RenderPassDescriptor {
         label: Some(label),
-        color_attachments: &[overwritten(target)],
+        color_attachments: &[cleared(target)],
         depth_stencil_attachment: None,
         timestamp_writes: None,
         occlusion_query_set: None,

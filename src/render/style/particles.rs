@@ -28,7 +28,7 @@ use bevy::{
 use glam::Vec3;
 
 use super::{
-    full_screen::overwritten,
+    full_screen::cleared,
     layouts::particles_layout,
     pipelines::StylePipelines,
     targets::{StyleMaps, StyleTargets, has_particles},
@@ -309,7 +309,7 @@ pub fn particles_pass(
     let diagnostics = diagnostics.as_deref();
     let mut pass = ctx.begin_tracked_render_pass(RenderPassDescriptor {
         label: Some("canopy_style_particles"),
-        color_attachments: &[overwritten(dabs)],
+        color_attachments: &[cleared(dabs)],
         depth_stencil_attachment: None,
         timestamp_writes: None,
         occlusion_query_set: None,

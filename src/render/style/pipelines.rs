@@ -45,7 +45,7 @@ pub const STYLED: &str = "STYLED";
 const OWN_NORMALS: &str = "OWN_NORMALS";
 
 /// What a level's renderer draws for: only its groups matter, not its colours.
-pub const LEVEL_TARGET: LevelTarget = LevelTarget::View(ViewFormat { color: MAP_FORMAT, samples: 1 });
+pub const LEVEL_TARGET: LevelTarget = LevelTarget::View(ViewFormat::ANY);
 
 /// The pipelines that were requested.
 #[derive(Resource)]

@@ -14,7 +14,7 @@ use bevy::{
 };
 
 use super::{
-    full_screen::overwritten,
+    full_screen::cleared,
     pipelines::{LEVEL_TARGET, StylePipelines},
     targets::StyleTargets,
 };
@@ -24,6 +24,7 @@ use crate::{
         bindings::FrameBindGroup,
         components::{CanopyCamera, DrawnStyle},
         forest::{GpuForests, PreparedForest, PreparedForests},
+        frame_work::FrameWork,
         terrain::GpuTerrain,
     },
 };
@@ -36,6 +37,7 @@ pub fn surfaces_pass(
     (forests, prepared, terrain): (Res<GpuForests>, Res<PreparedForests>, Res<GpuTerrain>),
     pipelines: Res<StylePipelines>,
     cache: Res<PipelineCache>,
+    work: Res<FrameWork>,
     mut ctx: RenderContext,
 ) {
     let (Some(group), Some(maps)) = (group.of(view.entity()), &targets.0) else { return };
@@ -43,7 +45,7 @@ pub fn surfaces_pass(
     let diagnostics = diagnostics.as_deref();
     let mut pass = ctx.begin_tracked_render_pass(RenderPassDescriptor {
         label: Some("canopy_style_surfaces"),
-        color_attachments: &[overwritten(&maps.surfaces), overwritten(&maps.identities), overwritten(&maps.colors)],
+        color_attachments: &[cleared(&maps.surfaces), cleared(&maps.identities), cleared(&maps.colors)],
         depth_stencil_attachment: Some(RenderPassDepthStencilAttachment {
             view: &maps.depth,
             depth_ops: Some(Operations { load: LoadOp::Clear(0.0), store: StoreOp::Store }),
@@ -64,7 +66,9 @@ pub fn surfaces_pass(
                 pass.set_render_pipeline(pipeline);
                 for page in lists.pages.iter().filter(|page| page.trees.may_have(index)) {
                     pass.set_bind_group(1, &page.bind_group, &[PreparedForest::offset(index)]);
-                    level.gpu.draw(&mut pass, features, LEVEL_TARGET, &page.trees.level(index, Share::ALL));
+                    let trees = page.trees.level(index, Share::ALL);
+                    level.gpu.draw(&mut pass, features, LEVEL_TARGET, &trees);
+                    FrameWork::add(&work.commands, trees.calls());
                 }
             }
         }
