@@ -12,6 +12,7 @@ mod leaf_kind;
 mod optics;
 pub(crate) mod surface;
 pub mod texture;
+mod tissue;
 
 use std::sync::Arc;
 
@@ -22,6 +23,7 @@ use serde::{Deserialize, Serialize};
 pub use gloss::{Gloss, lobe_gain, lobe_peak};
 pub use leaf_kind::LeafKind;
 pub use optics::LeafColors;
+pub use tissue::{LeafTextures, LeafTissue, Measured};
 
 /// One individual plant in its own frame: metres, Y up, the trunk's foot at the origin.
 #[derive(Clone, Debug, Default)]
@@ -103,6 +105,10 @@ pub struct PlantMaterial {
     pub transmission: Vec3,
     /// Specular reflection of the leaf's surface; wood is matt.
     pub gloss: Gloss,
+    /// Further textures of the leaf; none for wood.
+    pub leaf_textures: LeafTextures,
+    /// The leaf's tissue, for the layered model.
+    pub tissue: LeafTissue,
 }
 
 impl PlantMaterial {
@@ -120,6 +126,8 @@ impl Default for PlantMaterial {
             alpha_cutoff: 0.5,
             transmission: Vec3::ZERO,
             gloss: Gloss::MATT,
+            leaf_textures: LeafTextures::default(),
+            tissue: LeafTissue::default(),
         }
     }
 }
