@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use canopy::{
-    app::{LightGroup, ReferenceOptions, RenderedImage, Renderer, View, parse_size, reference},
+    app::{LeafModel, LightGroup, ReferenceOptions, RenderedImage, Renderer, View, parse_size, reference},
     assets::Stage,
     math::{luminance, srgb_to_linear},
     progress::Silent,
@@ -139,6 +139,7 @@ fn trace(arguments: &Arguments, case: &Case, samples: u32, out: &Path) -> anyhow
         samples,
         bounces: None,
         light: LightGroup::All,
+        leaf: LeafModel::Standard,
         fog: true,
         resume: true,
         overrides: Overrides::default(),

@@ -17,7 +17,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use canopy::{
-    app::{LightGroup, ReferenceOptions, RenderedImage, Renderer, View, parse_lighting, parse_size, reference},
+    app::{
+        LeafModel, LightGroup, ReferenceOptions, RenderedImage, Renderer, View, parse_lighting, parse_size, reference,
+    },
     assets::Stage,
     math::srgb_to_linear,
     progress::Silent,
@@ -175,6 +177,7 @@ fn trace(arguments: &Arguments, scene: &Scene, at: LocalTime, out: &Path) -> any
         samples: arguments.spp,
         bounces: None,
         light: LightGroup::All,
+        leaf: LeafModel::Standard,
         fog: true,
         resume: false,
         overrides: Overrides { lighting: Some(canopy::scene::Lighting::Local), ..Overrides::default() },

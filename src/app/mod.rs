@@ -53,7 +53,7 @@ pub use profile::{
 pub use reference::reference;
 pub use rendered_image::RenderedImage;
 pub use request::{
-    BakeOptions, Clock, FlyOptions, LightGroup, Output, ReferenceOptions, RenderOptions, RenderReport, Selection,
-    Still, View,
+    BakeOptions, Clock, FlyOptions, LeafModel, LightGroup, Output, ReferenceOptions, RenderOptions, RenderReport,
+    Selection, Still, View,
 };
 pub use tune::{Goal, TuneOptions, Tuned, tune};

@@ -47,7 +47,7 @@ pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Res
     let light = Arc::new(sun.light(&atmosphere)?);
 
     progress.begin("Building ray tracing structures", 0);
-    let scene = scene(&stage)?;
+    let scene = scene(&stage)?.with_leaves(options.leaf);
     progress.end();
     let settings = TraceSettings { bounces: options.bounces.unwrap_or(u32::MAX), ..TraceSettings::default() };
     let all = Light::of(&light, None);

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+pub use crate::reference::LeafModel;
 use crate::scene::{Lighting, LocalTime, Overrides, Pose, SceneSource};
 
 /// Everything about an interactive flight.
@@ -86,6 +87,8 @@ pub struct ReferenceOptions {
     pub bounces: Option<u32>,
     /// The light sources to include.
     pub light: LightGroup,
+    /// How leaves scatter light.
+    pub leaf: LeafModel,
     /// Whether to include the renderer's fog.
     pub fog: bool,
     /// Whether to continue an earlier trace of the same scene, light and camera, and to keep the state for the next

@@ -264,6 +264,10 @@ pub struct Reference {
     /// Light sources to include: the sun (or moon) alone, the sky alone, or all.
     #[arg(long, value_enum, default_value_t = LightChoice::All)]
     pub light: LightChoice,
+    /// How leaves scatter light: the standard model of the renderer, the layers of their tissue, or the layers as the thesis
+    /// prints them.
+    #[arg(long, value_enum, default_value_t = LeafChoice::Standard)]
+    pub leaf: LeafChoice,
     /// Leave out the renderer's fog.
     #[arg(long)]
     pub clear_air: bool,
@@ -281,6 +285,17 @@ pub enum LightChoice {
     Sun,
     /// The sky alone, with its bounces off ground and plants.
     Sky,
+}
+
+/// How leaves scatter light in a ground truth render.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum LeafChoice {
+    /// By front and transmission, the same from every angle.
+    Standard,
+    /// By the layers of the tissue, with all textures of the leaf.
+    Layers,
+    /// By the layers with the printed formulas of [Franzke 2005].
+    Published,
 }
 
 /// Arguments of `canopy bake`.

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use canopy::{
     app::{
-        BakeOptions, Clock, Combination, CompareOptions, FlyOptions, Goal, LightGroup, Output, PIXELS_PER_DEGREE,
-        ProfileOptions, ReferenceKind, ReferenceOptions, RenderOptions, Still, TuneOptions, View, Views,
+        BakeOptions, Clock, Combination, CompareOptions, FlyOptions, Goal, LeafModel, LightGroup, Output,
+        PIXELS_PER_DEGREE, ProfileOptions, ReferenceKind, ReferenceOptions, RenderOptions, Still, TuneOptions, View,
+        Views,
     },
     scene::{LocalTime, Overrides, SceneSource},
 };
@@ -13,8 +14,8 @@ use clap::CommandFactory;
 use clap::error::ErrorKind;
 
 use super::arguments::{
-    Arguments, Bake, CameraArguments, Common, Compare, Fly, LightChoice, Measured, Profile, Reference, Render,
-    StyleArguments, Tune,
+    Arguments, Bake, CameraArguments, Common, Compare, Fly, LeafChoice, LightChoice, Measured, Profile, Reference,
+    Render, StyleArguments, Tune,
 };
 
 /// The scene of `canopy fly` without an argument.
@@ -97,6 +98,11 @@ pub fn reference_options(reference: Reference, common: &Common) -> Result<Refere
             LightChoice::All => LightGroup::All,
             LightChoice::Sun => LightGroup::Sun,
             LightChoice::Sky => LightGroup::Sky,
+        },
+        leaf: match reference.leaf {
+            LeafChoice::Standard => LeafModel::Standard,
+            LeafChoice::Layers => LeafModel::Layers,
+            LeafChoice::Published => LeafModel::Published,
         },
         fog: !reference.clear_air,
         resume: reference.resume,

@@ -1,6 +1,6 @@
 //! The content of a plant as bytes, for fingerprints.
 
-use super::{PartKind, Plant};
+use super::{LeafTextures, PartKind, Plant, PlantMaterial};
 
 impl Plant {
     /// Feeds `hasher` with everything that a bake or a ray tracer reads of the plant. Not among it: its name, its
@@ -34,6 +34,36 @@ impl Plant {
                 }
                 None => list(&[]),
             }
+            // Only where there is one, so that plants without keep their fingerprints.
+            if let Some(image) = &material.leaf_textures.transmission {
+                list(b"transmission");
+                list(&image.width().to_le_bytes());
+                list(&image.height().to_le_bytes());
+                list(image.as_raw());
+            }
         }
     }
+}
+
+impl PlantMaterial {
+    /// Feeds `hasher` with what only the layered leaf model reads.
+    pub fn feed_tissue(&self, hasher: &mut blake3::Hasher) {
+        let LeafTextures { back, transmission: _, thickness, absorption } = &self.leaf_textures;
+        for image in [back, &self.normal_texture] {
+            let texels = image.as_ref().map(|image| (image.width(), image.height(), image.as_raw()));
+            feed_image(hasher, texels);
+        }
+        for image in [thickness, absorption] {
+            feed_image(hasher, image.as_ref().map(|image| (image.width(), image.height(), image.as_raw())));
+        }
+        hasher.update(format!("{:?}", self.tissue).as_bytes());
+    }
+}
+
+fn feed_image(hasher: &mut blake3::Hasher, image: Option<(u32, u32, &Vec<u8>)>) {
+    let (width, height, texels) =
+        image.map_or((0, 0, [].as_slice()), |(width, height, texels)| (width, height, texels));
+    hasher.update(&width.to_le_bytes());
+    hasher.update(&height.to_le_bytes());
+    hasher.update(texels);
 }

@@ -9,11 +9,13 @@ mod gloss;
 pub mod gltf;
 pub mod grow;
 mod leaf_kind;
+pub mod leaf_textures;
 mod optics;
 pub(crate) mod surface;
 pub mod texture;
 mod tissue;
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
@@ -78,6 +80,25 @@ impl PlantMesh {
             && self.triangles.iter().flatten().all(|&corner| (corner as usize) < vertices)
             && self.positions.iter().chain(&self.normals).all(|vector| vector.is_finite())
             && self.uvs.iter().all(|uv| uv.is_finite())
+    }
+
+    /// Whether the triangles enclose a volume: each edge belongs to as many triangles in one direction as in the other, vertices of
+    /// equal position being one. An empty mesh encloses none.
+    pub fn is_closed(&self) -> bool {
+        let place = |corner: u32| {
+            // Both zeros are the same place.
+            self.positions.get(corner as usize).map(|p| p.to_array().map(|c| (c + 0.0).to_bits()))
+        };
+        let mut balance: HashMap<_, i32> = HashMap::new();
+        for &[a, b, c] in &self.triangles {
+            for (from, to) in [(a, b), (b, c), (c, a)].map(|(from, to)| (place(from), place(to))) {
+                if from != to {
+                    let (edge, turn) = if from < to { ((from, to), 1) } else { ((to, from), -1) };
+                    *balance.entry(edge).or_default() += turn;
+                }
+            }
+        }
+        !balance.is_empty() && balance.values().all(|&turns| turns == 0)
     }
 
     /// Area of one side of a triangle, square metres; 0 where it overflows or a corner is missing.

@@ -69,8 +69,9 @@ impl Plant {
 
 /// Mean reflected and transmitted light over the texels that pass the alpha test.
 fn mean(material: &PlantMaterial) -> (Vec3, Vec3) {
-    let [reflected, transmitted] = mean_over_leaf(material, |color| [color, material.transmitted(color)]);
-    (reflected, transmitted)
+    let [reflected, derived] = mean_over_leaf(material, |color| [color, material.transmitted(color)]);
+    let given = material.leaf_textures.transmission.as_ref().map(|image| mean_texel(image, material).truncate());
+    (reflected, given.map_or(derived, |given| given.min(Vec3::ONE - reflected)))
 }
 
 /// Means of `values` of the base colour (0..1) over the texels that pass the alpha test; those of the plain base colour

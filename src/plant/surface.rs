@@ -3,7 +3,7 @@
 use std::sync::{Arc, LazyLock};
 
 use glam::{Vec2, Vec3};
-use image::RgbaImage;
+use image::{GrayImage, ImageBuffer, RgbaImage};
 
 use super::{PartKind, PlantPart};
 use crate::math::srgb_to_linear;
@@ -25,6 +25,8 @@ pub(crate) struct Surface {
     /// Base colour texture; `None` also where the image holds no texel.
     texture: Option<Arc<RgbaImage>>,
     factor: Vec3,
+    /// What comes through, where a texture says so.
+    transmission: Option<Arc<RgbaImage>>,
     /// The alpha test; `None` for opaque parts.
     test: Option<AlphaTest>,
 }
@@ -80,12 +82,13 @@ impl AlphaTest {
 impl Surface {
     /// The material of `part`.
     pub fn new(part: &PlantPart) -> Self {
-        let texture = part.material.base_color_texture.clone().filter(|image| image.width() > 0 && image.height() > 0);
+        let texture = filled(&part.material.base_color_texture);
         let test = texture
             .as_ref()
             .filter(|_| part.kind == PartKind::Foliage)
             .map(|image| AlphaTest::new(image, part.material.alpha_cutoff));
-        Self { texture, factor: part.material.base_color, test }
+        let transmission = filled(&part.material.leaf_textures.transmission);
+        Self { texture, factor: part.material.base_color, transmission, test }
     }
 
     /// Whether there is an alpha test that may fail.
@@ -96,7 +99,7 @@ impl Surface {
     /// Whether the surface is there at `uv`: the alpha test.
     pub fn passes(&self, uv: Vec2) -> bool {
         let (Some(image), Some(test)) = (&self.texture, &self.test) else { return true };
-        let Footprint { texels: [a, b, c, d], first: (x, y), right, down } = footprint(image, uv);
+        let Footprint { texels: [a, b, c, d], first: (x, y), right, down } = footprint(image.dimensions(), uv);
         match test.blocks[y / BLOCK * test.blocks_across + x / BLOCK] {
             Common::Covered => return true,
             Common::Empty => return false,
@@ -112,20 +115,72 @@ impl Surface {
     /// their alpha, so that a colour behind the outline never bleeds in.
     pub fn color(&self, uv: Vec2) -> Vec3 {
         let Some(image) = &self.texture else { return self.factor };
-        let Footprint { texels, right, down, .. } = footprint(image, uv);
-        let weights = [(1.0 - right) * (1.0 - down), right * (1.0 - down), (1.0 - right) * down, right * down];
-        let (mut sum, mut total) = (Vec3::ZERO, 0.0);
-        for (at, weight) in texels.into_iter().zip(weights) {
-            let weight = weight * self.test.as_ref().map_or(1.0, |test| f32::from(test.alphas[at]));
-            let code = |channel: usize| LINEAR[usize::from(image.as_raw()[4 * at + channel])];
-            sum += weight * Vec3::new(code(0), code(1), code(2));
-            total += weight;
-        }
-        if total > 0.0 { self.factor * sum / total } else { self.factor }
+        let alpha = |texel: usize| self.test.as_ref().map_or(1.0, |test| f32::from(test.alphas[texel]));
+        blend(image, uv, alpha).map_or(self.factor, |(sum, total)| self.factor * sum / total)
+    }
+
+    /// Linear colour of what comes through at `uv`, 0..=1, where a texture says so.
+    pub fn transmission(&self, uv: Vec2) -> Option<Vec3> {
+        Some(color_of(self.transmission.as_deref()?, uv))
     }
 }
 
-fn footprint(image: &RgbaImage, uv: Vec2) -> Footprint {
+/// An image that has texels.
+fn filled<T: image::Pixel>(
+    image: &Option<Arc<ImageBuffer<T, Vec<T::Subpixel>>>>,
+) -> Option<Arc<ImageBuffer<T, Vec<T::Subpixel>>>> {
+    image.clone().filter(|image| image.width() > 0 && image.height() > 0)
+}
+
+/// Linear colour of `image` at `uv`, its texels weighted by their alpha, so that colours beyond an outline do not bleed in. White
+/// where all are transparent. The image must have texels.
+pub(crate) fn color_of(image: &RgbaImage, uv: Vec2) -> Vec3 {
+    blend(image, uv, |texel| f32::from(image.as_raw()[4 * texel + 3])).map_or(Vec3::ONE, |(sum, total)| sum / total)
+}
+
+/// Value of `image` at `uv`, 0..=1. The image must have texels.
+pub(crate) fn value_of(image: &GrayImage, uv: Vec2) -> f32 {
+    filtered(image.dimensions(), uv, |texel| f32::from(image.as_raw()[texel]) / 255.0)
+}
+
+/// The values of the four texels around `uv`, filtered bilinearly.
+fn filtered(size: (u32, u32), uv: Vec2, value: impl Fn(usize) -> f32) -> f32 {
+    let Footprint { texels: [a, b, c, d], right, down, .. } = footprint(size, uv);
+    let (upper, lower) = (value(a) + right * (value(b) - value(a)), value(c) + right * (value(d) - value(c)));
+    upper + down * (lower - upper)
+}
+
+/// Alpha of `image` at `uv`, 0..=1. The image must have texels.
+pub(crate) fn alpha_of(image: &RgbaImage, uv: Vec2) -> f32 {
+    filtered(image.dimensions(), uv, |texel| f32::from(image.as_raw()[4 * texel + 3]) / 255.0)
+}
+
+/// The first three channels of `image` at `uv` as they are, 0..=1. The image must have texels.
+pub(crate) fn channels_of(image: &RgbaImage, uv: Vec2) -> Vec3 {
+    let Footprint { texels: [a, b, c, d], right, down, .. } = footprint(image.dimensions(), uv);
+    let texel = |at: usize| {
+        let texel = &image.as_raw()[4 * at..];
+        Vec3::new(f32::from(texel[0]), f32::from(texel[1]), f32::from(texel[2])) / 255.0
+    };
+    texel(a).lerp(texel(b), right).lerp(texel(c).lerp(texel(d), right), down)
+}
+
+/// The weighted sum of the linear colours of the four texels around `uv`, and the sum of the weights: those of bilinear filtering
+/// times `weight_of`. `None` where all are 0.
+fn blend(image: &RgbaImage, uv: Vec2, weight_of: impl Fn(usize) -> f32) -> Option<(Vec3, f32)> {
+    let Footprint { texels, right, down, .. } = footprint(image.dimensions(), uv);
+    let weights = [(1.0 - right) * (1.0 - down), right * (1.0 - down), (1.0 - right) * down, right * down];
+    let (mut sum, mut total) = (Vec3::ZERO, 0.0);
+    for (at, weight) in texels.into_iter().zip(weights) {
+        let weight = weight * weight_of(at);
+        let code = |channel: usize| LINEAR[usize::from(image.as_raw()[4 * at + channel])];
+        sum += weight * Vec3::new(code(0), code(1), code(2));
+        total += weight;
+    }
+    (total > 0.0).then_some((sum, total))
+}
+
+fn footprint((width, height): (u32, u32), uv: Vec2) -> Footprint {
     // Along one axis: the two texel indices and the weight of the second.
     let axis = |coordinate: f32, size: u32| {
         let wrapped = coordinate - floor(coordinate);
@@ -135,7 +190,6 @@ fn footprint(image: &RgbaImage, uv: Vec2) -> Footprint {
         let second = if first + 1 < size { first + 1 } else { 0 };
         (first as usize, second as usize, at - low)
     };
-    let (width, height) = image.dimensions();
     let (x0, x1, right) = axis(uv.x, width);
     let (y0, y1, down) = axis(uv.y, height);
     let (upper, lower) = (y0 * width as usize, y1 * width as usize);
@@ -188,7 +242,7 @@ mod tests {
             let surface = Surface::new(&leaf);
             for i in 0..4000u32 {
                 let uv = Vec2::new(i as f32 * 0.618_034, i as f32 * 0.381_966 * 0.07) - 3.0;
-                let Footprint { texels: [a, b, c, d], right, down, .. } = footprint(&image, uv);
+                let Footprint { texels: [a, b, c, d], right, down, .. } = footprint(image.dimensions(), uv);
                 let alpha = |texel: usize| f32::from(image.as_raw()[4 * texel + 3]);
                 let (upper, lower) =
                     (alpha(a) + right * (alpha(b) - alpha(a)), alpha(c) + right * (alpha(d) - alpha(c)));

@@ -16,6 +16,7 @@ use std::f32::consts::{PI, TAU};
 
 use glam::{Vec2, Vec3};
 
+use super::leaf::LeafView;
 use super::lobe::Lobe;
 use crate::plant::Gloss;
 
@@ -64,6 +65,8 @@ pub(crate) struct Bsdf {
     shares: Shares,
     /// About what the lobe returns to the viewer, summed over the channels; 0 without one.
     gloss: f32,
+    /// The tissue of a leaf with layers, which leaves the less of diffuse light the flatter it comes.
+    tissue: Option<LeafView>,
 }
 
 /// A direction that the surface scatters light from.
@@ -91,7 +94,23 @@ impl Bsdf {
         // A viewer behind the plane of an interpolated normal sees no facets; what they would send is lost.
         let cosine = shading.dot(to_viewer);
         let gloss = shares.lobe.filter(|_| cosine >= 0.0).map_or(0.0, |lobe| lobe.weight(cosine));
-        Self { geometric, shading, to_viewer, shares, gloss }
+        Self { geometric, shading, to_viewer, shares, gloss, tissue: None }
+    }
+
+    /// The same with the tissue of a leaf: `tissue` gets the cosine to the viewer, 0..=1.
+    pub fn with_tissue(self, tissue: impl FnOnce(f32) -> LeafView) -> Self {
+        let cosine = self.shading.dot(self.to_viewer).clamp(0.0, 1.0);
+        Self { tissue: Some(tissue(cosine)), ..self }
+    }
+
+    /// The tissue, the unit normal of the flat surface on the viewer's side, and the direction to the viewer.
+    pub fn tissue(&self) -> Option<(&LeafView, Vec3, Vec3)> {
+        self.tissue.as_ref().map(|tissue| (tissue, self.geometric, self.to_viewer))
+    }
+
+    /// Factor of the tissue on diffuse light from the cosine `cosine`, negative from behind.
+    fn tissue_factor(&self, cosine: f32) -> f32 {
+        self.tissue.as_ref().map_or(1.0, |tissue| tissue.factor(cosine.abs().min(1.0), cosine < 0.0))
     }
 
     /// The lobe, where the viewer sees it.
@@ -103,11 +122,11 @@ impl Bsdf {
     pub fn cosine_weighted(&self, direction: Vec3) -> Vec3 {
         let (flat, cosine) = (self.geometric.dot(direction), self.shading.dot(direction));
         if flat > 0.0 && cosine > 0.0 {
-            let diffuse = self.shares.reflected * (cosine / PI);
+            let diffuse = self.shares.reflected * (self.tissue_factor(cosine) * cosine / PI);
             let gloss = |lobe: &Lobe| lobe.cosine_weighted(self.shading, self.to_viewer, direction);
             self.lobe().map_or(diffuse, |lobe| diffuse + gloss(lobe))
         } else if flat < 0.0 && cosine < 0.0 {
-            self.shares.transmitted * (-cosine / PI)
+            self.shares.transmitted * (self.tissue_factor(cosine) * -cosine / PI)
         } else {
             Vec3::ZERO
         }
@@ -155,7 +174,8 @@ impl Bsdf {
         if side > 0.0 && self.lobe().is_some() {
             return self.mixed(direction);
         }
-        Some(Scattered { direction, weight: share / probability, density: probability * cosine / PI })
+        let weight = share * self.tissue_factor(side * cosine) / probability;
+        Some(Scattered { direction, weight, density: probability * cosine / PI })
     }
 
     /// A direction on the viewer's side that either the cosine or the lobe may have found.

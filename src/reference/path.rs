@@ -103,7 +103,7 @@ impl<'a> PathTracer<'a> {
                 }
                 throughput /= survival;
             }
-            let ray = self.scene.leave(&surface, scattered.direction);
+            let ray = self.leave(&surface, scattered.direction, sampler);
             let Some(found) = self.scene.closest(&ray) else {
                 let other = self.light.sky.density(scattered.direction);
                 let weight = scattered.density / (scattered.density + other);
@@ -123,19 +123,27 @@ impl<'a> PathTracer<'a> {
     /// Light straight from the key light's disc.
     fn key_light(&self, surface: &Surface, sampler: &mut PathSampler) -> Vec3 {
         let Some((direction, light)) = self.light.key(sampler.pair()) else { return Vec3::ZERO };
-        self.unless_occluded(surface, direction, light)
+        self.unless_occluded(surface, direction, light, sampler)
     }
 
     /// Light straight from the sky, in a direction drawn by its brightness.
     fn sky_light(&self, surface: &Surface, sampler: &mut PathSampler) -> Vec3 {
         let Some((direction, density)) = self.light.sky.sample(sampler.pair()) else { return Vec3::ZERO };
         let light = self.light.sky.radiance(direction) / (density + surface.bsdf.density(direction));
-        self.unless_occluded(surface, direction, light)
+        self.unless_occluded(surface, direction, light, sampler)
     }
 
-    fn unless_occluded(&self, surface: &Surface, direction: Vec3, light: Vec3) -> Vec3 {
+    fn unless_occluded(&self, surface: &Surface, direction: Vec3, light: Vec3, sampler: &mut PathSampler) -> Vec3 {
         let value = surface.bsdf.cosine_weighted(direction) * light;
-        let lit = value.max_element() > 0.0 && !self.scene.occluded(&self.scene.leave(surface, direction));
+        let lit = value.max_element() > 0.0 && !self.scene.occluded(&self.leave(surface, direction, sampler));
         if lit { value } else { Vec3::ZERO }
+    }
+
+    /// A ray that leaves the surface; from a leaf with layers it comes from one of the test points inside.
+    fn leave(&self, surface: &Surface, direction: Vec3, sampler: &mut PathSampler) -> WorldRay {
+        match surface.bsdf.tissue() {
+            Some(_) => self.scene.leave_leaf(surface, direction, sampler.pair().x),
+            None => self.scene.leave(surface, direction),
+        }
     }
 }

@@ -10,6 +10,7 @@ use super::bsdf::{Bsdf, Shares};
 use super::camera::WorldRay;
 use super::error::ReferenceError;
 use super::ground::{Crossing, GroundShape};
+use super::leaf::{LeafModel, PartLeaf};
 use super::soil::Soil;
 use crate::plant::{Gloss, PartKind, Plant};
 use crate::scatter::PackedStand;
@@ -107,22 +108,22 @@ pub enum Normals {
 
 /// An instance, ready for rays.
 #[derive(Clone, Copy, Debug)]
-struct Placed {
-    position: DVec3,
+pub(super) struct Placed {
+    pub(super) position: DVec3,
     /// Sine and cosine of the yaw.
     yaw_sin_cos: (f64, f64),
-    scale: f64,
+    pub(super) scale: f64,
     plant: u32,
     tint: f32,
 }
 
 impl Placed {
-    fn into_plant(self, v: DVec3) -> DVec3 {
+    pub(super) fn into_plant(self, v: DVec3) -> DVec3 {
         let (s, c) = self.yaw_sin_cos;
         DVec3::new(c * v.x - s * v.z, v.y, s * v.x + c * v.z)
     }
 
-    fn into_scene(self, v: DVec3) -> DVec3 {
+    pub(super) fn into_scene(self, v: DVec3) -> DVec3 {
         let (s, c) = self.yaw_sin_cos;
         DVec3::new(c * v.x + s * v.z, v.y, c * v.z - s * v.x)
     }
@@ -141,9 +142,12 @@ impl Placed {
 /// A scene that rays can be sent through.
 pub struct ReferenceScene {
     tracers: Vec<PlantTracer>,
+    /// For each plant, its parts that have leaves with layers; empty where no plant has.
+    leaves: Vec<Vec<Option<PartLeaf>>>,
+    model: LeafModel,
     /// For each plant, metres before its box from which rays are traced in its own frame, at scale 1.
     margins: Vec<f64>,
-    instances: Vec<Placed>,
+    pub(super) instances: Vec<Placed>,
     tree: BoxTree,
     ground: Option<Ground>,
 }
@@ -168,17 +172,28 @@ pub(crate) struct Surface {
     /// Scene metres.
     pub position: DVec3,
     pub bsdf: Bsdf,
-    anchor: Anchor,
+    pub(super) anchor: Anchor,
+}
+
+/// The body of a leaf with layers, under a point of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LeafBody {
+    /// Metres in the plant's frame.
+    pub thickness: f32,
+    /// Whether it is a closed volume, whose other side the mesh has.
+    pub volume: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Anchor {
+pub(super) enum Anchor {
     /// Point and flat normal in the plant's frame, where the point is exact but for `error` metres, if that is known.
     Plant {
         instance: usize,
         position: Vec3,
         normal: Vec3,
         error: Option<f32>,
+        /// Of a leaf with layers.
+        leaf: Option<LeafBody>,
     },
     Ground,
 }
@@ -226,7 +241,28 @@ impl ReferenceScene {
             tracer.bounds().map_or(0.0, |bounds| MARGIN * f64::from(bounds.size().max_element()))
         };
         let margins = tracers.iter().map(margin).collect();
-        Ok(Self { tracers, margins, tree: BoxTree::new(&boxes), instances: placed, ground })
+        let tree = BoxTree::new(&boxes);
+        Ok(Self { tracers, leaves: Vec::new(), model: LeafModel::Standard, margins, tree, instances: placed, ground })
+    }
+
+    /// The same with leaves that scatter light by `model`.
+    #[must_use]
+    pub fn with_leaves(mut self, model: LeafModel) -> Self {
+        let parts = |tracer: &PlantTracer| -> Vec<_> {
+            tracer.plant().parts.iter().map(|part| PartLeaf::new(part, model)).collect()
+        };
+        self.leaves = match model {
+            LeafModel::Standard => Vec::new(),
+            LeafModel::Layers | LeafModel::Published => self.tracers.par_iter().map(parts).collect(),
+        };
+        self.model = model;
+        self
+    }
+
+    /// The leaves of a part of an instance, if they have layers.
+    pub(super) fn leaf(&self, instance: usize, part: u32) -> Option<&PartLeaf> {
+        let plant = self.instances.get(instance)?.plant;
+        self.leaves.get(plant as usize)?.get(part as usize)?.as_ref()
     }
 
     /// Number of instances.
@@ -314,6 +350,9 @@ impl ReferenceScene {
                 let point = tracer.point(&hit);
                 let gloss = tracer.plant().parts.get(hit.part as usize)?.material.gloss;
                 let to_viewer = -direction.as_vec3();
+                if let Some(leaf) = self.leaf(instance, hit.part) {
+                    return Some(self.layered(leaf, instance, &hit, &point, normals, to_viewer));
+                }
                 Some(self.on_plant(instance, &point, normals, |placed, geometric, shading| {
                     Bsdf::new(geometric, shading, placed.shares(&point, gloss), to_viewer)
                 }))
@@ -322,7 +361,7 @@ impl ReferenceScene {
     }
 
     /// A surface of an instance at a point in the plant's frame; `bsdf` gets the normals in the scene's.
-    fn on_plant(
+    pub(super) fn on_plant(
         &self,
         instance: usize,
         point: &SurfacePoint,
@@ -346,6 +385,7 @@ impl ReferenceScene {
                 position: point.position,
                 normal: point.geometric_normal,
                 error: Some(point.error),
+                leaf: None,
             },
         }
     }
@@ -357,7 +397,7 @@ impl ReferenceScene {
         Some(Surface {
             position: placed.position + placed.into_scene(position.as_dvec3()) * placed.scale,
             bsdf: Bsdf::new(rotated, rotated, shares, rotated),
-            anchor: Anchor::Plant { instance, position, normal, error: None },
+            anchor: Anchor::Plant { instance, position, normal, error: None, leaf: None },
         })
     }
 
@@ -366,7 +406,7 @@ impl ReferenceScene {
         let direction = direction.as_dvec3().normalize_or(DVec3::Y);
         let origin = match surface.anchor {
             Anchor::Ground => self.ground.as_ref().map_or(surface.position, |g| g.shape.lifted(surface.position)),
-            Anchor::Plant { instance, position, normal, error } => {
+            Anchor::Plant { instance, position, normal, error, .. } => {
                 let placed = &self.instances[instance];
                 let local = placed.into_plant(direction).as_vec3();
                 let origin = match error {
@@ -386,7 +426,13 @@ impl ReferenceScene {
             // What no bake reads.
             for part in &tracer.plant().parts {
                 hasher.update(&part.material.gloss.roughness.to_le_bytes());
+                if self.model != LeafModel::Standard {
+                    part.material.feed_tissue(hasher);
+                }
             }
+        }
+        if self.model != LeafModel::Standard {
+            hasher.update(format!("{:?}", self.model).as_bytes());
         }
         for placed in &self.instances {
             let numbers =
@@ -417,7 +463,7 @@ impl ReferenceScene {
 
 impl Placed {
     /// What the point reflects and transmits: the twin of `tint_foliage` in `shaders/forest/instance.wgsl`.
-    fn shares(&self, point: &SurfacePoint, gloss: Gloss) -> Shares {
+    pub(super) fn shares(&self, point: &SurfacePoint, gloss: Gloss) -> Shares {
         let tint = match point.kind {
             PartKind::Wood => Vec3::ONE,
             PartKind::Foliage => Vec3::ONE + self.tint * Vec3::new(0.18, 0.07, -0.05),

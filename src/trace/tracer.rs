@@ -166,10 +166,14 @@ impl PlantTracer {
         let blended = (n0 * (1.0 - hit.u - hit.v) + n1 * hit.u + n2 * hit.v).normalize_or(geometric_normal);
         let shading_normal = if blended.dot(geometric_normal) < 0.0 { -blended } else { blended };
         let uv = uv + (uv1 - uv) * hit.u + (uv2 - uv) * hit.v;
-        let base_color = self.surfaces[hit.part as usize].color(uv);
+        let surface = &self.surfaces[hit.part as usize];
+        let base_color = surface.color(uv);
         let transmission = match part.kind {
             PartKind::Wood => Vec3::ZERO,
-            PartKind::Foliage => part.material.transmitted(base_color),
+            PartKind::Foliage => match surface.transmission(uv) {
+                Some(given) => given.min(Vec3::ONE - base_color.clamp(Vec3::ZERO, Vec3::ONE)),
+                None => part.material.transmitted(base_color),
+            },
         };
         SurfacePoint {
             position: a + (b - a) * hit.u + (c - a) * hit.v,

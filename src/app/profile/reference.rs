@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use super::{error::ProfileError, stages::Stages, views::ProfileView};
 use crate::{
-    app::{AppError, LightGroup, ReferenceOptions, RenderedImage, Renderer, View, adapter, reference as trace},
+    app::{
+        AppError, LeafModel, LightGroup, ReferenceOptions, RenderedImage, Renderer, View, adapter, reference as trace,
+    },
     measure::Picture,
     progress::Progress,
     scene::{LocalTime, Overrides, QualityLevel, Scene},
@@ -205,6 +207,7 @@ fn trace_all(
             samples,
             bounces: None,
             light: LightGroup::All,
+            leaf: LeafModel::Standard,
             fog: true,
             // An earlier trace of the same scene, light and camera is its cache.
             resume: true,

@@ -25,6 +25,8 @@ pub(super) enum Beside<'a> {
 /// A parsed file: the JSON part and access to its bytes.
 pub(super) struct Document<'a> {
     pub root: json::Root,
+    /// The extras of each material.
+    pub extras: Vec<Option<json::Value>>,
     beside: Beside<'a>,
     blob: Option<Vec<u8>>,
     /// The buffers that were read so far.
@@ -46,26 +48,42 @@ pub(super) fn open<'a>(
     beside: Beside<'a>,
     warnings: &mut Warnings,
 ) -> Result<Document<'a>, PlantError> {
-    let (root, blob) = read_root(bytes, path, warnings)?;
-    let buffers = vec![None; root.buffers.len()];
-    Ok(Document { root, beside, blob: blob.map(<[u8]>::to_vec), buffers, decoded: BTreeMap::new() })
+    let (text, blob) = split(bytes, path, warnings)?;
+    let root = parse(text, path)?;
+    let (buffers, extras) = (vec![None; root.buffers.len()], material_extras(text));
+    Ok(Document { root, extras, beside, blob: blob.map(<[u8]>::to_vec), buffers, decoded: BTreeMap::new() })
 }
 
-/// The JSON part of a file, and the binary chunk of GLB.
-fn read_root<'a>(
+/// The JSON text of a file, and the binary chunk of GLB.
+fn split<'a>(
     bytes: &'a [u8],
     path: &Path,
     warnings: &mut Warnings,
-) -> Result<(json::Root, Option<&'a [u8]>), PlantError> {
+) -> Result<(&'a [u8], Option<&'a [u8]>), PlantError> {
     let (text, blob) = if looks_binary(bytes, path) { split_glb(bytes, path, warnings)? } else { (bytes, None) };
-    let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
-    Ok((parse(text, path)?, blob))
+    Ok((text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text), blob))
+}
+
+/// The extras of each material. `json::Root` leaves them out: the feature that keeps them keeps those of everything.
+fn material_extras(text: &[u8]) -> Vec<Option<json::Value>> {
+    #[derive(serde::Deserialize)]
+    struct Extras {
+        extras: Option<json::Value>,
+    }
+    #[derive(serde::Deserialize)]
+    struct Materials {
+        #[serde(default)]
+        materials: Vec<Extras>,
+    }
+    let read = json::deserialize::from_slice::<Materials>(text);
+    read.map_or_else(|_| Vec::new(), |read| read.materials.into_iter().map(|material| material.extras).collect())
 }
 
 /// The external files that the `bytes` of `path` name for buffers and images, each once: relative paths with forward
 /// slashes, as written.
 pub(super) fn external_files(bytes: &[u8], path: &Path) -> Result<Vec<String>, PlantError> {
-    let (root, _) = read_root(bytes, path, &mut Warnings::default())?;
+    let (text, _) = split(bytes, path, &mut Warnings::default())?;
+    let root = parse(text, path)?;
     let buffers = root.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
     let images =
         root.images.iter().filter(|image| image.buffer_view.is_none()).filter_map(|image| image.uri.as_deref());

@@ -9,20 +9,27 @@
 //!  reflected = (1 - f) base colour        transmitted = f c
 //! ```
 //!
-//! The material of a plant has one factor per channel for transmitted light, relative to what the inside of the leaf
-//! reflects ([`PlantMaterial::transmission`]). So `f` and `c` are averaged over the leaf, and the factor is chosen so
-//! that the leaf transmits `f c` on average. The base colour then decides where on the leaf more light passes, and
-//! where less. If the base colour leaves no room for so much light, less is transmitted, and a warning says how much.
+//! Where one of them is a texture, their product becomes the texture of transmitted light
+//! ([`LeafTextures::transmission`](crate::plant::LeafTextures::transmission)). The material of a plant also has one factor per
+//! channel, relative to what the inside of the leaf reflects ([`PlantMaterial::transmission`]), which far levels of detail
+//! use: it is chosen so that the leaf transmits `f c` on average. Without textures the base colour decides where on the
+//! leaf more light passes, and where less. `1 - f` is the mean over the leaf. If the base colour leaves no room for so
+//! much light, less is transmitted, and a warning says how much.
 
-use glam::Vec3;
+use std::sync::Arc;
+
+use glam::{Vec2, Vec3};
 use gltf::json::Value;
 use gltf::json::material::Material;
 use gltf::json::texture::Info;
+use image::{Rgba, RgbaImage};
 use serde::Deserialize;
 
 use super::error::{WarningKind, Warnings};
+use crate::math::linear_to_srgb;
 use crate::plant::PlantMaterial;
 use crate::plant::optics::{mean_over_leaf, mean_texel};
+use crate::plant::surface::{alpha_of, color_of};
 
 /// The name of the extension.
 pub(super) const NAME: &str = "KHR_materials_diffuse_transmission";
@@ -51,6 +58,25 @@ impl Default for DiffuseTransmission {
 }
 
 impl DiffuseTransmission {
+    /// What comes through at every texel, as large as the larger of the two textures; `None` where neither has texels.
+    fn product(&self, factor: Option<&RgbaImage>, color: Option<&RgbaImage>) -> Option<RgbaImage> {
+        let filled =
+            |image: Option<&'_ RgbaImage>| image.filter(|image| image.width() > 0 && image.height() > 0).cloned();
+        let (factor, color) = (filled(factor), filled(color));
+        let sizes = [&factor, &color].into_iter().flatten().map(RgbaImage::dimensions);
+        let (width, height) = sizes.max_by_key(|(width, height)| u64::from(*width) * u64::from(*height))?;
+        let share = |value: f32| if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) };
+        let (share_of_all, tint) = (share(self.factor), Vec3::from(self.color.map(share)));
+        Some(RgbaImage::from_fn(width, height, |x, y| {
+            let uv = Vec2::new((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
+            let passed = share_of_all * factor.as_ref().map_or(1.0, |image| alpha_of(image, uv));
+            let color = tint * color.as_ref().map_or(Vec3::ONE, |image| color_of(image, uv));
+            let code = |value: f32| (255.0 * linear_to_srgb(value.clamp(0.0, 1.0)) + 0.5) as u8;
+            let [r, g, b] = (passed * color).to_array().map(code);
+            Rgba([r, g, b, 255])
+        }))
+    }
+
     /// The extension of `material`; `None` if there is none, or, with a warning, if it cannot be read.
     pub fn of(material: &Material, location: &str, warnings: &mut Warnings) -> Option<Self> {
         let value: &Value = material.extensions.as_ref()?.others.get(NAME)?;
@@ -75,7 +101,7 @@ impl DiffuseTransmission {
     pub fn apply(
         &self,
         material: &mut PlantMaterial,
-        [factor_texture, color_texture]: [Option<&image::RgbaImage>; 2],
+        [factor_texture, color_texture]: [Option<&RgbaImage>; 2],
         location: &str,
         warnings: &mut Warnings,
     ) {
@@ -88,14 +114,8 @@ impl DiffuseTransmission {
         if let Some(image) = color_texture {
             color *= mean_texel(image, material).truncate();
         }
-        if factor_texture.is_some() || color_texture.is_some() {
-            let [r, g, b] = color.to_array();
-            let message = format!(
-                "its textures of transmitted light are used as their means over the leaf: \
-                 {factor:.3} of the light passes, with the colour {r:.3} {g:.3} {b:.3}"
-            );
-            warnings.push(WarningKind::Ignored, location, message);
-        }
+        let textured = self.product(factor_texture, color_texture);
+        material.leaf_textures.transmission = textured.map(Arc::new);
 
         material.base_color *= 1.0 - factor;
         let wanted = factor * color;

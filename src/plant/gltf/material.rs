@@ -13,6 +13,7 @@ use super::GltfOptions;
 use super::container::Document;
 use super::diffuse_transmission::DiffuseTransmission;
 use super::error::{WarningKind, Warnings};
+use super::leaf_extras::{self, LeafExtras};
 use crate::plant::{Gloss, PartKind, PlantMaterial};
 
 /// Maximum side of an image in texels. Larger images are not decoded.
@@ -159,6 +160,33 @@ pub(super) fn read(
             surface.uv_set = own.uv_set;
             surface.uv_transform = own.transform;
             surface.material.normal_texture = load(document, own.texture, &location, "normal", images, warnings);
+        }
+    }
+    if kind == PartKind::Foliage {
+        let extras = index.and_then(|index| document.extras.get(index)).and_then(Option::as_ref).cloned();
+        if let Some(leaf) = LeafExtras::of(extras.as_ref(), &location, warnings) {
+            let mut image = |texture: Option<leaf_extras::Texture>, role: &str| {
+                texture.and_then(|texture| load(document, texture.index, &location, role, images, warnings))
+            };
+            let thickness = image(leaf.thickness_texture, "thickness");
+            let absorption = image(leaf.absorption_texture, "absorption");
+            let back = match (leaf.back_texture, leaf.back_material) {
+                (Some(texture), _) => image(Some(texture), "back"),
+                (None, Some(material)) => {
+                    let material = document.root.materials.get(material);
+                    let base =
+                        material.and_then(|material| material.pbr_metallic_roughness.base_color_texture.as_ref());
+                    let texture = base.map(|base| leaf_extras::Texture { index: base.index.value() });
+                    if texture.is_none() {
+                        let message =
+                            "the material of its back does not exist or has no texture; the back is as the front";
+                        warnings.push(WarningKind::Missing, &location, message);
+                    }
+                    texture.and_then(|texture| load(document, texture.index, &location, "back", images, warnings))
+                }
+                (None, None) => None,
+            };
+            leaf.apply(&mut surface.material, [back, thickness, absorption], &location, warnings);
         }
     }
     surface

@@ -4,7 +4,7 @@
 //! files. The reader uses the triangles of the default scene with position, normal and one set of texture coordinates;
 //! base colour (factor and texture), normal texture, alpha mode and cutoff; vertex colours; skins and morph targets as they
 //! stand at rest; KHR_texture_transform, KHR_materials_pbrSpecularGlossiness (its diffuse part),
-//! KHR_materials_diffuse_transmission (the averages of its textures over the leaf), KHR_mesh_quantization,
+//! KHR_materials_diffuse_transmission, the tissue of leaves in extras (`leaf_extras.rs`), KHR_mesh_quantization,
 //! EXT_meshopt_compression, EXT_mesh_gpu_instancing, EXT_texture_webp and MSFT_lod (its finest level). Coarser levels, collision
 //! hulls and ground planes are told by their names and left out; a tree whose z axis points up is turned upright. A
 //! [`Warning`] names everything else.
@@ -14,10 +14,12 @@
 //! [`PlantError`]. Anything else (a missing texture, a broken normal) is repaired or omitted, with a warning.
 
 mod accessor;
+mod back_faces;
 mod container;
 mod diffuse_transmission;
 mod error;
 mod instancing;
+mod leaf_extras;
 mod material;
 mod meshopt;
 mod nodes;
@@ -146,6 +148,7 @@ fn read_plant(
     check_extensions(&document.root, path, &mut warnings)?;
     let mut gathered = gather(&mut document, options, &mut warnings).map_err(|fault| fault.into_error(path))?;
     gathered.retain(|(_, mesh)| !mesh.triangles.is_empty());
+    back_faces::join(&mut gathered, &mut warnings);
     if gathered.is_empty() {
         let root = &document.root;
         let scanned = format!("{} scenes, {} nodes, {} meshes", root.scenes.len(), root.nodes.len(), root.meshes.len());
@@ -157,7 +160,14 @@ fn read_plant(
     let mut plant = Plant { name: options.name.clone().unwrap_or(stem), parts: Vec::new() };
     gathered.sort_by_key(|(surface, _)| surface.kind == PartKind::Foliage);
     for (surface, mesh) in gathered {
-        plant.parts.push(PlantPart { kind: surface.kind, mesh, material: surface.material });
+        let mut material = surface.material;
+        if material.tissue.volume && !mesh.is_closed() {
+            material.tissue.volume = false;
+            let message =
+                format!("'{}' is no closed volume: edges are open; its leaves are drawn as planes", surface.name);
+            warnings.push(WarningKind::Repaired, "", message);
+        }
+        plant.parts.push(PlantPart { kind: surface.kind, mesh, material });
     }
     mention_absent_kind(&plant, &mut warnings);
     stand(&mut plant, options, &mut warnings).map_err(|fault| fault.into_error(path))?;

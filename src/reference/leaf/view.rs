@@ -1,0 +1,61 @@
+//! A point of a leaf with layers, seen from somewhere.
+
+use glam::Vec3;
+
+use super::layers::Layers;
+
+/// Height over the shift along the surface by which the start of a ray is raised, so that a curved leaf does not shade
+/// itself: its triangles may meet at up to this slope.
+const RAISED: f32 = 0.25;
+
+/// The tissue under a point of a leaf, on the viewer's side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct LeafView {
+    layers: Layers,
+    optical_depth: f32,
+    /// Cosines of the view ray in the layers.
+    view: [f32; 3],
+    /// What is left of perpendicular light from before and from behind; above 0.
+    perpendicular: [f32; 2],
+}
+
+impl LeafView {
+    /// Tissue of an optical depth, seen at the cosine `to_viewer`, 0..=1.
+    pub fn new(layers: Layers, optical_depth: f32, to_viewer: f32) -> Self {
+        let least = f32::MIN_POSITIVE;
+        let perpendicular = [false, true].map(|behind| layers.perpendicular(optical_depth, behind).max(least));
+        Self { layers, optical_depth, view: layers.view(to_viewer), perpendicular }
+    }
+
+    /// Factor on the light from the cosine `light`, 0..=1, over that on perpendicular light seen perpendicularly: 0..=1.
+    pub fn factor(&self, light: f32, behind: bool) -> f32 {
+        let left = self.layers.attenuation(self.optical_depth, self.view, light, behind);
+        (left / self.perpendicular[usize::from(behind)]).min(1.0)
+    }
+
+    /// Where a ray in `direction` leaves the leaf that comes from a test point, relative to the point that is seen.
+    /// `normal` is on the viewer's side, `thickness` in metres, and `choice`, 0..1, picks the point.
+    pub fn exit(&self, normal: Vec3, to_viewer: Vec3, direction: Vec3, thickness: f32, choice: f32) -> Exit {
+        let cosine = normal.dot(direction);
+        let behind = cosine < 0.0;
+        let point = self.layers.point(self.optical_depth, self.view, cosine.abs().min(1.0), behind, choice);
+        let away = -(to_viewer - normal * normal.dot(to_viewer)).normalize_or_zero();
+        let inside = thickness * (away * point.lateral - normal * point.depth);
+        let rest = if behind { 1.0 - point.depth } else { point.depth };
+        let outside = inside + direction * (thickness * rest / cosine.abs().max(super::layers::LEAST_COSINE));
+        let shift = (outside - normal * normal.dot(outside)).length();
+        // On the plane exactly, whatever was clamped.
+        let height = if behind { -thickness - RAISED * shift } else { RAISED * shift };
+        let plane = outside - normal * normal.dot(outside);
+        Exit { inside, outside: plane + normal * height }
+    }
+}
+
+/// Where a ray comes from that leaves a leaf: offsets in metres from the point that is seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Exit {
+    /// Of the test point.
+    pub inside: Vec3,
+    /// Of the point where it leaves a leaf that is a plane.
+    pub outside: Vec3,
+}
