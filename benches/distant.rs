@@ -139,7 +139,7 @@ fn trace(arguments: &Arguments, case: &Case, samples: u32, out: &Path) -> anyhow
         samples,
         bounces: None,
         light: LightGroup::All,
-        leaf: LeafModel::Standard,
+        leaf: LeafModel::default(),
         fog: true,
         resume: true,
         overrides: Overrides::default(),

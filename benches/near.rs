@@ -177,7 +177,7 @@ fn trace(arguments: &Arguments, scene: &Scene, at: LocalTime, out: &Path) -> any
         samples: arguments.spp,
         bounces: None,
         light: LightGroup::All,
-        leaf: LeafModel::Standard,
+        leaf: LeafModel::default(),
         fog: true,
         resume: false,
         overrides: Overrides { lighting: Some(canopy::scene::Lighting::Local), ..Overrides::default() },

@@ -13,6 +13,7 @@ mod implicit;
 mod interrupts;
 mod inventory;
 mod layering;
+mod leaf;
 mod library;
 mod light;
 mod limits;

@@ -64,8 +64,11 @@ pub fn bake_plant(plant: Arc<Plant>, settings: &BakeSettings, cache: Option<&Cac
 
 /// The bake, and why a texture of it could not be stored.
 fn bake_fresh(plant: Arc<Plant>, settings: &BakeSettings, cache: Option<&Cache>) -> (BakedPlant, Option<BakeError>) {
-    let lighting = Arc::new(BakedLighting::bake(&plant, &settings.lighting));
-    let levels = bake_levels(&plant, &lighting, settings);
+    // Light between leaves, and levels that show no single leaf, know leaves in the mean over their angles.
+    let averaged = plant.without_layers().map(Arc::new);
+    let seen = averaged.as_ref().unwrap_or(&plant);
+    let lighting = Arc::new(BakedLighting::bake(seen, &settings.lighting));
+    let levels = bake_levels(seen, &lighting, settings);
     let (textures, not_stored) = if settings.representations.iter().any(|listed| needs_textures(*listed)) {
         PlantTextures::new(&plant, cache)
     } else {

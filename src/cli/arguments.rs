@@ -264,9 +264,8 @@ pub struct Reference {
     /// Light sources to include: the sun (or moon) alone, the sky alone, or all.
     #[arg(long, value_enum, default_value_t = LightChoice::All)]
     pub light: LightChoice,
-    /// How leaves scatter light: the standard model of the renderer, the layers of their tissue, or the layers as the thesis
-    /// prints them.
-    #[arg(long, value_enum, default_value_t = LeafChoice::Standard)]
+    /// How leaves scatter light.
+    #[arg(long, value_enum, default_value_t = LeafChoice::Species)]
     pub leaf: LeafChoice,
     /// Leave out the renderer's fog.
     #[arg(long)]
@@ -290,11 +289,13 @@ pub enum LightChoice {
 /// How leaves scatter light in a ground truth render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum LeafChoice {
+    /// As the renderer: by layers where a species has a tissue, otherwise by the standard model.
+    Species,
     /// By front and transmission, the same from every angle.
     Standard,
-    /// By the layers of the tissue, with all textures of the leaf.
+    /// All by the layers of their tissue, with all textures of the leaf.
     Layers,
-    /// By the layers with the printed formulas of [Franzke 2005].
+    /// All by the layers with the printed formulas of [Franzke 2005].
     Published,
 }
 

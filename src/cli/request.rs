@@ -100,6 +100,7 @@ pub fn reference_options(reference: Reference, common: &Common) -> Result<Refere
             LightChoice::Sky => LightGroup::Sky,
         },
         leaf: match reference.leaf {
+            LeafChoice::Species => LeafModel::Species,
             LeafChoice::Standard => LeafModel::Standard,
             LeafChoice::Layers => LeafModel::Layers,
             LeafChoice::Published => LeafModel::Published,

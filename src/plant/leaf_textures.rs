@@ -213,3 +213,29 @@ impl LeafTextures {
         if self.thickness.is_some() || self.absorption.is_some() { Measured::Leaf } else { Measured::Texel }
     }
 }
+
+/// The transmission with the factor of the tissue on perpendicular light, where textures of thickness or absorption tell
+/// one place from another and the colours do not contain it; `None` elsewhere.
+pub(crate) fn attenuated_transmission(material: &PlantMaterial, tissue: &LeafTissue) -> Option<RgbaImage> {
+    if tissue.measured == Measured::Texel {
+        return None;
+    }
+    let filled = |image: &Option<Arc<GrayImage>>| image.clone().filter(|image| image.width() > 0 && image.height() > 0);
+    let textures = &material.leaf_textures;
+    let [thickness, absorption] = [filled(&textures.thickness), filled(&textures.absorption)];
+    let sizes = [thickness.as_ref(), absorption.as_ref()].into_iter().flatten().map(|image| image.dimensions());
+    let (width, height) =
+        sizes.chain(size_of(material)).max_by_key(|(width, height)| u64::from(*width) * u64::from(*height))?;
+    let mean = match tissue.measured {
+        Measured::Nothing => 0.0,
+        _ => mean_optical_depth(tissue, material, [thickness.as_deref(), absorption.as_deref()]),
+    };
+    let value = |image: &Option<Arc<GrayImage>>, uv: Vec2| image.as_deref().map_or(EVEN, |image| value_of(image, uv));
+    Some(RgbaImage::from_fn(width, height, |x, y| {
+        let uv = center((x, y), (width, height));
+        let depth = tissue.optical_depth(value(&thickness, uv), value(&absorption, uv));
+        let through = transmission_at(material, uv) * (mean - depth).exp();
+        let [r, g, b] = through.to_array().map(|value| code(linear_to_srgb(value.clamp(0.0, 1.0))));
+        Rgba([r, g, b, 255])
+    }))
+}

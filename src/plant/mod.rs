@@ -14,6 +14,7 @@ mod optics;
 pub(crate) mod surface;
 pub mod texture;
 mod tissue;
+pub mod tissue_light;
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -128,8 +129,9 @@ pub struct PlantMaterial {
     pub gloss: Gloss,
     /// Further textures of the leaf; none for wood.
     pub leaf_textures: LeafTextures,
-    /// The leaf's tissue, for the layered model.
-    pub tissue: LeafTissue,
+    /// The leaf's tissue. With one, leaves are drawn and traced by the layers of [Franzke 2005, 3.2]; without, light leaves them
+    /// the same at every angle.
+    pub tissue: Option<LeafTissue>,
 }
 
 impl PlantMaterial {
@@ -148,7 +150,7 @@ impl Default for PlantMaterial {
             transmission: Vec3::ZERO,
             gloss: Gloss::MATT,
             leaf_textures: LeafTextures::default(),
-            tissue: LeafTissue::default(),
+            tissue: None,
         }
     }
 }

@@ -253,7 +253,7 @@ impl ReferenceScene {
         };
         self.leaves = match model {
             LeafModel::Standard => Vec::new(),
-            LeafModel::Layers | LeafModel::Published => self.tracers.par_iter().map(parts).collect(),
+            _ => self.tracers.par_iter().map(parts).collect(),
         };
         self.model = model;
         self
@@ -426,13 +426,13 @@ impl ReferenceScene {
             // What no bake reads.
             for part in &tracer.plant().parts {
                 hasher.update(&part.material.gloss.roughness.to_le_bytes());
-                if self.model != LeafModel::Standard {
-                    part.material.feed_tissue(hasher);
-                }
             }
         }
-        if self.model != LeafModel::Standard {
+        // A scene that no leaf has layers in is the same whatever the model.
+        if self.leaves.iter().flatten().any(Option::is_some) {
             hasher.update(format!("{:?}", self.model).as_bytes());
+            let parts = self.tracers.iter().flat_map(|tracer| &tracer.plant().parts);
+            parts.for_each(|part| part.material.feed_tissue(hasher));
         }
         for placed in &self.instances {
             let numbers =

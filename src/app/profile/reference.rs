@@ -207,7 +207,7 @@ fn trace_all(
             samples,
             bounces: None,
             light: LightGroup::All,
-            leaf: LeafModel::Standard,
+            leaf: LeafModel::default(),
             fog: true,
             // An earlier trace of the same scene, light and camera is its cache.
             resume: true,

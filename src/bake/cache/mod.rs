@@ -51,6 +51,8 @@ impl CacheKey {
         hasher.update(&(settings.len() as u64).to_le_bytes());
         hasher.update(&settings);
         plant.feed_baked_content(&mut hasher);
+        let layered = plant.parts.iter().filter(|part| part.material.tissue.is_some());
+        layered.for_each(|part| part.material.feed_tissue(&mut hasher));
         Self { hash: *hasher.finalize().as_bytes(), representations }
     }
 

@@ -25,6 +25,10 @@ pub struct PartTextures {
     pub color: Option<Arc<FilteredTexture>>,
     /// The normal map; `None` without one.
     pub normals: Option<Arc<FilteredTexture>>,
+    /// The colour of the back of leaves; `None` where it is that of the front.
+    pub back: Option<Arc<FilteredTexture>>,
+    /// What comes through leaves; `None` where it follows from the front.
+    pub transmission: Option<Arc<FilteredTexture>>,
 }
 
 /// The textures of a plant's full model, one entry for each part. Empty where they were not asked for.
@@ -36,7 +40,8 @@ impl PlantTextures {
     /// and stored in `cache`. The result is the same wherever it comes from. The error says why one could not be
     /// stored.
     pub fn new(plant: &Plant, cache: Option<&Cache>) -> (Self, Option<BakeError>) {
-        let jobs: Vec<(Arc<RgbaImage>, TextureUse)> = plant.parts.iter().flat_map(images).collect();
+        let images: Vec<PartImages> = plant.parts.iter().map(PartImages::of).collect();
+        let jobs: Vec<(Arc<RgbaImage>, TextureUse)> = images.iter().flat_map(PartImages::jobs).collect();
         let made: Vec<_> = jobs
             .par_iter()
             .map(|(image, usage)| shared(TextureKey::new(image, *usage), image, *usage, cache))
@@ -47,11 +52,11 @@ impl PlantTextures {
             error = error.take().or(failed);
             Some(texture)
         };
-        let part = |part: &PlantPart| PartTextures {
-            color: next(part.material.base_color_texture.is_some()),
-            normals: next(part.material.normal_texture.is_some()),
+        let part = |images: &PartImages| {
+            let [color, normals, back, transmission] = [0, 1, 2, 3].map(|role| next(images.0[role].is_some()));
+            PartTextures { color, normals, back, transmission }
         };
-        let textures = Self(plant.parts.iter().map(part).collect());
+        let textures = Self(images.iter().map(part).collect());
         (textures, error)
     }
 }
@@ -62,24 +67,41 @@ pub fn filter_together<'a>(
     plants: impl IntoIterator<Item = &'a Plant>,
     cache: Option<&Cache>,
 ) -> Vec<Arc<FilteredTexture>> {
-    let mut jobs: Vec<_> = plants.into_iter().flat_map(|plant| plant.parts.iter().flat_map(images)).collect();
+    let images = |plant: &'a Plant| plant.parts.iter().map(PartImages::of);
+    let mut jobs: Vec<_> =
+        plants.into_iter().flat_map(images).flat_map(|images| images.jobs().collect::<Vec<_>>()).collect();
     jobs.dedup_by(|(a, of_a), (b, of_b)| Arc::ptr_eq(a, b) && of_a == of_b);
     let keys: Vec<TextureKey> = jobs.par_iter().map(|(image, usage)| TextureKey::new(image, *usage)).collect();
     let unique: HashMap<TextureKey, (Arc<RgbaImage>, TextureUse)> = keys.into_iter().zip(jobs).collect();
     unique.par_iter().map(|(key, (image, usage))| shared(*key, image, *usage, cache).0).collect()
 }
 
-/// The images of a part with their use: base colour, normals.
-fn images(part: &PlantPart) -> impl Iterator<Item = (Arc<RgbaImage>, TextureUse)> + use<> {
-    let material = &part.material;
-    let color = match part.kind {
-        PartKind::Wood => TextureUse::Color,
-        PartKind::Foliage => TextureUse::Leaf { cutoff: material.alpha_cutoff },
-    };
-    let with = |image: &Option<Arc<RgbaImage>>, usage| image.clone().map(|image| (image, usage));
-    [with(&material.base_color_texture, color), with(&material.normal_texture, TextureUse::Normals)]
-        .into_iter()
-        .flatten()
+/// The images of a part with their use: base colour, normals, back, transmission.
+struct PartImages([Option<(Arc<RgbaImage>, TextureUse)>; 4]);
+
+impl PartImages {
+    fn of(part: &PlantPart) -> Self {
+        let material = &part.material;
+        let foliage = part.kind == PartKind::Foliage;
+        let color = if foliage { TextureUse::Leaf { cutoff: material.alpha_cutoff } } else { TextureUse::Color };
+        let with = |image: &Option<Arc<RgbaImage>>, usage| image.clone().map(|image| (image, usage));
+        // Without a tissue the given image itself, so that plants share it.
+        let through = match (&material.tissue, &material.leaf_textures.transmission) {
+            (None, given) => given.clone(),
+            _ => material.light_through().map(Arc::new),
+        };
+        let leaf = |image: &Option<Arc<RgbaImage>>| with(image, TextureUse::Color).filter(|_| foliage);
+        Self([
+            with(&material.base_color_texture, color),
+            with(&material.normal_texture, TextureUse::Normals),
+            leaf(&material.leaf_textures.back),
+            leaf(&through),
+        ])
+    }
+
+    fn jobs(&self) -> impl Iterator<Item = (Arc<RgbaImage>, TextureUse)> + '_ {
+        self.0.iter().flatten().cloned()
+    }
 }
 
 /// The textures that are in use somewhere in the process.

@@ -87,9 +87,10 @@ impl LeafExtras {
             measured: self.measured.unwrap_or_else(|| material.leaf_textures.measured()),
             volume: self.volume,
         };
-        material.tissue = stated.sanitized();
-        let scaled = |tissue: LeafTissue| LeafTissue { layers: usual.layers, ..tissue };
-        if scaled(material.tissue) != scaled(stated) {
+        let possible = stated.sanitized();
+        material.tissue = Some(possible);
+        // The layers may be scaled to a sum of 1.
+        if (LeafTissue { layers: stated.layers, ..possible }) != stated {
             let message = format!("its extras' {NAME} has values that no leaf has; the nearest possible ones are used");
             warnings.push(WarningKind::Repaired, location, message);
         }

@@ -161,8 +161,10 @@ fn read_plant(
     gathered.sort_by_key(|(surface, _)| surface.kind == PartKind::Foliage);
     for (surface, mesh) in gathered {
         let mut material = surface.material;
-        if material.tissue.volume && !mesh.is_closed() {
-            material.tissue.volume = false;
+        if let Some(tissue) = material.tissue.as_mut().filter(|tissue| tissue.volume)
+            && !mesh.is_closed()
+        {
+            tissue.volume = false;
             let message =
                 format!("'{}' is no closed volume: edges are open; its leaves are drawn as planes", surface.name);
             warnings.push(WarningKind::Repaired, "", message);

@@ -13,7 +13,7 @@
 //!
 //! # Cost
 //! Three sums of eight exponentials for each surface of a path, where a leaf is; `docs/measurements/leaves.md` has the
-//! times. Species are drawn by the standard model unless [`LeafModel::Layers`] is asked for, and pay nothing then.
+//! times. A species without a tissue is traced by the standard model and pays nothing.
 //!
 //! # Limits
 //! - Rays to the light have the direction of the light outside (the thesis allows itself that error).
@@ -32,10 +32,12 @@ pub(crate) use view::LeafView;
 /// How leaves scatter light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum LeafModel {
-    /// By the front and the transmission alone, the same from every angle and on both sides.
+    /// As their material says: by layers where it has a tissue, otherwise by the standard model. The renderer does the same.
     #[default]
+    Species,
+    /// By the front and the transmission alone, the same from every angle and on both sides.
     Standard,
-    /// By the layers of their tissue, with all textures.
+    /// By the layers of their tissue, with all textures; where the material has no tissue, by those of a usual leaf.
     Layers,
     /// The same as the thesis prints it: the light's way is that through one medium (eq. 3.5), all test points have equal
     /// weights, the absorption texture is the luminance of the transmission, and colours are attenuated whatever they were measured

@@ -33,14 +33,17 @@ fn filled<T>(image: &Option<Arc<T>>, size: impl Fn(&T) -> (u32, u32)) -> Option<
 }
 
 impl PartLeaf {
-    /// The leaves of `part` by `model`; `None` for wood, and where the standard model does.
+    /// The leaves of `part` by `model`; `None` for wood, and where the standard model is enough.
     pub fn new(part: &PlantPart, model: LeafModel) -> Option<Self> {
-        if part.kind == PartKind::Wood || model == LeafModel::Standard {
-            return None;
-        }
-        let published = model == LeafModel::Published;
         let material = &part.material;
-        let tissue = material.tissue.sanitized();
+        let tissue = match model {
+            _ if part.kind == PartKind::Wood => None,
+            LeafModel::Standard => None,
+            LeafModel::Species => material.tissue,
+            LeafModel::Layers | LeafModel::Published => Some(material.tissue.unwrap_or_default()),
+        };
+        let tissue = tissue?.sanitized();
+        let published = model == LeafModel::Published;
         let textures = &material.leaf_textures;
         let [mut thickness, mut absorption] =
             [&textures.thickness, &textures.absorption].map(|image| filled(image, |image| image.dimensions()));
