@@ -38,6 +38,7 @@ fn run(arguments: Arguments) -> Outcome {
                 Err(error) => Outcome::Usage(error),
             },
         },
+        Some(Command::Leaf(leaf)) => complete_leaf(&cli::leaf_options(leaf, &common)).into(),
         Some(Command::Compare(compare)) => match cli::compare_options(&compare) {
             Ok(options) => compare_images(&options, &compare, common.quiet).into(),
             Err(error) => Outcome::Usage(error),
@@ -96,6 +97,18 @@ fn bake_levels(options: &canopy::app::BakeOptions) -> anyhow::Result<()> {
         return Ok(());
     }
     cli::print_lines([options.out.display()])
+}
+
+fn complete_leaf(options: &canopy::app::LeafOptions) -> anyhow::Result<()> {
+    canopy::app::listen_to_interrupts()?;
+    let mut bars = Bars::new(options.quiet);
+    let report = canopy::app::leaf(options, &mut bars)?;
+    drop(bars);
+    if options.quiet {
+        return Ok(());
+    }
+    cli::print_lines(report.lines)?;
+    cli::print_lines(report.files.iter().map(|file| file.display()))
 }
 
 fn compare_images(options: &canopy::app::CompareOptions, arguments: &cli::Compare, quiet: bool) -> anyhow::Result<()> {

@@ -291,7 +291,13 @@ fn gpu_structs_are_what_the_shaders_think() {
             ambient_term,
             lobe_gain,
             lobe_limit,
-            cover_weight
+            cover_weight,
+            optical_depth,
+            shares,
+            inverse_squares,
+            perpendicular,
+            sky_before,
+            sky_behind
         }
     );
     twin!(

@@ -7,6 +7,10 @@
 #import canopy::stand::{StandLight, stand_light, trunk_light}
 #import canopy::sun_visibility::{sample_ground, terrain_visibility, cascaded_visibility, LeafSample, cascaded_leaf_visibility}
 
+#ifdef LAYERED
+#import canopy::lighting::key_light
+#import canopy::tissue::{Tissue, tissue_light, tissue_sky}
+#endif
 #ifdef STYLED
 #import canopy::constants::WOOD_LAYER
 #import canopy::style_surface::{StyledSurface, styled_surface, crown_surface, individual}
@@ -32,12 +36,23 @@ struct Part {
     lobe_gain: f32,
     lobe_limit: f32,
     cover_weight: f32,
+    // Of leaves with layers: the members of `Tissue`.
+    optical_depth: f32,
+    shares: vec3<f32>,
+    inverse_squares: vec3<f32>,
+    perpendicular: vec2<f32>,
+    sky_before: vec3<f32>,
+    sky_behind: vec3<f32>,
 }
 
 @group(2) @binding(0) var color_texture: texture_2d<f32>;
 @group(2) @binding(1) var normal_texture: texture_2d<f32>;
 @group(2) @binding(2) var part_sampler: sampler;
 @group(2) @binding(3) var<uniform> part: Part;
+#ifdef LAYERED
+@group(2) @binding(4) var back_texture: texture_2d<f32>;
+@group(2) @binding(5) var transmission_texture: texture_2d<f32>;
+#endif
 
 struct Vertex {
     @location(0) position: vec3<f32>,
@@ -192,6 +207,10 @@ fn detail_normal(normal: vec3<f32>, relative: vec3<f32>, uv: vec2<f32>) -> vec3<
 fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let look = unpack_look(in.look);
     let texel = textureSample(color_texture, part_sampler, in.uv);
+#ifdef LAYERED
+    let back_texel = textureSample(back_texture, part_sampler, in.uv);
+    let through_texel = textureSample(transmission_texture, part_sampler, in.uv);
+#endif
     let smooth_normal = normalize(in.normal);
     var normal = smooth_normal;
 #ifdef NORMAL_MAP
@@ -226,7 +245,12 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.albedo = texel.rgb * part.base_color;
 #ifdef FOLIAGE
     let published = is_published(part.ambient_term);
+#ifdef LAYERED
+    surface.albedo = select(surface.albedo, back_texel.rgb * part.base_color, behind);
+    let transmission = min(through_texel.rgb, max(1.0 - surface.albedo, vec3(0.0))) / max(surface.albedo, vec3(1e-6));
+#else
     let transmission = leaf_transmission(surface.albedo, part.transmission, part.specular_reflectance);
+#endif
     surface.transmission = transmission * (1.0 - published);
     surface.albedo = tint_foliage(surface.albedo, look.tint);
     surface.viewer = -normalize(in.relative);
@@ -241,18 +265,37 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
 #endif
     surface.normal = normal;
     let ground = sample_ground(in.relative);
+#ifdef LAYERED
+    let tissue = Tissue(
+        part.optical_depth, part.shares, part.inverse_squares, part.perpendicular, part.sky_before, part.sky_behind,
+    );
+    let to_viewer = abs(dot(normal, surface.viewer));
+    let key_factors = tissue_light(tissue, to_viewer, abs(dot(normal, light.key_direction)));
+    let sky_factors = tissue_sky(tissue, to_viewer);
+#endif
 #ifdef TRANSFER
 #ifdef FOLIAGE
     let near_sky = select(in.front_sky, in.back_sky, behind);
     let far_sky = select(in.back_sky, in.front_sky, behind);
+#ifdef LAYERED
+    let sky = near_sky * sky_factors.x + surface.transmission * far_sky * sky_factors.y;
+#else
     let sky = near_sky + surface.transmission * far_sky;
+#endif
 #else
     let sky = in.front_sky;
 #endif
 #else
     surface.ambient_visibility = with_indirect_ambient(look.ambient_visibility, part.ambient_term);
     let neighbours = ground.surrounding_cover * part.cover_weight;
-    let sky = even_sky(surface, light_at(neighbours, 1.0 - look.relative_height));
+    let stand = light_at(neighbours, 1.0 - look.relative_height);
+#ifdef LAYERED
+    var under_sky = surface;
+    under_sky.transmission *= sky_factors.y / max(sky_factors.x, 1e-3);
+    let sky = even_sky(under_sky, stand) * sky_factors.x;
+#else
+    let sky = even_sky(surface, stand);
+#endif
 #endif
     var visibility = terrain_visibility(ground, look.height);
 #ifdef SUN_HARMONICS
@@ -282,15 +325,27 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
 #ifdef FOLIAGE
     let near_sun = select(in.front_sun, in.back_sun, behind);
     let far_sun = select(in.back_sun, in.front_sun, behind);
-    var color = exitant(surface, transferred_key_light(surface, near_sun, far_sun, visibility, leaves), sky);
+    var key = transferred_key_light(surface, near_sun, far_sun, visibility, leaves);
+#ifdef LAYERED
+    key.near *= key_factors.x;
+    key.far *= key_factors.y;
+#endif
+    var color = exitant(surface, key, sky);
 #else
     var color = exitant_matt(surface, transferred_key_light(surface, in.front_sun, vec3(0.0), visibility, leaves), sky);
 #endif
+#else
+#ifdef LAYERED
+    var key = key_light(surface, visibility);
+    key.near *= key_factors.x;
+    key.far *= key_factors.y;
+    var color = exitant(surface, key, sky);
 #else
 #ifdef FOLIAGE
     var color = shade(surface, visibility, sky);
 #else
     var color = shade_matt(surface, visibility, sky);
+#endif
 #endif
 #endif
     color = tint_level(color);

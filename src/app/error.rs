@@ -117,6 +117,22 @@ pub enum AppError {
     /// Rendering failed.
     #[error("rendering failed: {0}")]
     Render(String),
+    /// An image of a leaf that cannot be read.
+    #[error("{}: {what}; give a PNG, JPEG or WebP image", path.display())]
+    LeafImage {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        what: String,
+    },
+    /// A plant without the leaf that was asked for.
+    #[error("{}: has no such leaf; its materials of foliage: {names}", path.display())]
+    NoLeaf {
+        /// The file.
+        path: PathBuf,
+        /// Those that there are.
+        names: String,
+    },
     /// A file that is no plant.
     #[error("{}: this is not a plant; levels of detail are made of glTF files (.glb, .gltf)", path.display())]
     NoPlant {

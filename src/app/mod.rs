@@ -17,6 +17,7 @@ mod fly;
 mod headless;
 mod info;
 mod interrupt;
+mod leaf;
 mod notes;
 mod parse;
 mod plan;
@@ -24,6 +25,7 @@ mod profile;
 mod reference;
 mod rendered_image;
 mod request;
+mod text;
 mod tone;
 mod tune;
 
@@ -38,8 +40,9 @@ pub use fly::fly;
 pub use headless::{Renderer, UpdateTime, render};
 pub use info::info;
 pub use interrupt::{Interrupt, listen as listen_to_interrupts, received as interrupt_received};
+pub use leaf::{LeafImages, LeafOptions, LeafReport, leaf};
 pub use parse::{
-    ArgumentError, parse_chunk, parse_exposure, parse_flip, parse_frames, parse_lighting, parse_milliseconds,
+    ArgumentError, parse_chunk, parse_exposure, parse_flip, parse_frames, parse_leaf_kind, parse_lighting, parse_milliseconds,
     parse_palette, parse_paper, parse_pixels_per_degree, parse_pose, parse_positive, parse_samples, parse_seconds,
     parse_size, parse_style,
 };
@@ -53,7 +56,7 @@ pub use profile::{
 pub use reference::reference;
 pub use rendered_image::RenderedImage;
 pub use request::{
-    BakeOptions, Clock, FlyOptions, LeafModel, LightGroup, Output, ReferenceOptions, RenderOptions, RenderReport,
+    BakeOptions, Clock, FlyOptions, LeafKind, LeafModel, LightGroup, Output, ReferenceOptions, RenderOptions, RenderReport,
     Selection, Still, View,
 };
 pub use tune::{Goal, TuneOptions, Tuned, tune};

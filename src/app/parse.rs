@@ -119,6 +119,20 @@ pub fn parse_paper(text: &str) -> Result<String, ArgumentError> {
     Ok(paper.name().to_owned())
 }
 
+/// Reads the name of a kind of leaf: `thin`, `leathery`, ..., `autumn-red`.
+///
+/// # Errors
+/// [`ArgumentError::LeafKind`].
+pub fn parse_leaf_kind(text: &str) -> Result<LeafKind, ArgumentError> {
+    let all = LeafKind::ALL.map(|kind| (names::words(&format!("{kind:?}")).join("-"), kind));
+    let wanted = text.trim().to_lowercase();
+    let found = all.iter().find(|(name, _)| *name == wanted).map(|(_, kind)| *kind);
+    found.ok_or_else(|| {
+        let known = all.map(|(name, _)| name).join(", ");
+        ArgumentError::LeafKind(text.to_owned(), known)
+    })
+}
+
 /// Reads the number of samples per pixel: 1 or 4, which every device supports.
 ///
 /// # Errors

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+pub use crate::plant::LeafKind;
 pub use crate::reference::LeafModel;
 use crate::scene::{Lighting, LocalTime, Overrides, Pose, SceneSource};
 

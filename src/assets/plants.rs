@@ -11,7 +11,7 @@ use crate::{
     },
     lod::Representation,
     plant::{
-        Gloss, Plant,
+        Gloss, LeafTissue, Plant,
         gltf::{GltfOptions, load_plant},
         grow::{GrowParameters, grow},
     },
@@ -70,6 +70,8 @@ pub struct Individual {
     pub source: IndividualSource,
     /// The gloss of its leaves.
     pub gloss: Gloss,
+    /// The tissue of its leaves; `None` leaves it as the source has it.
+    pub tissue: Option<LeafTissue>,
     /// How its foliage is lit.
     pub lighting: LightingSettings,
 }
@@ -82,6 +84,9 @@ impl Individual {
     pub fn build(&self) -> Result<(Plant, Vec<String>), StageError> {
         let (mut plant, warnings) = self.source.build()?;
         plant.set_leaf_gloss(self.gloss);
+        if let Some(tissue) = self.tissue {
+            plant.set_leaf_tissue(tissue);
+        }
         Ok((plant, warnings))
     }
 }
@@ -105,7 +110,9 @@ pub fn plan(scene: &Scene) -> Result<PlantPlan, StageError> {
         let first = plan.individuals.len();
         let lighting = species.lighting.as_ref().map_or_else(LightingSettings::default, Lighting::settings);
         let gloss = species.gloss.sanitized();
-        let individuals = sources(species, gloss)?.into_iter().map(|source| Individual { source, gloss, lighting });
+        let tissue = species.tissue;
+        let individual = |source| Individual { source, gloss, tissue, lighting };
+        let individuals = sources(species, gloss)?.into_iter().map(individual);
         plan.individuals.extend(individuals);
         plan.variants.push(first as u16..plan.individuals.len() as u16);
     }

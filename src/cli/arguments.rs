@@ -94,6 +94,8 @@ pub enum Command {
     Reference(Reference),
     /// Make the levels of detail of a plant, and show them on a contact sheet; or bake all plants of a scene.
     Bake(Bake),
+    /// Complete the textures of a leaf, and show it in front light, grazing light and against the light.
+    Leaf(Leaf),
     /// Compare images with references: how different they look, and why.
     Compare(Compare),
     /// Measure what settings cost in run time, and how wrong they are.
@@ -315,6 +317,59 @@ pub struct Bake {
     /// Planes of the billboard cloud, 1 to 1000. More are nearer to the plant, and slower.
     #[arg(long, value_name = "NUMBER", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub planes: u32,
+}
+
+/// Arguments of `canopy leaf`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  canopy leaf oak-leaf.png --out oak-leaf                  derives back, transmission, thickness, absorption and bump
+  canopy leaf front.png --back back.png --transmission through.png --out leaf
+  canopy leaf ficus.glb --material leaf --out ficus-leaf --kind leathery
+The folder gets the six textures (PNG), leaf.gltf, a plant of one leaf that uses them, and sheet.png.")]
+pub struct Leaf {
+    /// Image of the front, with the outline in its alpha (.png, .jpg, .webp), or a plant (.glb, .gltf).
+    pub file: PathBuf,
+    /// Folder to write to.
+    #[arg(long, value_name = "FOLDER")]
+    pub out: PathBuf,
+    /// Material of a plant whose leaf is meant [default: the first of foliage].
+    #[arg(long, value_name = "NAME")]
+    pub material: Option<String>,
+    /// Image of the back [default: the plant's, or guessed from the front].
+    #[arg(long, value_name = "FILE")]
+    pub back: Option<PathBuf>,
+    /// Image of the light that comes through, such as a scan with a transparency unit [default: the plant's, or derived from the
+    /// front].
+    #[arg(long, value_name = "FILE")]
+    pub transmission: Option<PathBuf>,
+    /// Image of the thickness, white is thickest [default: the plant's, or derived from the transmission].
+    #[arg(long, value_name = "FILE")]
+    pub thickness: Option<PathBuf>,
+    /// Image of the absorption, white absorbs most [default: the plant's, or derived from the transmission].
+    #[arg(long, value_name = "FILE")]
+    pub absorption: Option<PathBuf>,
+    /// Tangent-space normal map, OpenGL convention [default: the plant's, or derived from the front].
+    #[arg(long, value_name = "FILE")]
+    pub bump: Option<PathBuf>,
+    /// Kind of leaf, which decides how much light comes through where nothing else does: thin, young, leathery, needle, dead,
+    /// autumn-yellow, autumn-red.
+    #[arg(long, value_name = "KIND", default_value = "thin", value_parser = parse_leaf_kind)]
+    pub kind: LeafKind,
+    /// Greatest thickness in millimetres [default: the plant's, or 0.3].
+    #[arg(long, value_name = "MM", value_parser = parse_positive)]
+    pub max_thickness: Option<f64>,
+    /// Width of the leaf in metres.
+    #[arg(long, value_name = "M", default_value_t = 0.1, value_parser = parse_positive)]
+    pub width: f64,
+    /// Take slow changes out of the thickness: standard deviation of the blur as a fraction of the texture's longer side.
+    #[arg(long, value_name = "FRACTION", value_parser = parse_positive)]
+    pub high_pass: Option<f64>,
+    /// Derive the absorption as the thesis prints it: bright absorbs.
+    #[arg(long)]
+    pub published: bool,
+    /// Samples per pixel of the sheet.
+    #[arg(long, value_name = "NUMBER", default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub spp: u32,
 }
 
 /// Arguments of `canopy compare`.

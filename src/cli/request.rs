@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use canopy::{
     app::{
-        BakeOptions, Clock, Combination, CompareOptions, FlyOptions, Goal, LeafModel, LightGroup, Output,
+        BakeOptions, Clock, Combination, CompareOptions, FlyOptions, Goal, LeafImages, LeafModel, LeafOptions, LightGroup, Output,
         PIXELS_PER_DEGREE, ProfileOptions, ReferenceKind, ReferenceOptions, RenderOptions, Still, TuneOptions, View,
         Views,
     },
@@ -14,7 +14,7 @@ use clap::CommandFactory;
 use clap::error::ErrorKind;
 
 use super::arguments::{
-    Arguments, Bake, CameraArguments, Common, Compare, Fly, LeafChoice, LightChoice, Measured, Profile, Reference,
+    Arguments, Bake, CameraArguments, Common, Compare, Fly, Leaf, LeafChoice, LightChoice, Measured, Profile, Reference,
     Render, StyleArguments, Tune,
 };
 
@@ -139,6 +139,29 @@ pub fn bake_options(bake: Bake, common: &Common) -> Result<BakeOptions, clap::Er
         adapter: common.adapter.clone(),
         quiet: common.quiet,
     })
+}
+
+/// The options of a leaf.
+pub fn leaf_options(leaf: Leaf, common: &Common) -> LeafOptions {
+    LeafOptions {
+        file: leaf.file,
+        out: leaf.out,
+        material: leaf.material,
+        given: LeafImages {
+            back: leaf.back,
+            transmission: leaf.transmission,
+            thickness: leaf.thickness,
+            absorption: leaf.absorption,
+            bump: leaf.bump,
+        },
+        kind: leaf.kind,
+        max_thickness: leaf.max_thickness.map(|millimetres| (1e-3 * millimetres) as f32),
+        width: leaf.width as f32,
+        published: leaf.published,
+        high_pass: leaf.high_pass.map(|fraction| fraction as f32),
+        samples: leaf.spp,
+        quiet: common.quiet,
+    }
 }
 
 /// The options of a comparison.
@@ -287,7 +310,7 @@ fn usage(message: String) -> clap::Error {
 pub fn no_command() -> clap::Error {
     Arguments::command().error(
         ErrorKind::MissingSubcommand,
-        "no command given (expected fly, render, reference, bake, compare, profile, tune or info)",
+        "no command given (expected fly, render, reference, bake, leaf, compare, profile, tune or info)",
     )
 }
 

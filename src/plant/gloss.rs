@@ -22,7 +22,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::{PartKind, Plant, PlantMaterial};
+use super::{LeafTissue, PartKind, Plant, PlantMaterial};
 
 /// The gloss of a leaf: the light that its surface reflects without letting it in. In a scene file: `(share: 0.045,
 /// roughness: 0.4)`.
@@ -98,6 +98,14 @@ impl Plant {
             count += triangles;
         }
         if count > 0.0 { Gloss { reflectance: reflectance / count, roughness: roughness / count } } else { Gloss::MATT }
+    }
+
+    /// Gives all foliage this tissue. What is a closed volume stays one.
+    pub fn set_leaf_tissue(&mut self, tissue: LeafTissue) {
+        for part in self.parts.iter_mut().filter(|part| part.kind == PartKind::Foliage) {
+            let volume = part.material.tissue.is_some_and(|tissue| tissue.volume);
+            part.material.tissue = Some(LeafTissue { volume, ..tissue.sanitized() });
+        }
     }
 
     /// Gives all foliage this gloss.

@@ -113,6 +113,8 @@ impl PlantMesh {
 /// The material of one part.
 #[derive(Clone, Debug)]
 pub struct PlantMaterial {
+    /// Name for messages; may be empty.
+    pub name: String,
     /// Linear factor on the base colour, 0..1.
     pub base_color: Vec3,
     /// Base colour: sRGB-encoded RGB, linear straight alpha. `None`: white and opaque.
@@ -143,6 +145,7 @@ impl PlantMaterial {
 impl Default for PlantMaterial {
     fn default() -> Self {
         Self {
+            name: String::new(),
             base_color: Vec3::ONE,
             base_color_texture: None,
             normal_texture: None,

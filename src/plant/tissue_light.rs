@@ -9,6 +9,7 @@ use glam::Vec3;
 
 use super::LeafTissue;
 use super::leaf_textures::{Derivation, mean_optical_depth, thickness_and_absorption, transmission_of};
+use super::optics::{mean_over_leaf, mean_texel};
 use super::{Plant, PlantMaterial};
 
 /// The least cosine of a ray to the normal inside a layer.
@@ -139,6 +140,16 @@ impl Plant {
 }
 
 impl PlantMaterial {
+    /// Takes `image` for what comes through (sRGB), and its mean over the leaf for the levels of detail that have a factor
+    /// on the front instead.
+    pub fn set_transmission(&mut self, image: std::sync::Arc<image::RgbaImage>) {
+        let wanted = mean_texel(&image, self).truncate();
+        let [inside] = mean_over_leaf(self, |color| [self.gloss.subsurface_albedo(color)]);
+        let most = Vec3::splat(Self::MOST_TRANSMISSION);
+        self.transmission = (wanted / inside.max(Vec3::splat(1e-6))).clamp(Vec3::ZERO, most);
+        self.leaf_textures.transmission = Some(image);
+    }
+
     fn average_layers(&mut self) {
         let Some(light) = TissueLight::new(self) else { return };
         let [before, behind] = light.mean();

@@ -64,6 +64,7 @@ shader_files! {
     Output = "common/output.wgsl",
     SunVisibility = "common/sun_visibility.wgsl",
     Lighting = "common/lighting.wgsl",
+    Tissue = "common/tissue.wgsl",
     ForestInstance = "forest/instance.wgsl",
     StyleSurface = "style/surface.wgsl",
     Style = "style/style.wgsl",

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::check::Check;
 use super::lighting::Lighting;
-use crate::plant::{Gloss, LeafKind, gltf::UpAxis};
+use crate::plant::{Gloss, LeafKind, LeafTissue, gltf::UpAxis};
 
 /// One species.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -26,6 +26,11 @@ pub struct Species {
     /// The gloss of its leaves. Default `(share: 0.045, roughness: 0.4)`, as measured on leaves.
     #[serde(default)]
     pub gloss: Gloss,
+    /// The tissue of its leaves, all of its members optional: `tissue: (max_thickness: 0.0004)`. With one its leaves are drawn
+    /// by layers [Franzke 2005, 3.2]: darker at flat angles, with their own back where a file has one. Default: what the file or
+    /// the rules say, mostly none.
+    #[serde(default)]
+    pub tissue: Option<LeafTissue>,
     /// The kind of its leaves, which determines how much light passes through them: `Thin`, `Young`, `Leathery`,
     /// `Needle` or `Dead`. A glTF material's own value takes precedence. Default: what the rules of a grown plant say,
     /// `Thin` for a plant from a file.
@@ -161,6 +166,7 @@ impl Species {
             plant: plant.into(),
             lighting: None,
             gloss: Gloss::default(),
+            tissue: None,
             leaf: None,
             height: default_height(),
             elevation: None,
@@ -196,6 +202,9 @@ impl Species {
         }
         check.number(&format!("{at}.gloss.share"), self.gloss.reflectance, 0.0..=0.09, "");
         check.number(&format!("{at}.gloss.roughness"), self.gloss.roughness, 0.1..=1.0, "");
+        if let Some(tissue) = &self.tissue {
+            check_tissue(tissue, &format!("{at}.tissue"), check);
+        }
         check.number(&format!("{at}.slope_limit"), self.slope_limit, 0.0..=90.0, "degrees");
         if let Some(radius) = self.trunk_radius {
             check.number(&format!("{at}.trunk_radius"), radius, 0.001..=10.0, "m");
@@ -242,6 +251,19 @@ impl GltfPlants {
                 );
             }
         }
+    }
+}
+
+fn check_tissue(tissue: &LeafTissue, at: &str, check: &mut Check) {
+    check.number(&format!("{at}.max_thickness"), tissue.max_thickness, LeafTissue::THICKNESS, "m");
+    for (number, absorption) in tissue.absorption_range.into_iter().enumerate() {
+        check.number(&format!("{at}.absorption_range[{number}]"), absorption, LeafTissue::ABSORPTION, "1/m");
+    }
+    for number in 0..3 {
+        check.number(&format!("{at}.layers[{number}]"), tissue.layers[number], 0.0..=1.0, "");
+        check.number(&format!("{at}.refraction[{number}]"), tissue.refraction[number], LeafTissue::REFRACTION, "");
+        let points = u32::from(tissue.test_points[number]);
+        check.count(&format!("{at}.test_points[{number}]"), points, 0..=u32::from(LeafTissue::MOST_POINTS));
     }
 }
 

@@ -4,7 +4,6 @@ mod levels;
 mod of_scene;
 mod sheet;
 mod studio;
-mod text;
 
 use std::{path::Path, sync::Arc, time::Instant};
 

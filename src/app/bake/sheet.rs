@@ -3,9 +3,9 @@
 use glam::Vec3;
 use image::{Rgb, RgbImage};
 
-use super::{levels::LevelFacts, studio::Side, text::Writer};
+use super::{levels::LevelFacts, studio::Side};
 use crate::{
-    app::AppError,
+    app::{AppError, text::Writer},
     math::{digits::grouped, linear_to_srgb},
     measure::{Cutout, LevelError},
 };

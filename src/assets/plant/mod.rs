@@ -24,7 +24,7 @@ use crate::{
         BakeSettings, BakeSource, BakedPlant, bake_plant, cache::Cache, lighting::SunLight, textures::filter_together,
     },
     plant::{
-        Gloss, LeafKind, Plant,
+        Gloss, LeafKind, LeafTissue, Plant,
         gltf::GltfOptions,
         grow::{GrowError, GrowParameters, grow},
     },
@@ -99,6 +99,8 @@ pub struct PlantSettings {
     pub transmission: Option<Vec3>,
     /// The gloss of leaves.
     pub gloss: Gloss,
+    /// The tissue of leaves; `None` leaves it as the file has it.
+    pub tissue: Option<LeafTissue>,
     /// How it is baked, above all its lighting.
     pub bake: BakeSettings,
     /// How the sun lights full models.
@@ -114,6 +116,7 @@ impl Default for PlantSettings {
             leaf: LeafKind::default(),
             transmission: None,
             gloss: Gloss::LEAF,
+            tissue: None,
             bake: BakeSettings::default(),
             sun: SunLight::default(),
         }
@@ -179,6 +182,9 @@ impl PlantAsset {
                     return None;
                 }
                 plant.set_leaf_gloss(settings.gloss);
+                if let Some(tissue) = settings.tissue {
+                    plant.set_leaf_tissue(tissue);
+                }
                 let (baked, source) = bake_plant(plant.into(), &settings.bake, cache.as_ref());
                 warnings.extend(baked.lighting.warning().map(|what| format!("{}: {what}", baked.plant.name)));
                 if let BakeSource::Fresh { warning: Some(warning) } = source {

@@ -75,6 +75,7 @@ impl Recipe {
     /// The plants of a species, `individuals`, whose own lighting and gloss replace those of `settings`.
     pub fn species(species: &Species, individuals: Vec<Individual>, settings: &PlantSettings) -> Self {
         let mut settings = PlantSettings { gloss: species.gloss.sanitized(), ..settings.clone() };
+        settings.tissue = species.tissue.or(settings.tissue);
         if let Some(lighting) = &species.lighting {
             settings.bake.lighting = lighting.settings();
             settings.sun = lighting.sun();

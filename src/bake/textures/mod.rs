@@ -15,6 +15,7 @@ use rayon::prelude::*;
 
 use super::cache::{Cache, TextureKey};
 use super::error::BakeError;
+use crate::plant::tissue_light::TissueLight;
 use crate::plant::{PartKind, Plant, PlantPart};
 pub use filtered::{FilteredTexture, TextureUse};
 
@@ -29,6 +30,8 @@ pub struct PartTextures {
     pub back: Option<Arc<FilteredTexture>>,
     /// What comes through leaves; `None` where it follows from the front.
     pub transmission: Option<Arc<FilteredTexture>>,
+    /// The tissue of leaves with layers.
+    pub tissue: Option<TissueLight>,
 }
 
 /// The textures of a plant's full model, one entry for each part. Empty where they were not asked for.
@@ -52,11 +55,12 @@ impl PlantTextures {
             error = error.take().or(failed);
             Some(texture)
         };
-        let part = |images: &PartImages| {
+        let part = |(images, part): (&PartImages, &PlantPart)| {
             let [color, normals, back, transmission] = [0, 1, 2, 3].map(|role| next(images.0[role].is_some()));
-            PartTextures { color, normals, back, transmission }
+            let tissue = TissueLight::new(&part.material).filter(|_| part.kind == PartKind::Foliage);
+            PartTextures { color, normals, back, transmission, tissue }
         };
-        let textures = Self(images.iter().map(part).collect());
+        let textures = Self(images.iter().zip(&plant.parts).map(part).collect());
         (textures, error)
     }
 }

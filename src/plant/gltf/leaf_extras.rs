@@ -4,6 +4,7 @@
 //! "extras": { "canopy_leaf": {
 //!     "backTexture": { "index": 3 },         what the back reflects, sRGB
 //!     "backMaterial": 2,                     or a material, whose base colour texture that is
+//!     "transmissionTexture": { "index": 6 }, what comes through, sRGB
 //!     "thicknessTexture": { "index": 4 },    red channel, 0..1
 //!     "absorptionTexture": { "index": 5 },   red channel, 0..1
 //!     "maxThickness": 0.0003,                metres; further members as in `LeafTissue`:
@@ -12,7 +13,8 @@
 //! } }
 //! ```
 //!
-//! All members are optional. The transmission is that of `KHR_materials_diffuse_transmission`, the bump the normal texture.
+//! All members are optional. Without a transmission of its own, that of `KHR_materials_diffuse_transmission` counts. The bump is the
+//! normal texture.
 
 use std::sync::Arc;
 
@@ -38,6 +40,7 @@ pub(super) struct Texture {
 pub(super) struct LeafExtras {
     pub back_texture: Option<Texture>,
     pub back_material: Option<usize>,
+    pub transmission_texture: Option<Texture>,
     pub thickness_texture: Option<Texture>,
     pub absorption_texture: Option<Texture>,
     max_thickness: Option<f32>,
@@ -66,15 +69,18 @@ impl LeafExtras {
         .ok()
     }
 
-    /// Sets the tissue of `material`. `[back, thickness, absorption]` are the decoded textures.
+    /// Sets the tissue of `material`. `[back, transmission, thickness, absorption]` are the decoded textures.
     pub fn apply(
         &self,
         material: &mut PlantMaterial,
-        [back, thickness, absorption]: [Option<Arc<RgbaImage>>; 3],
+        [back, transmission, thickness, absorption]: [Option<Arc<RgbaImage>>; 4],
         location: &str,
         warnings: &mut Warnings,
     ) {
         material.leaf_textures.back = back;
+        if let Some(image) = transmission {
+            material.set_transmission(image);
+        }
         material.leaf_textures.thickness = thickness.map(|image| Arc::new(red(&image)));
         material.leaf_textures.absorption = absorption.map(|image| Arc::new(red(&image)));
         let usual = LeafTissue::default();

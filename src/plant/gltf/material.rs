@@ -123,6 +123,7 @@ pub(super) fn read(
     mention_cut_out(document, source, (&name, kind), base.as_ref(), texture.as_deref(), &location, warnings);
     let opacity = unit(factor[3]);
     let mut material = PlantMaterial {
+        name: name.clone(),
         base_color: Vec3::new(unit(factor[0]), unit(factor[1]), unit(factor[2])),
         base_color_texture: texture,
         ..PlantMaterial::default()
@@ -168,6 +169,7 @@ pub(super) fn read(
             let mut image = |texture: Option<leaf_extras::Texture>, role: &str| {
                 texture.and_then(|texture| load(document, texture.index, &location, role, images, warnings))
             };
+            let transmission = image(leaf.transmission_texture, "transmission");
             let thickness = image(leaf.thickness_texture, "thickness");
             let absorption = image(leaf.absorption_texture, "absorption");
             let back = match (leaf.back_texture, leaf.back_material) {
@@ -186,7 +188,7 @@ pub(super) fn read(
                 }
                 (None, None) => None,
             };
-            leaf.apply(&mut surface.material, [back, thickness, absorption], &location, warnings);
+            leaf.apply(&mut surface.material, [back, transmission, thickness, absorption], &location, warnings);
         }
     }
     surface

@@ -9,8 +9,8 @@ use bevy::{
 
 use crate::{
     bake::textures::{FilteredTexture, PartTextures},
-    math::MipView,
-    plant::PartKind,
+    math::{MipView, color::srgb8},
+    plant::{PartKind, PlantMaterial},
     render::{
         forest::upload::ForestUpload,
         gpu::{self, Gpu},
@@ -35,6 +35,31 @@ impl TextureCache {
         };
         let smallest = if kind == PartKind::Foliage { gpu::SMALLEST_TESTED_MIP } else { 1 };
         self.uploaded("canopy_base_color", format, texture, smallest, upload)
+    }
+
+    /// The back of leaves; the front without a texture of its own.
+    pub fn back(&mut self, textures: &PartTextures, front: &TextureView, upload: &mut ForestUpload) -> TextureView {
+        match &textures.back {
+            Some(texture) => self.uploaded("canopy_leaf_back", TextureFormat::Rgba8UnormSrgb, texture, 1, upload),
+            None => front.clone(),
+        }
+    }
+
+    /// What comes through the leaves of `material`.
+    pub fn transmission(
+        &mut self,
+        textures: &PartTextures,
+        material: &PlantMaterial,
+        upload: &mut ForestUpload,
+    ) -> TextureView {
+        let format = TextureFormat::Rgba8UnormSrgb;
+        match &textures.transmission {
+            Some(texture) => self.uploaded("canopy_leaf_transmission", format, texture, 1, upload),
+            None => {
+                let [r, g, b] = material.transmitted(material.base_color).to_array().map(srgb8);
+                plain("canopy_leaf_transmission", format, [r, g, b, 255], upload.gpu)
+            }
+        }
     }
 
     /// The normal map. Without one: a texel that no pipeline samples, shared by all materials.

@@ -16,7 +16,10 @@ use crate::{
     light::sh::MAX_BANDS,
     lod::level_distance::inverse_height,
     math::luminance,
-    plant::{LeafColors, PlantMaterial, lobe_gain, lobe_peak},
+    plant::{
+        LeafColors, LeafTissue, PlantMaterial, lobe_gain, lobe_peak,
+        tissue_light::{SKY_COSINES, TissueLight},
+    },
     scatter::PlantSize,
     style::layers,
 };
@@ -143,8 +146,22 @@ pub struct PartUniform {
     pub lobe_limit: f32,
     /// Factor on the cover around it: 0 where its k_a holds the shade of the trees around already, else 1.
     pub cover_weight: f32,
-    /// WGSL rounds the size up to 16 bytes.
-    pub padding: [u32; 3],
+    /// Of the tissue of leaves with layers ([`TissueLight`]): absorption times thickness; 0 without.
+    pub optical_depth: f32,
+    /// Alignment.
+    pub padding: [u32; 2],
+    /// Shares of the layers.
+    pub shares: [f32; 4],
+    /// Squares of their inverse indices of refraction.
+    pub inverse_squares: [f32; 4],
+    /// What is left of perpendicular light from before, and from behind.
+    pub perpendicular: [f32; 2],
+    /// Alignment.
+    pub more_padding: [u32; 2],
+    /// Factors on even light from before at [`SKY_COSINES`].
+    pub sky_before: [f32; 4],
+    /// The same from behind.
+    pub sky_behind: [f32; 4],
 }
 
 /// Words of four coefficients after the first, of all bands.
@@ -277,8 +294,10 @@ fn cover_weight(lighting: &BakedLighting) -> f32 {
 }
 
 /// What the shaders know of a part's material.
-pub fn part_uniform(material: &PlantMaterial, lighting: &BakedLighting) -> PartUniform {
+pub fn part_uniform(material: &PlantMaterial, lighting: &BakedLighting, tissue: Option<TissueLight>) -> PartUniform {
     let gloss = material.gloss.sanitized();
+    let tissue = tissue.unwrap_or_else(|| TissueLight::of(&LeafTissue::default(), 0.0));
+    let even = SKY_COSINES.map(|cosine| tissue.in_even_light(cosine));
     PartUniform {
         base_color: material.base_color.to_array(),
         realigned: realigned(lighting),
@@ -289,7 +308,14 @@ pub fn part_uniform(material: &PlantMaterial, lighting: &BakedLighting) -> PartU
         lobe_gain: lobe_gain(gloss.roughness),
         lobe_limit: lobe_peak(gloss.roughness).recip(),
         cover_weight: cover_weight(lighting),
-        padding: [0; 3],
+        optical_depth: tissue.optical_depth,
+        padding: [0; 2],
+        shares: tissue.shares.extend(0.0).to_array(),
+        inverse_squares: tissue.inverse_squares.extend(0.0).to_array(),
+        perpendicular: tissue.attenuation(1.0, 1.0).map(|left| left.max(1e-30)),
+        more_padding: [0; 2],
+        sky_before: Vec3::from(even.map(|[before, _]| before)).extend(0.0).to_array(),
+        sky_behind: Vec3::from(even.map(|[_, behind]| behind)).extend(0.0).to_array(),
     }
 }
 
@@ -325,7 +351,7 @@ mod tests {
             let (plant, _) = bake_plant(plant.clone(), &BakeSettings { lighting, ..BakeSettings::default() }, None);
             assert_eq!(plant.lighting.ambient_term(), term);
             assert_eq!(variants(std::slice::from_ref(&plant), &[plant.size()])[0].ambient_term, term as u32);
-            assert_eq!(part_uniform(&PlantMaterial::default(), &plant.lighting).ambient_term, term as u32);
+            assert_eq!(part_uniform(&PlantMaterial::default(), &plant.lighting, None).ambient_term, term as u32);
         }
         Ok(())
     }
@@ -338,7 +364,7 @@ mod tests {
             |own_normal| baked(LightingSettings::Expressive(ImplicitSettings { own_normal, ..Default::default() }));
         let (local, own, half) = (baked(LightingSettings::Local), expressive(1.0), expressive(0.5));
         for (part, source) in plant.parts.iter().enumerate() {
-            let realigned = |plant: &BakedPlant| part_uniform(&source.material, &plant.lighting).realigned;
+            let realigned = |plant: &BakedPlant| part_uniform(&source.material, &plant.lighting, None).realigned;
             assert_eq!([realigned(&local), realigned(&own), realigned(&half)], [0.0, 0.0, 1.0]);
             assert_eq!(own.lighting.normals(part), None, "the leaves keep their own");
         }

@@ -25,10 +25,11 @@ use crate::{
         BakedPlant,
         lighting::BakedLighting,
         lighting::transfer::{Channels, TransferSettings},
+        textures::PartTextures,
     },
     cull::Grouping,
     lod::Representation,
-    plant::{PartKind, PlantMesh},
+    plant::{PartKind, PlantMesh, PlantPart},
     render::{
         components::{Forest, SunLight},
         forest::{
@@ -105,16 +106,29 @@ struct PartSurface {
     kind: PartKind,
     /// Whether its material has a normal map. Without one its pipeline samples none.
     normal_map: bool,
+    /// Whether its leaves have a back, a transmission or layers of their own.
+    layered: bool,
 }
 
 impl PartSurface {
     /// All values, wood first.
-    const ALL: [Self; 4] = [
-        Self { kind: PartKind::Wood, normal_map: false },
-        Self { kind: PartKind::Wood, normal_map: true },
-        Self { kind: PartKind::Foliage, normal_map: false },
-        Self { kind: PartKind::Foliage, normal_map: true },
+    const ALL: [Self; 6] = [
+        Self { kind: PartKind::Wood, normal_map: false, layered: false },
+        Self { kind: PartKind::Wood, normal_map: true, layered: false },
+        Self { kind: PartKind::Foliage, normal_map: false, layered: false },
+        Self { kind: PartKind::Foliage, normal_map: true, layered: false },
+        Self { kind: PartKind::Foliage, normal_map: false, layered: true },
+        Self { kind: PartKind::Foliage, normal_map: true, layered: true },
     ];
+
+    fn new(part: &PlantPart, textures: &PartTextures) -> Self {
+        let leaf = textures.back.is_some() || textures.transmission.is_some() || textures.tissue.is_some();
+        Self {
+            kind: part.kind,
+            normal_map: part.material.normal_texture.is_some(),
+            layered: leaf && part.kind == PartKind::Foliage,
+        }
+    }
 }
 
 /// The pipeline of a part, as the bits that [`LevelRenderer::pipeline`] takes. Wood has the lower numbers, because it
@@ -131,7 +145,7 @@ fn part_of(features: u32) -> (PartSurface, PartLight) {
     (PartSurface::ALL[features / lights % PartSurface::ALL.len()], PartLight::ALL[features % lights])
 }
 
-/// Group 2: colour, normals, sampler, material.
+/// Group 2: colour, normals, sampler, material, and what only leaves with layers sample: back and transmission.
 fn part_layout() -> BindGroupLayoutDescriptor {
     let float = TextureSampleType::Float { filterable: true };
     BindGroupLayoutDescriptor::new(
@@ -143,6 +157,8 @@ fn part_layout() -> BindGroupLayoutDescriptor {
                 texture_2d(float),
                 sampler(SamplerBindingType::Filtering),
                 uniform_buffer_sized(false, std::num::NonZeroU64::new(size_of::<PartUniform>() as u64)),
+                texture_2d(float),
+                texture_2d(float),
             ),
         ),
     )
@@ -206,7 +222,7 @@ impl LevelRenderer for ModelRenderer {
     }
 
     fn pipeline(&self, features: u32, target: LevelTarget) -> RenderPipelineDescriptor {
-        let (PartSurface { kind, normal_map }, light) = part_of(features);
+        let (PartSurface { kind, normal_map, layered }, light) = part_of(features);
         let foliage = kind == PartKind::Foliage;
         let mut defs: Vec<ShaderDefVal> = Vec::new();
         if foliage {
@@ -234,6 +250,9 @@ impl LevelRenderer for ModelRenderer {
         };
         if normal_map {
             defs.push("NORMAL_MAP".into());
+        }
+        if layered {
+            defs.push("LAYERED".into());
         }
         let mut groups = vec![part_layout()];
         if let PartLight::Transfer { color, sun } = light {
@@ -317,8 +336,10 @@ impl GpuLevel for GpuModels {
     fn features(&self, target: LevelTarget) -> Vec<u32> {
         let features_of = |part: &GpuPart| match target {
             LevelTarget::View(_) => features(part.surface, part.light),
-            // Depth does not depend on the normal map.
-            LevelTarget::ShadowMap => features(PartSurface { normal_map: false, ..part.surface }, PartLight::Plain),
+            // Depth does not depend on the normal map or the layers.
+            LevelTarget::ShadowMap => {
+                features(PartSurface { normal_map: false, layered: false, ..part.surface }, PartLight::Plain)
+            }
         };
         let mut all: Vec<u32> = self.parts.iter().flatten().map(features_of).collect();
         all.sort_unstable();
@@ -373,7 +394,8 @@ impl GpuLevel for GpuModels {
             let Some(parts) = self.parts.get_mut(index) else { continue };
             for (number, (gpu_part, part)) in parts.iter_mut().zip(&new.plant.parts).enumerate() {
                 let vertices = vertices(&part.mesh, &new.lighting, number);
-                let uniform = part_uniform(&part.material, &new.lighting);
+                let tissue = new.textures.0.get(number).and_then(|textures| textures.tissue);
+                let uniform = part_uniform(&part.material, &new.lighting, tissue);
                 upload.gpu.queue.write_buffer(&gpu_part.model.vertices, 0, bytemuck::cast_slice(&vertices));
                 upload.gpu.queue.write_buffer(&gpu_part.uniform, 0, bytemuck::bytes_of(&uniform));
                 let traced = new.lighting.transfer(number);
@@ -415,17 +437,26 @@ fn upload_parts(
         let material = &part.material;
         let coefficients = plant.lighting.transfer(index);
         let usage = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
-        let uniform = part_uniform(material, &plant.lighting);
+        let uniform = part_uniform(material, &plant.lighting, filtered.tissue);
         let uniform = gpu::buffer_with(&gpu.device, "canopy_plant_part", usage, &[uniform]);
         let color = textures.color(filtered, part.kind, upload);
         let normal = textures.normal(filtered, upload);
+        let back = textures.back(filtered, &color, upload);
+        let transmission = textures.transmission(filtered, material, upload);
         let bind_group = gpu.bind_group(
             "canopy_plant_part",
             &part_layout(),
-            &BindGroupEntries::sequential((&color, &normal, sampler, uniform.as_entire_binding())),
+            &BindGroupEntries::sequential((
+                &color,
+                &normal,
+                sampler,
+                uniform.as_entire_binding(),
+                &back,
+                &transmission,
+            )),
         );
         parts.push(GpuPart {
-            surface: PartSurface { kind: part.kind, normal_map: material.normal_texture.is_some() },
+            surface: PartSurface::new(part, filtered),
             uniform,
             model: upload_mesh(plant, index, model_mesh, &plant.lighting, upload),
             proxy: upload_mesh(plant, index, proxy_mesh, &local, upload),
