@@ -10,6 +10,8 @@
 //! | [`octahedral`] | unit vectors in two coordinates |
 //! | [`cholesky`](mod@cholesky) | small systems of linear equations |
 //! | [`color`] | sRGB, luminance, 8-bit codes |
+//! | [`color_matching`](mod@color_matching) | from spectra to linear colours |
+//! | [`exponential_integral`](mod@exponential_integral) | the exponential integral E₁ |
 //! | [`interpolation`] | the smooth step |
 //! | [`mip`] | a texture with its mip levels |
 //! | [`resample`] | images at another size: filtering in linear light with colours weighted by alpha |
@@ -20,10 +22,12 @@
 
 pub mod cholesky;
 pub mod color;
+pub mod color_matching;
 pub mod compute_once;
 pub mod digits;
 pub mod discrepancy;
 mod error;
+pub mod exponential_integral;
 pub mod hash;
 pub mod interpolation;
 pub mod mip;
@@ -39,6 +43,7 @@ pub use color::{LUMINANCE_WEIGHTS, linear_to_srgb, luminance, srgb_to_linear};
 pub use compute_once::compute_once;
 pub use discrepancy::star_discrepancy;
 pub use error::MathError;
+pub use exponential_integral::exponential_integral;
 pub use interpolation::smoothstep;
 pub use mip::{MipChain, MipView};
 pub use quadrature::SphereQuadrature;

@@ -9,28 +9,31 @@
 //!
 //! | kind | reflectance | transmittance | factor | from |
 //! |---|---|---|--:|---|
-//! | thin | 0.065 0.127 0.033 | 0.057 0.123 0.000 | 1.3 | PROSPECT-D, green leaf; autumn leaves, yellow and red: 1.27, 1.28 |
+//! | thin | 0.065 0.127 0.033 | 0.057 0.123 0.000 | 1.3 | PROSPECT-D, green leaf |
 //! | young | 0.153 0.203 0.032 | 0.211 0.259 0.003 | 1.6 | PROSPECT-D, leaf in spring |
 //! | leathery | 0.104 0.121 0.088 | 0.043 0.062 0.015 | 0.7 | measured, median of 11 woody species |
 //! | needle | 0.070 0.128 0.033 | 0.017 0.046 0.000 | 0.5 | PROSPECT-D, thick needle |
 //! | dead | 0.181 0.116 0.065 | 0.107 0.052 0.013 | 0.7 | PROSPECT-D, brown leaf |
+//! | autumn yellow | 0.277 0.172 0.032 | 0.298 0.171 0.000 | 1.27 | PROSPECT-D, little chlorophyll left |
+//! | autumn red | 0.138 0.048 0.040 | 0.150 0.022 0.002 | 1.28 | PROSPECT-D, anthocyanin |
 //!
-//! Colours are linear, Rec. 709 primaries, under light of 6504 K. PROSPECT-D: [Féret et al. 2017]; the green leaf has
-//! structure 1.5, chlorophyll 40 and carotenoid 8 µg/cm², water 0.01 and dry matter 0.008 g/cm². Measured: the spectral
+//! Colours are linear, Rec. 709 primaries, under light of 6504 K. PROSPECT-D: [Féret et al. 2017], from the
+//! [`LeafKind::constituents`]; a test computes them again. Measured: the spectral
 //! library of Helios [Bailey 2019]. A species differs from its kind by a fifth or more; a value in a file
 //! ([`KHR_materials_diffuse_transmission`](super::gltf)) has priority.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+use super::prospect::Constituents;
+
 /// The structure of a leaf, as far as its transmission is concerned.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum LeafKind {
-    /// Green leaves of most broadleaved trees and herbs, in autumn colours too: about as much light passes as is
-    /// reflected.
+    /// Green leaves of most broadleaved trees and herbs: about as much light passes as is reflected.
     #[default]
     Thin,
-    /// Leaves that have just unfolded: thin and pale, more light passes.
+    /// Leaves of spring, which have just unfolded: thin and pale, more light passes.
     Young,
     /// Thick and tough leaves, such as of evergreen oak, holly, ivy, rhododendron: half of a thin leaf's.
     Leathery,
@@ -38,11 +41,16 @@ pub enum LeafKind {
     Needle,
     /// Dry brown leaves: half of a thin leaf's.
     Dead,
+    /// Yellow leaves of autumn, which have lost most of their chlorophyll: about a thin leaf's.
+    AutumnYellow,
+    /// Red leaves of autumn, which make anthocyanin: about a thin leaf's.
+    AutumnRed,
 }
 
 impl LeafKind {
     /// All kinds.
-    pub const ALL: [Self; 5] = [Self::Thin, Self::Young, Self::Leathery, Self::Needle, Self::Dead];
+    pub const ALL: [Self; 7] =
+        [Self::Thin, Self::Young, Self::Leathery, Self::Needle, Self::Dead, Self::AutumnYellow, Self::AutumnRed];
 
     /// Transmittance over subsurface albedo, 0..=2: each channel of
     /// [`PlantMaterial::transmission`](super::PlantMaterial::transmission).
@@ -52,6 +60,8 @@ impl LeafKind {
             Self::Young => 1.6,
             Self::Leathery | Self::Dead => 0.7,
             Self::Needle => 0.5,
+            Self::AutumnYellow => 1.27,
+            Self::AutumnRed => 1.28,
         }
     }
 
@@ -68,6 +78,8 @@ impl LeafKind {
             Self::Leathery => Vec3::new(0.104, 0.121, 0.088),
             Self::Needle => Vec3::new(0.070, 0.128, 0.033),
             Self::Dead => Vec3::new(0.181, 0.116, 0.065),
+            Self::AutumnYellow => Vec3::new(0.277, 0.172, 0.032),
+            Self::AutumnRed => Vec3::new(0.138, 0.048, 0.040),
         }
     }
 
@@ -79,7 +91,24 @@ impl LeafKind {
             Self::Leathery => Vec3::new(0.043, 0.062, 0.015),
             Self::Needle => Vec3::new(0.017, 0.046, 0.0),
             Self::Dead => Vec3::new(0.107, 0.052, 0.013),
+            Self::AutumnYellow => Vec3::new(0.298, 0.171, 0.0),
+            Self::AutumnRed => Vec3::new(0.150, 0.022, 0.002),
         }
+    }
+
+    /// What a typical leaf is made of: contents with which PROSPECT-D gives the colours above, to 0.004. `None` for
+    /// leathery leaves, which are measured.
+    pub const fn constituents(self) -> Option<Constituents> {
+        let (structure, chlorophyll, carotenoid, anthocyanin, brown, water, dry_matter) = match self {
+            Self::Thin => (1.5, 40.0, 8.0, 0.0, 0.0, 0.01, 0.008),
+            Self::Young => (1.3, 15.0, 5.0, 0.0, 0.0, 0.01, 0.004),
+            Self::Leathery => return None,
+            Self::Needle => (2.2, 55.0, 12.0, 0.0, 0.1, 0.02, 0.02),
+            Self::Dead => (2.0, 1.5, 2.0, 0.0, 2.0, 0.002, 0.002),
+            Self::AutumnYellow => (1.5, 4.0, 8.0, 0.0, 0.48, 0.01, 0.003),
+            Self::AutumnRed => (1.5, 10.0, 6.0, 22.0, 0.0, 0.01, 0.005),
+        };
+        Some(Constituents { structure, chlorophyll, carotenoid, anthocyanin, brown, water, dry_matter })
     }
 }
 

@@ -11,6 +11,7 @@ pub mod grow;
 mod leaf_kind;
 pub mod leaf_textures;
 mod optics;
+pub mod prospect;
 pub(crate) mod surface;
 pub mod texture;
 mod tissue;

@@ -32,7 +32,7 @@ pub struct Species {
     #[serde(default)]
     pub tissue: Option<LeafTissue>,
     /// The kind of its leaves, which determines how much light passes through them: `Thin`, `Young`, `Leathery`,
-    /// `Needle` or `Dead`. A glTF material's own value takes precedence. Default: what the rules of a grown plant say,
+    /// `Needle`, `Dead`, `AutumnYellow` or `AutumnRed`. A glTF material's own value takes precedence. Default: what the rules of a grown plant say,
     /// `Thin` for a plant from a file.
     #[serde(default)]
     pub leaf: Option<LeafKind>,
