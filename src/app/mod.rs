@@ -42,9 +42,9 @@ pub use info::info;
 pub use interrupt::{Interrupt, listen as listen_to_interrupts, received as interrupt_received};
 pub use leaf::{LeafImages, LeafOptions, LeafReport, leaf};
 pub use parse::{
-    ArgumentError, parse_chunk, parse_exposure, parse_flip, parse_frames, parse_leaf_kind, parse_lighting, parse_milliseconds,
-    parse_palette, parse_paper, parse_pixels_per_degree, parse_pose, parse_positive, parse_samples, parse_seconds,
-    parse_size, parse_style,
+    ArgumentError, parse_chunk, parse_exposure, parse_flip, parse_frames, parse_leaf_kind, parse_lighting,
+    parse_milliseconds, parse_palette, parse_paper, parse_pixels_per_degree, parse_pose, parse_positive, parse_samples,
+    parse_seconds, parse_size, parse_style,
 };
 pub use plan::{Frame, PlanError, RenderPlan};
 pub use profile::{
@@ -56,7 +56,7 @@ pub use profile::{
 pub use reference::reference;
 pub use rendered_image::RenderedImage;
 pub use request::{
-    BakeOptions, Clock, FlyOptions, LeafKind, LeafModel, LightGroup, Output, ReferenceOptions, RenderOptions, RenderReport,
-    Selection, Still, View,
+    BakeOptions, Clock, FlyOptions, LeafKind, LeafModel, LightGroup, Output, ReferenceOptions, RenderOptions,
+    RenderReport, Selection, Still, View,
 };
 pub use tune::{Goal, TuneOptions, Tuned, tune};

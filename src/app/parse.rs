@@ -4,6 +4,7 @@ use super::Selection;
 use crate::{
     bake::lighting::{SunLight, implicit::ImplicitSettings},
     math::names,
+    plant::LeafKind,
     scene::{Lighting, Pose, Transfer},
     style::{Palette, Paper, Style},
 };
@@ -26,6 +27,9 @@ pub enum ArgumentError {
     /// Not a paper.
     #[error("`{0}` is not a paper; did you mean `{1}`? (expected hot-pressed, cold-pressed, rough, laid or canvas)")]
     Paper(String, &'static str),
+    /// Not a kind of leaf.
+    #[error("`{0}` is not a kind of leaf (expected one of {1})")]
+    LeafKind(String, String),
     /// Not an exposure value.
     #[error("`{0}` is not an exposure value (expected EV at ISO 100 from -10 to 25, as in 12.5)")]
     Exposure(String),
@@ -124,7 +128,7 @@ pub fn parse_paper(text: &str) -> Result<String, ArgumentError> {
 /// # Errors
 /// [`ArgumentError::LeafKind`].
 pub fn parse_leaf_kind(text: &str) -> Result<LeafKind, ArgumentError> {
-    let all = LeafKind::ALL.map(|kind| (names::words(&format!("{kind:?}")).join("-"), kind));
+    let all = LeafKind::ALL.map(|kind| (names::words(&format!("{kind:?}"), str::to_lowercase).join("-"), kind));
     let wanted = text.trim().to_lowercase();
     let found = all.iter().find(|(name, _)| *name == wanted).map(|(_, kind)| *kind);
     found.ok_or_else(|| {

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use canopy::{
     app::{
-        Selection, Sweep, parse_chunk, parse_exposure, parse_flip, parse_frames, parse_lighting, parse_milliseconds,
-        parse_palette, parse_paper, parse_pixels_per_degree, parse_pose, parse_positive, parse_samples, parse_seconds,
-        parse_size, parse_style,
+        LeafKind, Selection, Sweep, parse_chunk, parse_exposure, parse_flip, parse_frames, parse_leaf_kind,
+        parse_lighting, parse_milliseconds, parse_palette, parse_paper, parse_pixels_per_degree, parse_pose,
+        parse_positive, parse_samples, parse_seconds, parse_size, parse_style,
     },
     scene::{Lighting, LocalTime, Pose},
     style::Style,

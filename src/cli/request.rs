@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use canopy::{
     app::{
-        BakeOptions, Clock, Combination, CompareOptions, FlyOptions, Goal, LeafImages, LeafModel, LeafOptions, LightGroup, Output,
-        PIXELS_PER_DEGREE, ProfileOptions, ReferenceKind, ReferenceOptions, RenderOptions, Still, TuneOptions, View,
-        Views,
+        BakeOptions, Clock, Combination, CompareOptions, FlyOptions, Goal, LeafImages, LeafModel, LeafOptions,
+        LightGroup, Output, PIXELS_PER_DEGREE, ProfileOptions, ReferenceKind, ReferenceOptions, RenderOptions, Still,
+        TuneOptions, View, Views,
     },
     scene::{LocalTime, Overrides, SceneSource},
 };
@@ -14,8 +14,8 @@ use clap::CommandFactory;
 use clap::error::ErrorKind;
 
 use super::arguments::{
-    Arguments, Bake, CameraArguments, Common, Compare, Fly, Leaf, LeafChoice, LightChoice, Measured, Profile, Reference,
-    Render, StyleArguments, Tune,
+    Arguments, Bake, CameraArguments, Common, Compare, Fly, Leaf, LeafChoice, LightChoice, Measured, Profile,
+    Reference, Render, StyleArguments, Tune,
 };
 
 /// The scene of `canopy fly` without an argument.

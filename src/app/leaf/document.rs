@@ -65,9 +65,8 @@ pub fn document(material: &PlantMaterial, [width, height]: [f32; 2]) -> (String,
         described["normalTexture"] = index;
     }
     let view = |offset: usize, length: usize| json!({ "buffer": 0, "byteOffset": offset, "byteLength": length });
-    let accessor = |view: usize, kind: &str| {
-        json!({ "bufferView": view, "componentType": 5126, "count": 4, "type": kind })
-    };
+    let accessor =
+        |view: usize, kind: &str| json!({ "bufferView": view, "componentType": 5126, "count": 4, "type": kind });
     let mut of_positions = accessor(0, "VEC3");
     of_positions["min"] = json!([-half, 0.0, 0.0]);
     of_positions["max"] = json!([half, height, 0.0]);

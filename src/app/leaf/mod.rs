@@ -87,7 +87,8 @@ pub fn leaf(options: &LeafOptions, progress: &mut dyn Progress) -> Result<LeafRe
     complete(&mut material, options, &mut report.lines);
 
     let textures = &material.leaf_textures;
-    let color = |image: &Option<Arc<RgbaImage>>| image.as_ref().map(|image| DynamicImage::ImageRgba8((**image).clone()));
+    let color =
+        |image: &Option<Arc<RgbaImage>>| image.as_ref().map(|image| DynamicImage::ImageRgba8((**image).clone()));
     let grey = |image: &Option<Arc<GrayImage>>| image.as_ref().map(|image| DynamicImage::ImageLuma8((**image).clone()));
     let images = [
         ("front", color(&material.base_color_texture)),
@@ -103,7 +104,8 @@ pub fn leaf(options: &LeafOptions, progress: &mut dyn Progress) -> Result<LeafRe
         write_image(&path, image)?;
         report.files.push(path);
     }
-    let shape = material.base_color_texture.as_ref().map_or(1.0, |image| image.height() as f32 / image.width().max(1) as f32);
+    let shape =
+        material.base_color_texture.as_ref().map_or(1.0, |image| image.height() as f32 / image.width().max(1) as f32);
     let path = options.out.join("leaf.gltf");
     let (text, buffer) = document::document(&material, [options.width, options.width * shape]);
     let beside = options.out.join(document::BUFFER);
@@ -161,13 +163,13 @@ fn complete(material: &mut PlantMaterial, options: &LeafOptions, lines: &mut Vec
 
 fn write_image(path: &Path, image: &DynamicImage) -> Result<(), AppError> {
     let mut bytes = std::io::Cursor::new(Vec::new());
-    image.write_to(&mut bytes, image::ImageFormat::Png).map_err(|error| AppError::Write {
-        path: path.to_owned(),
-        source: std::io::Error::other(error),
-    })?;
+    image
+        .write_to(&mut bytes, image::ImageFormat::Png)
+        .map_err(|error| AppError::Write { path: path.to_owned(), source: std::io::Error::other(error) })?;
     write(path, bytes.get_ref())
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), AppError> {
-    files::write_whole(path, |writer| writer.write_all(bytes)).map_err(|source| AppError::Write { path: path.to_owned(), source })
+    files::write_whole(path, |writer| writer.write_all(bytes))
+        .map_err(|source| AppError::Write { path: path.to_owned(), source })
 }

@@ -42,7 +42,8 @@ const SHOWN: f32 = 0.16;
 const FAR: f64 = 40.0;
 
 /// Where the sun is: degrees from the normal of the side that is seen.
-const LIGHTS: [(&str, f32); 3] = [("front light, 25°", 25.0), ("grazing light, 80°", 80.0), ("light from behind, 155°", 155.0)];
+const LIGHTS: [(&str, f32); 3] =
+    [("front light, 25°", 25.0), ("grazing light, 80°", 80.0), ("light from behind, 155°", 155.0)];
 
 /// Draws the sheet of the leaf of `material`, whose height over its width is `shape`. `lines` say where the textures are from.
 ///

@@ -20,7 +20,8 @@ use crate::{
 /// # Errors
 /// [`AppError`] for files that cannot be read.
 pub fn material(options: &LeafOptions, progress: &mut dyn Progress) -> Result<PlantMaterial, AppError> {
-    let mut material = if is_plant(&options.file) { of_plant(options, progress)? } else { of_image(options, progress)? };
+    let mut material =
+        if is_plant(&options.file) { of_plant(options, progress)? } else { of_image(options, progress)? };
     let given = &options.given;
     if let Some(path) = &given.back {
         material.leaf_textures.back = Some(Arc::new(read(path)?));
