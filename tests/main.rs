@@ -10,6 +10,7 @@ mod front_door;
 mod fuzz;
 mod grow;
 mod implicit;
+mod independent;
 mod interrupts;
 mod inventory;
 mod layering;

@@ -16,7 +16,13 @@ use canopy::scene::Viewpoint;
 use canopy::terrain::{HeightField, Surroundings, Terrain};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
-fn part(kind: PartKind, positions: Vec<Vec3>, triangles: Vec<[u32; 3]>, albedo: f32, transmission: f32) -> PlantPart {
+pub(crate) fn part(
+    kind: PartKind,
+    positions: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    albedo: f32,
+    transmission: f32,
+) -> PlantPart {
     let mut normals = vec![Vec3::ZERO; positions.len()];
     for corners in triangles.iter().filter(|corners| corners.iter().all(|&c| (c as usize) < positions.len())) {
         let [a, b, c] = corners.map(|corner| positions[corner as usize]);
@@ -34,7 +40,7 @@ fn part(kind: PartKind, positions: Vec<Vec3>, triangles: Vec<[u32; 3]>, albedo: 
     PlantPart { kind, mesh: PlantMesh { positions, normals, uvs, triangles }, material }
 }
 
-fn plant(parts: Vec<PlantPart>) -> Arc<Plant> {
+pub(crate) fn plant(parts: Vec<PlantPart>) -> Arc<Plant> {
     Arc::new(Plant { name: "test".to_owned(), parts })
 }
 
@@ -62,7 +68,7 @@ fn sphere(kind: PartKind, albedo: f32) -> Arc<Plant> {
 }
 
 /// Level squares of `side` metres at these heights, fronts up.
-fn leaves(heights: &[f32], side: f32, albedo: f32, transmission: f32) -> Arc<Plant> {
+pub(crate) fn leaves(heights: &[f32], side: f32, albedo: f32, transmission: f32) -> Arc<Plant> {
     let corners = [(-0.5, -0.5), (-0.5, 0.5), (0.5, 0.5), (0.5, -0.5)];
     let positions =
         heights.iter().flat_map(|&y| corners.map(|(x, z)| Vec3::new(x * side, y, z * side))).collect::<Vec<_>>();
@@ -71,42 +77,42 @@ fn leaves(heights: &[f32], side: f32, albedo: f32, transmission: f32) -> Arc<Pla
     plant(vec![part(PartKind::Foliage, positions, triangles.collect(), albedo, transmission)])
 }
 
-fn alone() -> Instance {
+pub(crate) fn alone() -> Instance {
     Instance { plant: 0, position: DVec3::ZERO, yaw: 0.0, scale: 1.0, tint: 0.0 }
 }
 
-fn scene(plant: &Arc<Plant>) -> ReferenceScene {
+pub(crate) fn scene(plant: &Arc<Plant>) -> ReferenceScene {
     ReferenceScene::new(std::slice::from_ref(plant), &[alone()], None).unwrap()
 }
 
-fn plane(albedo: f32) -> Ground {
+pub(crate) fn plane(albedo: f32) -> Ground {
     Ground { shape: GroundShape::Plane(0.0), color: GroundColor::Even(Vec3::splat(albedo)), max_distance: 1e6 }
 }
 
-fn shot(position: DVec3, yaw: f64, pitch: f64, size: (u32, u32)) -> Shot {
+pub(crate) fn shot(position: DVec3, yaw: f64, pitch: f64, size: (u32, u32)) -> Shot {
     let view = Viewpoint { position, yaw, pitch, field_of_view: 0.6 };
     Shot { camera: Camera { view, size, near: 0.0 }, fog: None }
 }
 
 /// A single pixel's view of next to nothing.
-fn narrow(position: DVec3, pitch: f64) -> Shot {
+pub(crate) fn narrow(position: DVec3, pitch: f64) -> Shot {
     let shot = shot(position, 0.0, pitch, (1, 1));
     let view = Viewpoint { field_of_view: 1e-4, ..shot.camera.view };
     Shot { camera: Camera { view, ..shot.camera }, fog: None }
 }
 
-fn film(tracer: &PathTracer, shot: &Shot, samples: u32) -> Film {
+pub(crate) fn film(tracer: &PathTracer, shot: &Shot, samples: u32) -> Film {
     let mut film = Film::new(shot).unwrap();
     tracer.render(shot, &mut film, samples, &mut |_| ControlFlow::Continue(())).unwrap();
     film
 }
 
-fn mean(film: &Film) -> Vec3 {
+pub(crate) fn mean(film: &Film) -> Vec3 {
     let pixels = film.radiance();
     pixels.iter().copied().sum::<Vec3>() / pixels.len() as f32
 }
 
-fn close(value: Vec3, expected: f32, bound: f32) -> bool {
+pub(crate) fn close(value: Vec3, expected: f32, bound: f32) -> bool {
     (value / expected - 1.0).abs().max_element() <= bound
 }
 
@@ -116,7 +122,8 @@ fn upper_half(radiance: f32) -> Light {
     Light { environment: Environment::Sky { view, below: Some(Vec3::ZERO) }, ..Light::even(Vec3::ZERO) }
 }
 
-const FLAT: TraceSettings = TraceSettings { bounces: u32::MAX, seed: 1, normals: Normals::Flat, limit: f32::INFINITY };
+pub(crate) const FLAT: TraceSettings =
+    TraceSettings { bounces: u32::MAX, seed: 1, normals: Normals::Flat, limit: f32::INFINITY };
 
 #[test]
 fn white_furnace_a_white_body_vanishes() {
@@ -149,7 +156,7 @@ fn white_furnace_leaves_that_absorb_nothing_vanish() {
 }
 
 /// The plant with leaves of this gloss.
-fn glossy(plant: &Arc<Plant>, reflectance: f32, roughness: f32) -> Arc<Plant> {
+pub(crate) fn glossy(plant: &Arc<Plant>, reflectance: f32, roughness: f32) -> Arc<Plant> {
     let mut plant = Plant::clone(plant);
     plant.set_leaf_gloss(Gloss { reflectance, roughness });
     Arc::new(plant)
