@@ -9,7 +9,9 @@ use std::sync::Arc;
 
 use canopy::light::{Atmosphere, AtmosphereParams, LightSettings, LightState, SunPosition};
 use canopy::plant::{PartKind, Plant};
-use canopy::reference::{Camera, Disc, Light, Normals, PathTracer, ReferenceScene, Shot, TraceSettings};
+use canopy::reference::{
+    Camera, Disc, Environment, Instance, Light, Normals, PathTracer, ReferenceScene, Shot, TraceSettings,
+};
 use canopy::scene::Viewpoint;
 use glam::{DVec3, Vec2, Vec3};
 
@@ -160,12 +162,13 @@ fn glossy_leaf(color: DVec3, gloss: (f64, f64), viewer: DVec3, light: DVec3) -> 
     let through = (1.3 * inside).min(1.0 - color);
     let gain = 1.031_46 + width * (2.971_15 + width * (-0.464_45 + width * 0.747_35));
     let peak = 1.004 / (0.097_622 + width * (1.116_31 + width * (0.639_87 + width * (-1.468_04 + width * 0.614_61))));
-    let strength = ((color - inside) * gain).min((1.0 - inside - through) / peak);
+    // What a bright leaf has no room for in its lobe it reflects diffusely.
+    let specular = (color - inside).min((1.0 - color - through) / (gain * peak - 1.0));
     let middle = (viewer + light).normalize();
     let fresnel = 0.5 + 10.5 * (1.0 - middle.dot(light)).powi(5);
     let distribution = (width / (middle.y * middle.y * (width * width - 1.0) + 1.0)).powi(2) / PI;
     let masking = 0.5 / (2.0 * light.y * viewer.y * (1.0 - width) + (light.y + viewer.y) * width);
-    light.y * (inside / PI + strength * (fresnel * distribution * masking))
+    light.y * ((color - specular) / PI + specular * gain * (fresnel * distribution * masking))
 }
 
 #[test]
@@ -212,37 +215,67 @@ fn prism(sides: u32, albedo: f32) -> Arc<Plant> {
     plant(vec![wood])
 }
 
-/// Mean radiance of the pixels that show a prism alone.
-fn on_prism(prism: &Arc<Plant>, light: &Light, normals: Normals, samples: u32) -> f64 {
-    let scene = scene(prism);
-    let shot = view(DVec3::new(0.0, 4.0, 12.0), 0.0, 4.0, (24, 24));
+/// Mean radiance of a prism on what it covers of an image, turned by so many radians, before a dark background or in even
+/// light of 1.
+fn on_prism(prism: &Arc<Plant>, turned: f64, light: &Light, normals: Normals, samples: u32) -> f64 {
+    const SIDE: u32 = 24;
+    let place = Instance { yaw: turned as f32, ..alone() };
+    let scene = ReferenceScene::new(std::slice::from_ref(prism), &[place], None).unwrap();
+    let shot = view(DVec3::new(0.0, 4.0, 120.0), 0.0, 0.4, (SIDE, SIDE));
     let tracer = PathTracer::new(&scene, light, TraceSettings { normals, ..FLAT }).unwrap();
-    let pixels = film(&tracer, &shot, samples).radiance();
-    let hits = |column: u32, row: u32| {
-        let points = (0..9).map(|i| Vec2::new((i % 3) as f32, (i / 3) as f32) * 0.5);
-        points.into_iter().all(|inside| scene.distance(&shot.camera.ray(column, row, inside)).is_some())
+    let background = f64::from(matches!(light.environment, Environment::Even(radiance) if radiance == Vec3::ONE));
+    let seen = f64::from(mean(&film(&tracer, &shot, samples)).y);
+    // The outlines are upright: one row of many points is enough.
+    let points = 64 * SIDE;
+    let hit = |point: &u32| {
+        let (column, inside) = (point / 64, (point % 64) as f32 / 64.0 + 0.5 / 64.0);
+        scene.distance(&shot.camera.ray(column, SIDE / 2, Vec2::new(inside, 0.5))).is_some()
     };
-    let covered = pixels.iter().enumerate().filter(|(i, _)| hits(*i as u32 % 24, *i as u32 / 24));
-    let (count, sum) = covered.fold((0.0, 0.0), |(count, sum), (_, pixel)| (count + 1.0, sum + f64::from(pixel.y)));
-    assert!(count > 100.0, "{count} pixels show the prism");
-    sum / count
+    let covered = (0..points).filter(hit).count() as f64 / f64::from(points);
+    assert!(covered > 0.3, "the prism covers {covered}");
+    (seen - background * (1.0 - covered)) / covered
 }
 
 #[test]
-fn white_prisms_in_even_light_lose_no_more_than_is_known() {
+fn white_prisms_vanish_in_even_light() {
     let light = Light::even(Vec3::ONE);
-    // What the cut behind the flat triangles costs. One standard error is 0.07 %.
-    for (sides, known) in [(6, 0.976), (8, 0.987), (12, 0.994), (24, 0.9985)] {
-        let white = prism(sides, 1.0);
-        let round = on_prism(&white, &light, Normals::RoundWood, 256);
-        assert!((round - known).abs() < 0.002, "{sides} sides: {round}");
-        let flat = on_prism(&white, &light, Normals::Flat, 4);
-        assert!((flat - 1.0).abs() < 1e-3, "{sides} flat sides: {flat}");
+    for sides in [3, 4, 6, 8, 12, 24] {
+        // Flat triangles lose nothing. The cut behind them does, 2.4 % of the light at six sides, and is made up for: one
+        // standard error of 256 samples is 0.05 %.
+        for (normals, samples, bound) in [(Normals::Flat, 4, 1e-5), (Normals::RoundWood, 256, 2e-3)] {
+            let seen = on_prism(&prism(sides, 1.0), 0.2, &light, normals, samples);
+            assert!((seen - 1.0).abs() < bound, "{sides} sides, {normals:?}: {seen}");
+        }
+        let grey = on_prism(&prism(sides, 0.99), 0.2, &light, Normals::RoundWood, 256);
+        assert!((grey - 1.0).abs() > 2e-3, "{sides} sides: the control has {grey}");
     }
 }
 
 #[test]
-fn a_bright_leaf_with_gloss_returns_what_is_known_of_its_colour() {
+fn prisms_in_the_sun_have_about_the_light_of_their_cylinder() {
+    // Root mean square over suns around the view and over the prism's rotations, of radiance over illuminance, which is
+    // 0.25 in front; at most what is known (docs/decisions/0031). Without the factor for the cut, it would be 0.0492,
+    // 0.0233, 0.0095, 0.0052, 0.0024 and 0.0006. One standard error is 0.0001.
+    for (sides, known) in [(3, 0.0485), (4, 0.0214), (6, 0.0082), (8, 0.0045), (12, 0.0021), (24, 0.0005)] {
+        let prism = prism(sides, 1.0);
+        let mut squares = 0.0;
+        for aside in [0.0, 30.0, 60.0, 90.0, 120.0, 150.0] {
+            // The camera stands in the south.
+            let light = sun(direction(180.0 - aside, 0.0), 1.0);
+            // Mean over the width of a cylinder: the cosine to the viewer is the weight of what is seen.
+            let turn = f64::to_radians(aside);
+            let cylinder = (turn.sin() + (PI - turn) * turn.cos()) / (4.0 * PI);
+            for turn in 0..8 {
+                let turned = TAU / f64::from(sides) * (f64::from(turn) + 0.5) / 8.0;
+                squares += (on_prism(&prism, turned, &light, Normals::RoundWood, 16) - cylinder).powi(2) / 48.0;
+            }
+        }
+        assert!(squares.sqrt() < known, "{sides} sides: {}", squares.sqrt());
+    }
+}
+
+#[test]
+fn a_bright_leaf_with_gloss_returns_its_colour() {
     // Mean over all views, by the cosine, of what comes back of even light.
     let returned = |color: f32| {
         let leaf = glossy(&leaves(&[0.0], 1.5, color, 1.3), 0.045, 0.4);
@@ -257,10 +290,12 @@ fn a_bright_leaf_with_gloss_returns_what_is_known_of_its_colour() {
             sum += height * (f64::from(seen.y) - through);
             weights += height;
         }
-        sum / weights / f64::from(color)
+        sum / weights
     };
-    for (color, known) in [(0.43, 0.967), (0.5, 0.936), (0.6, 0.946)] {
+    // A lobe that is limited and whose rest is lost returns 0.967, 0.936 and 0.946 of these. One standard error of the
+    // mean is 0.1 %.
+    for color in [0.43, 0.5, 0.6] {
         let returned = returned(color);
-        assert!((returned - known).abs() < 0.01, "{color}: {returned}");
+        assert!((returned / f64::from(color) - 1.0).abs() < 0.005, "{color}: {returned}");
     }
 }

@@ -136,11 +136,11 @@ fn white_furnace_a_white_body_vanishes() {
             assert!(close(pixel, 500.0, 1e-5), "{pixel}");
         }
     }
-    // Round normals lose light where facets hide it, and never make any.
+    // Round normals lose light where facets hide it, which is made up for in the mean.
     let round = TraceSettings { normals: Normals::RoundWood, ..FLAT };
     let pixels = film(&PathTracer::new(&ball, &light, round).unwrap(), &shot, 64).radiance();
-    assert!(pixels.iter().all(|pixel| pixel.max_element() <= 500.01));
-    assert!(pixels.iter().map(|pixel| pixel.y).sum::<f32>() / pixels.len() as f32 > 0.97 * 500.0);
+    assert!(pixels.iter().all(|pixel| pixel.max_element() <= 502.0));
+    assert!((pixels.iter().map(|pixel| pixel.y).sum::<f32>() / pixels.len() as f32 / 500.0 - 1.0).abs() < 1e-3);
 }
 
 #[test]
@@ -163,10 +163,9 @@ pub(crate) fn glossy(plant: &Arc<Plant>, reflectance: f32, roughness: f32) -> Ar
 }
 
 #[test]
-fn white_furnace_gloss_loses_only_what_its_facets_shade() {
-    // One leaf of base colour 0.6 that transmits as much as the rest: it absorbs nothing but what its single scattering
-    // loses. Where the diffuse light leaves the lobe no more than its mean, a viewer in the plane of the leaf sets how bright
-    // it may be, and all others see less: of a gloss of some 0.045 at most the whole.
+fn white_furnace_gloss_loses_nothing() {
+    // One leaf of base colour 0.6 that transmits as much as the rest: it absorbs nothing, so there is no room for a lobe, and
+    // all of its colour is diffuse.
     let light = Light::even(Vec3::ONE);
     let shot = shot(DVec3::new(0.0, 4.0, 4.0), 0.0, -0.78, (12, 12));
     for roughness in [0.0, 0.1, 0.4, 1.0] {
@@ -175,7 +174,7 @@ fn white_furnace_gloss_loses_only_what_its_facets_shade() {
         let mut pixels = film.radiance();
         pixels.sort_by(|a, b| a.y.total_cmp(&b.y));
         let darkest = pixels[0].y;
-        assert!(pixels.iter().all(|pixel| pixel.max_element() < 1.01) && darkest > 0.95, "{roughness}: {darkest}");
+        assert!(pixels.iter().all(|pixel| pixel.max_element() < 1.0001) && darkest > 0.9999, "{roughness}: {darkest}");
         // A leaf that absorbs half has room for its whole gloss, and sends back its base colour in the mean of all views.
         let half = self::scene(&glossy(&leaves(&[0.0], 1.5, 0.3, 0.0), 0.045, roughness));
         let tracer = PathTracer::new(&half, &light, FLAT).unwrap();

@@ -5,6 +5,7 @@ mod device;
 mod exposure;
 mod foliage;
 mod forests;
+mod gloss;
 mod levels;
 mod light_updates;
 mod lists;

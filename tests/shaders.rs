@@ -79,7 +79,7 @@ fn is_library(source: &str) -> bool {
 }
 
 /// The shader at `path` with `defines`, composed as Bevy does it.
-fn compose(path: &str, source: &str, defines: &[&str]) -> Result<Module, String> {
+pub(crate) fn compose(path: &str, source: &str, defines: &[&str]) -> Result<Module, String> {
     let defs: HashMap<String, ShaderDefValue> =
         defines.iter().map(|define| ((*define).to_owned(), ShaderDefValue::Bool(true))).collect();
     let mut composer = Composer::default();
@@ -273,7 +273,7 @@ fn gpu_structs_are_what_the_shaders_think() {
             indirect_sun_color,
             ambient_term,
             lobe_gain,
-            lobe_limit,
+            lobe_room,
             cover_weight,
             inverse_height,
             foliage_layer,
@@ -290,7 +290,7 @@ fn gpu_structs_are_what_the_shaders_think() {
             roughness,
             ambient_term,
             lobe_gain,
-            lobe_limit,
+            lobe_room,
             cover_weight,
             optical_depth,
             shares,

@@ -21,10 +21,10 @@ struct Surface {
     specular_reflectance: f32,
     // Root mean square slope of its facets.
     roughness: f32,
-    // Strength of the lobe for a specular albedo of 1, and its maximum strength if nothing else reflects or transmits:
-    // lobe_gain and one over lobe_peak of src/plant/gloss.rs.
+    // Strength of the lobe for a specular albedo of 1, and the largest specular albedo over the fraction of light that
+    // is absorbed: lobe_gain and lobe_room of src/plant/gloss.rs.
     lobe_gain: f32,
-    lobe_limit: f32,
+    lobe_room: f32,
     // Weight of the gloss of many leaves with isotropic normals, 0..1.
     gloss_isotropy: f32,
     // Ambient occlusion, 0..1: visible fraction of the surroundings.
@@ -57,6 +57,14 @@ fn subsurface_share(albedo: vec3<f32>, reflectance: f32) -> vec3<f32> {
     return albedo / max(sqrt(albedo * albedo + reflectance * reflectance) + reflectance, vec3(1e-6));
 }
 
+// Fraction of the reflected light that is diffuse: what has been inside, and what a bright leaf has no room for in its
+// lobe (1 less Gloss::specular_albedo of src/plant/gloss.rs over the albedo).
+fn diffuse_share(surface: Surface) -> vec3<f32> {
+    let room = max(1.0 - surface.albedo * (1.0 + surface.transmission), vec3(0.0)) * surface.lobe_room;
+    let least = 1.0 - room / max(surface.albedo, vec3(1e-6));
+    return max(subsurface_share(surface.albedo, surface.specular_reflectance), least);
+}
+
 // Light through a leaf as a factor on its base colour: the twin of PlantMaterial::transmitted in src/plant/gloss.rs.
 fn leaf_transmission(base_color: vec3<f32>, factor: vec3<f32>, reflectance: f32) -> vec3<f32> {
     let c = clamp(base_color, vec3(0.0), vec3(1.0));
@@ -68,9 +76,8 @@ fn leaf_transmission(base_color: vec3<f32>, factor: vec3<f32>, reflectance: f32)
 // Hammon 2017], whose Fresnel factor is half constant and half that of Schlick [1994]: the mean of (1 - cosine)^5 is
 // 1/21. Leaves with isotropic normals reflect like a ball: equally in all directions except for that factor.
 //
-// A single reflection loses the light that facets mask; the strength of the lobe compensates for it, limited by `room`,
-// the energy that the diffuse light leaves in the brightest grazing direction.
-fn leaf_gloss(surface: Surface, specular_albedo: vec3<f32>, room: vec3<f32>) -> vec3<f32> {
+// A single reflection loses the light that facets mask; the strength of the lobe compensates for it.
+fn leaf_gloss(surface: Surface, specular_albedo: vec3<f32>) -> vec3<f32> {
     let to_light = light.key_direction;
     // Between two opposite directions the half vector is not defined: any direction will do.
     let between = surface.viewer + to_light;
@@ -86,7 +93,7 @@ fn leaf_gloss(surface: Surface, specular_albedo: vec3<f32>, room: vec3<f32>) -> 
     // Distribution times pi; masking over four times the cosines.
     let distribution = width * width / (falloff * falloff);
     let masking = 0.5 / max(mix(2.0 * nl * nv, nl + nv, width), 1e-4);
-    let strength = min(specular_albedo * surface.lobe_gain, max(room, vec3(0.0)) * surface.lobe_limit);
+    let strength = specular_albedo * surface.lobe_gain;
     return fresnel * mix(strength * (distribution * masking * nl), specular_albedo * 0.25, surface.gloss_isotropy);
 }
 
@@ -109,11 +116,10 @@ fn exitant_matt(surface: Surface, key: KeyLight, sky: vec3<f32>) -> vec3<f32> {
 // The same of a leaf, whose specular reflectance may be 0. Only the diffuse part of the key light is reduced by the
 // gloss: the sky has no visible specular lobe.
 fn exitant(surface: Surface, key: KeyLight, sky: vec3<f32>) -> vec3<f32> {
-    let subsurface = subsurface_share(surface.albedo, surface.specular_reflectance);
-    let room = 1.0 - surface.albedo * (subsurface + surface.transmission);
-    let specular_albedo = surface.albedo * (1.0 - subsurface);
-    let gloss = leaf_gloss(surface, specular_albedo, room) * light.key_illuminance * INVERSE_PI;
-    return exitant_matt(surface, KeyLight(key.near * subsurface, key.far, key.visibility), sky) + gloss * key.visibility;
+    let diffuse = diffuse_share(surface);
+    let specular_albedo = surface.albedo * (1.0 - diffuse);
+    let gloss = leaf_gloss(surface, specular_albedo) * light.key_illuminance * INVERSE_PI;
+    return exitant_matt(surface, KeyLight(key.near * diffuse, key.far, key.visibility), sky) + gloss * key.visibility;
 }
 
 // Cosines of the key light to the viewer's side and to the other, in the mean over the leaves.
@@ -169,14 +175,13 @@ fn transferred_key_light(
 // `lit`, as a fraction of what a surface that faces the light gets, weighted as src/bake/levels/cross/sun.rs says.
 // `visibility` is that behind other plants.
 fn shade_leaves(surface: Surface, lit: f32, visibility: f32, sky: vec3<f32>) -> vec3<f32> {
-    let subsurface = subsurface_share(surface.albedo, surface.specular_reflectance);
-    let room = 1.0 - surface.albedo * (subsurface + surface.transmission);
+    let share = diffuse_share(surface);
     let full = light.key_illuminance * INVERSE_PI;
-    let gloss = leaf_gloss(surface, surface.albedo * (1.0 - subsurface), room);
+    let gloss = leaf_gloss(surface, surface.albedo * (1.0 - share));
     // The leaves' own shade, for the gloss: what they show over what they would show without it.
     let sides = key_cosines(surface);
     let through = dot(surface.transmission, LUMINANCE);
     let own = saturate(lit * (1.0 + through) / max(sides.x + through * sides.y, 0.05));
-    let diffuse = surface.albedo * (subsurface + surface.transmission) * lit;
+    let diffuse = surface.albedo * (share + surface.transmission) * lit;
     return full * visibility * (diffuse + gloss * own) + surface.albedo * sky;
 }

@@ -228,7 +228,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.specular_reflectance = reflectance * foliage;
     surface.roughness = variants[variant].roughness;
     surface.lobe_gain = variants[variant].lobe_gain;
-    surface.lobe_limit = variants[variant].lobe_limit;
+    surface.lobe_room = variants[variant].lobe_room;
     surface.gloss_isotropy = max(surface.isotropic_fraction, variants[variant].realigned * (1.0 - published));
     let ground = sample_ground(in.relative);
     let by_transfer = variants[variant].radiance_transfer == 1u;

@@ -52,7 +52,7 @@ struct Variant {
     ambient_term: u32,
     // As in `Surface`.
     lobe_gain: f32,
-    lobe_limit: f32,
+    lobe_room: f32,
     // Factor on the cover around it: 0 where its ambient visibility holds the shade of the trees around already, else 1.
     cover_weight: f32,
     // The nominal height over its own, times FACTOR_ONE.

@@ -34,7 +34,7 @@ struct Part {
     ambient_term: u32,
     // As in `Surface`.
     lobe_gain: f32,
-    lobe_limit: f32,
+    lobe_room: f32,
     cover_weight: f32,
     // Of leaves with layers: the members of `Tissue`.
     optical_depth: f32,
@@ -257,7 +257,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.specular_reflectance = part.specular_reflectance;
     surface.roughness = part.roughness;
     surface.lobe_gain = part.lobe_gain;
-    surface.lobe_limit = part.lobe_limit;
+    surface.lobe_room = part.lobe_room;
     // A pixel that covers half a texture of leaves covers several of them, and each faces elsewhere: highlights of one would
     // sparkle. Normals that point out of the crown are no leaf's at all; as published, the crown has the highlight.
     let isotropy = max(saturate(2.0 * max(across.x, across.y)), part.realigned);

@@ -24,7 +24,7 @@ use glam::{Vec2, Vec3};
 use image::RgbaImage;
 use serde::{Deserialize, Serialize};
 
-pub use gloss::{Gloss, lobe_gain, lobe_peak};
+pub use gloss::{Gloss, lobe_gain, lobe_peak, lobe_room};
 pub use leaf_kind::LeafKind;
 pub use optics::LeafColors;
 pub use tissue::{LeafTextures, LeafTissue, Measured};

@@ -10,7 +10,13 @@
 //! lobe applies to all light, and each leaf reflects about its own normal.
 //!
 //! Energy: reflection and transmission together must not exceed 1. A material that exceeds it is scaled down, channel
-//! by channel, to a sum of 1 in the same ratio; the lobe is limited to the rest.
+//! by channel, to a sum of 1 in the same ratio. Where the rest has no room for the whole lobe
+//! ([`Gloss::specular_albedo`]), the leaf reflects more diffusely: its base colour is kept.
+//!
+//! Interpolated normals: a surface scatters by the cosine to the interpolated normal, but no light passes through the
+//! flat triangle. Of even light, the part `(1 - c) / 2` of that cosine lies behind the triangle, `c` being the cosine
+//! between both normals. The diffuse light is therefore raised by `2 / (1 + c)`: a white surface loses nothing of even
+//! light ([`Bsdf::new`]).
 
 use std::f32::consts::{PI, TAU};
 
@@ -46,10 +52,14 @@ impl Shares {
         if gloss.reflectance <= 0.0 {
             return whole;
         }
-        let subsurface_albedo = gloss.subsurface_albedo(whole.reflected);
-        let (specular_albedo, room) =
-            (whole.reflected - subsurface_albedo, Vec3::ONE - subsurface_albedo - whole.transmitted);
-        Self { reflected: subsurface_albedo, lobe: Lobe::new(specular_albedo, room, gloss.roughness), ..whole }
+        let specular_albedo = gloss.specular_albedo(whole.reflected, whole.transmitted);
+        let lobe = Lobe::new(specular_albedo, gloss.roughness);
+        Self { reflected: whole.reflected - specular_albedo, lobe, ..whole }
+    }
+
+    /// The same with `factor` times the diffuse light.
+    fn with_diffuse(self, factor: f32) -> Self {
+        Self { reflected: self.reflected * factor, transmitted: self.transmitted * factor, ..self }
     }
 }
 
@@ -93,6 +103,9 @@ impl Bsdf {
         let shading = if shading.dot(geometric) < 0.0 { -shading } else { shading };
         // A viewer behind the plane of an interpolated normal sees no facets; what they would send is lost.
         let cosine = shading.dot(to_viewer);
+        // What the cut behind the triangle costs of even light.
+        let kept = 0.5 * (1.0 + shading.dot(geometric).min(1.0));
+        let shares = if shading == geometric { shares } else { shares.with_diffuse(kept.recip()) };
         let gloss = shares.lobe.filter(|_| cosine >= 0.0).map_or(0.0, |lobe| lobe.weight(cosine));
         Self { geometric, shading, to_viewer, shares, gloss, tissue: None }
     }
@@ -313,6 +326,10 @@ mod tests {
                 let most = if bsdf.lobe().is_some() { 0.8 * SHINY.reflectance } else { 0.0 };
                 assert!((drawn - all).max_element() < 2e-3 + most);
                 assert!(shading != Vec3::Y || (drawn - all).min_element() > -2e-3);
+                // The diffuse light makes up for it; a lobe that is cut loses something.
+                let material = Shares::glossy(Vec3::new(0.5, 0.3, 0.1), Vec3::new(0.4, 0.15, 0.02), Gloss::MATT);
+                let whole = material.reflected + material.transmitted;
+                assert!(bsdf.lobe().is_some() || (drawn - whole).abs().max_element() < 2e-3, "{drawn} {whole}");
             }
         }
     }

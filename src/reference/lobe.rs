@@ -16,8 +16,9 @@
 //! strength is raised accordingly ([`lobe_gain`]), here and in the shader.
 //!
 //! A viewer in the surface's plane gets most: 4.7 to 1 times the strength ([`lobe_peak`]). Where that and a bright
-//! leaf's diffuse light would exceed 1, the lobe is scaled down, channel by channel; viewers elsewhere then get too
-//! little. A green leaf, which absorbs most light, is far from that limit.
+//! leaf's diffuse light would exceed 1, a part of the specular albedo is reflected diffusely instead, channel by channel
+//! ([`Gloss::specular_albedo`](crate::plant::Gloss::specular_albedo)). A green leaf, which absorbs most light, is far
+//! from that limit.
 
 use std::f32::consts::{FRAC_1_PI, TAU};
 
@@ -38,11 +39,11 @@ pub(crate) struct Lobe {
 }
 
 impl Lobe {
-    /// A lobe that reflects the fraction `specular_albedo` of the light, at most `room`, which the diffuse light leaves
-    /// over; both 0..1. `width`: 0.1..=1. `None` if the lobe reflects nothing.
-    pub fn new(specular_albedo: Vec3, room: Vec3, width: f32) -> Option<Self> {
+    /// A lobe that reflects the fraction `specular_albedo` of the light in the mean over all directions, 0..1. `width`:
+    /// 0.1..=1. `None` if the lobe reflects nothing.
+    pub fn new(specular_albedo: Vec3, width: f32) -> Option<Self> {
         let (gain, peak) = (lobe_gain(width), lobe_peak(width));
-        let strength = (specular_albedo * gain).min(room.max(Vec3::ZERO) / peak);
+        let strength = specular_albedo * gain;
         (strength.max_element() > 0.0).then_some(Self { strength, width, before: 0.75 / gain, peak })
     }
 
@@ -113,9 +114,8 @@ mod tests {
 
     const WIDTHS: [f32; 4] = [0.1, 0.25, 0.4, 1.0];
 
-    /// A lobe that is not scaled down.
     fn lobe(specular_albedo: f32, width: f32) -> Lobe {
-        Lobe::new(Vec3::splat(specular_albedo), Vec3::ONE, width).unwrap()
+        Lobe::new(Vec3::splat(specular_albedo), width).unwrap()
     }
 
     fn direction(height: f32, azimuth: f32) -> Vec3 {
@@ -199,7 +199,8 @@ mod tests {
     fn the_shaders_lobe_carries_its_whole_share() {
         for width in [0.05, 0.1, 0.15, 0.25, 0.4, 0.6, 0.8, 1.0] {
             let carried = carried(width);
-            assert!((carried - 1.0).abs() < 0.05, "{width}: {carried}");
+            let bound = if width < 0.1 { 0.05 } else { 0.01 };
+            assert!((carried - 1.0).abs() < bound, "{width}: {carried}");
         }
     }
 
@@ -229,7 +230,8 @@ mod tests {
     #[test]
     fn it_carries_its_sheen_in_the_mean_and_never_more_than_there_is() {
         for width in [0.1, 0.13, 0.2, 0.3, 0.4, 0.55, 0.7, 0.85, 1.0] {
-            let (plain, tight) = (lobe(0.04, width), Lobe::new(Vec3::splat(0.04), Vec3::splat(0.1), width).unwrap());
+            // The latter sends a tenth of the light to its brightest view.
+            let (plain, tight) = (lobe(0.04, width), lobe(0.1 / (lobe_gain(width) * lobe_peak(width)), width));
             let (mut mean, count) = (0.0, 128);
             for step in 0..count {
                 let height = (step as f32 + 0.5) / count as f32;
@@ -245,7 +247,7 @@ mod tests {
                 assert!((0.7..1.4).contains(&ratio), "{width}, {height}: {ratio}");
             }
         }
-        assert!(Lobe::new(Vec3::ZERO, Vec3::ONE, 0.4).is_none() && Lobe::new(Vec3::ONE, Vec3::ZERO, 0.4).is_none());
+        assert!(Lobe::new(Vec3::ZERO, 0.4).is_none());
     }
 
     #[test]

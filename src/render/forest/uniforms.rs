@@ -17,7 +17,7 @@ use crate::{
     lod::level_distance::inverse_height,
     math::luminance,
     plant::{
-        LeafColors, LeafTissue, PlantMaterial, lobe_gain, lobe_peak,
+        LeafColors, LeafTissue, PlantMaterial, lobe_gain, lobe_room,
         tissue_light::{SKY_COSINES, TissueLight},
     },
     scatter::PlantSize,
@@ -94,8 +94,8 @@ pub struct VariantUniform {
     pub ambient_term: u32,
     /// Strength of the lobe of its gloss that carries a share of 1 ([`lobe_gain`]).
     pub lobe_gain: f32,
-    /// Greatest strength of the lobe where nothing else reflects or transmits (one over [`lobe_peak`]).
-    pub lobe_limit: f32,
+    /// Greatest share of the lobe over the fraction of light that is absorbed ([`lobe_room`]).
+    pub lobe_room: f32,
     /// Factor on the cover around it: 0 where its k_a holds the shade of the trees around already, else 1.
     pub cover_weight: f32,
     /// Its [`inverse_height`].
@@ -142,8 +142,8 @@ pub struct PartUniform {
     pub ambient_term: u32,
     /// Strength of the lobe of its gloss that carries a share of 1 ([`lobe_gain`]).
     pub lobe_gain: f32,
-    /// Greatest strength of the lobe where nothing else reflects or transmits (one over [`lobe_peak`]).
-    pub lobe_limit: f32,
+    /// Greatest share of the lobe over the fraction of light that is absorbed ([`lobe_room`]).
+    pub lobe_room: f32,
     /// Factor on the cover around it: 0 where its k_a holds the shade of the trees around already, else 1.
     pub cover_weight: f32,
     /// Of the tissue of leaves with layers ([`TissueLight`]): absorption times thickness; 0 without.
@@ -247,7 +247,7 @@ fn variant(plant: &BakedPlant, size: &PlantSize) -> VariantUniform {
         indirect_sun_mean: mean,
         ambient_term: plant.lighting.ambient_term() as u32,
         lobe_gain: lobe_gain(gloss.roughness),
-        lobe_limit: lobe_peak(gloss.roughness).recip(),
+        lobe_room: lobe_room(gloss.roughness),
         cover_weight: cover_weight(&plant.lighting),
         inverse_height: inverse_height(size.height),
         foliage_layer: 0,
@@ -306,7 +306,7 @@ pub fn part_uniform(material: &PlantMaterial, lighting: &BakedLighting, tissue: 
         roughness: gloss.roughness,
         ambient_term: lighting.ambient_term() as u32,
         lobe_gain: lobe_gain(gloss.roughness),
-        lobe_limit: lobe_peak(gloss.roughness).recip(),
+        lobe_room: lobe_room(gloss.roughness),
         cover_weight: cover_weight(lighting),
         optical_depth: tissue.optical_depth,
         padding: [0; 2],
