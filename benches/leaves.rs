@@ -238,7 +238,8 @@ fn times(rounds: u32) {
     let plant = Arc::new(plant);
     let instance = Instance { plant: 0, position: DVec3::ZERO, yaw: 0.0, scale: 1.0, tint: 0.0 };
     let scene = |model: LeafModel| {
-        let scene = ReferenceScene::new(std::slice::from_ref(&plant), &[instance], None).expect("the scene is possible");
+        let scene =
+            ReferenceScene::new(std::slice::from_ref(&plant), &[instance], None).expect("the scene is possible");
         scene.with_leaves(model)
     };
     let models = [scene(LeafModel::Standard), scene(LeafModel::Layers)];
@@ -260,5 +261,8 @@ fn times(rounds: u32) {
         }
     }
     let [standard, layers] = total.map(|total| total.as_secs_f64() / f64::from(rounds.max(1)));
-    println!("\na broadleaf's crown, 320 x 240, 8 samples: standard {standard:.3} s, layers {layers:.3} s, {:.3} times", layers / standard);
+    println!(
+        "\na broadleaf's crown, 320 x 240, 8 samples: standard {standard:.3} s, layers {layers:.3} s, {:.3} times",
+        layers / standard
+    );
 }

@@ -15,12 +15,12 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 use image::{GrayImage, Luma, Rgba, RgbaImage, imageops};
 
-use super::surface::{color_of, value_of};
+use super::surface::{color_of, filled, value_of};
 use super::{LeafTextures, LeafTissue, Measured, PlantMaterial};
 use crate::math::{linear_to_srgb, luminance};
 
 /// Value of thickness and absorption where nothing tells more.
-const EVEN: f32 = 0.5;
+pub(crate) const EVEN: f32 = 0.5;
 /// Share of its luminance that the back of a leaf reflects more than its front, without colour: the lower epidermis
 /// scatters light before it meets the chlorophyll.
 const PALER: f32 = 0.3;
@@ -54,17 +54,13 @@ fn center((x, y): (u32, u32), (width, height): (u32, u32)) -> Vec2 {
 
 /// The size that a derived texture has: that of the transmission, otherwise that of the front; `None` without either.
 fn size_of(material: &PlantMaterial) -> Option<(u32, u32)> {
-    let filled = |image: &&Arc<RgbaImage>| image.width() > 0 && image.height() > 0;
-    let transmission = material.leaf_textures.transmission.as_ref().filter(filled);
-    transmission.or(material.base_color_texture.as_ref().filter(filled)).map(|image| image.dimensions())
+    let image = filled(&material.leaf_textures.transmission).or_else(|| filled(&material.base_color_texture));
+    image.map(|image| image.dimensions())
 }
 
 /// Whether the leaf is there.
 fn covered(material: &PlantMaterial, uv: Vec2) -> bool {
-    let Some(front) = material.base_color_texture.as_ref().filter(|image| image.width() > 0 && image.height() > 0)
-    else {
-        return true;
-    };
+    let Some(front) = filled(&material.base_color_texture) else { return true };
     let at = uv * Vec2::new(front.width() as f32, front.height() as f32);
     front
         .get_pixel_checked(at.x as u32, at.y as u32)
@@ -73,14 +69,14 @@ fn covered(material: &PlantMaterial, uv: Vec2) -> bool {
 
 /// Linear base colour of the front, 0..=1.
 fn front_at(material: &PlantMaterial, uv: Vec2) -> Vec3 {
-    let texture = material.base_color_texture.as_ref().filter(|image| image.width() > 0 && image.height() > 0);
-    texture.map_or(Vec3::ONE, |image| color_of(image, uv)) * material.base_color
+    let texture = filled(&material.base_color_texture);
+    texture.map_or(Vec3::ONE, |image| color_of(&image, uv)) * material.base_color
 }
 
 /// Linear transmission, 0..=1: that of the texture, otherwise derived from the front.
 pub(crate) fn transmission_at(material: &PlantMaterial, uv: Vec2) -> Vec3 {
-    match material.leaf_textures.transmission.as_ref().filter(|image| image.width() > 0 && image.height() > 0) {
-        Some(image) => color_of(image, uv),
+    match filled(&material.leaf_textures.transmission) {
+        Some(image) => color_of(&image, uv),
         None => material.transmitted(front_at(material, uv)),
     }
 }
@@ -143,7 +139,7 @@ fn high_passed(image: &GrayImage, sigma: f32) -> GrayImage {
 
 /// A texture with the size and the mask of the front and the colours of `of` (linear, 0..=1).
 fn painted(material: &PlantMaterial, of: impl Fn(Vec2) -> Vec3) -> Option<RgbaImage> {
-    let front = material.base_color_texture.as_ref().filter(|image| image.width() > 0 && image.height() > 0)?;
+    let front = filled(&material.base_color_texture)?;
     let size = front.dimensions();
     Some(RgbaImage::from_fn(size.0, size.1, |x, y| {
         let [r, g, b] = of(center((x, y), size)).to_array().map(|value| code(linear_to_srgb(value)));
@@ -168,7 +164,7 @@ pub fn back_of(material: &PlantMaterial) -> Option<RgbaImage> {
 /// Tangent-space normals (OpenGL convention) of a relief whose height is the luminance of the front: veins are paler and
 /// stand out. `depth`: height of the full range over the width of the texture. `None` without a front texture.
 pub fn bump_of(material: &PlantMaterial, depth: f32) -> Option<RgbaImage> {
-    let front = material.base_color_texture.as_ref().filter(|image| image.width() > 0 && image.height() > 0)?;
+    let front = filled(&material.base_color_texture)?;
     let (width, height) = front.dimensions();
     let at = |x: u32, y: u32| {
         let place = center((x % width, y % height), (width, height));
@@ -220,7 +216,6 @@ pub(crate) fn attenuated_transmission(material: &PlantMaterial, tissue: &LeafTis
     if tissue.measured == Measured::Texel {
         return None;
     }
-    let filled = |image: &Option<Arc<GrayImage>>| image.clone().filter(|image| image.width() > 0 && image.height() > 0);
     let textures = &material.leaf_textures;
     let [thickness, absorption] = [filled(&textures.thickness), filled(&textures.absorption)];
     let sizes = [thickness.as_ref(), absorption.as_ref()].into_iter().flatten().map(|image| image.dimensions());

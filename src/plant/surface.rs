@@ -3,7 +3,7 @@
 use std::sync::{Arc, LazyLock};
 
 use glam::{Vec2, Vec3};
-use image::{GrayImage, ImageBuffer, RgbaImage};
+use image::{GrayImage, ImageBuffer, Pixel, RgbaImage};
 
 use super::{PartKind, PlantPart};
 use crate::math::srgb_to_linear;
@@ -125,12 +125,13 @@ impl Surface {
     }
 }
 
-/// An image that has texels.
-fn filled<T: image::Pixel>(
-    image: &Option<Arc<ImageBuffer<T, Vec<T::Subpixel>>>>,
-) -> Option<Arc<ImageBuffer<T, Vec<T::Subpixel>>>> {
+/// An image, if it has texels.
+pub(crate) fn filled<T: Pixel>(image: &Option<Arc<Image<T>>>) -> Option<Arc<Image<T>>> {
     image.clone().filter(|image| image.width() > 0 && image.height() > 0)
 }
+
+/// An image of pixels `T`.
+pub(crate) type Image<T> = ImageBuffer<T, Vec<<T as Pixel>::Subpixel>>;
 
 /// Linear colour of `image` at `uv`, its texels weighted by their alpha, so that colours beyond an outline do not bleed in. White
 /// where all are transparent. The image must have texels.

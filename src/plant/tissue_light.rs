@@ -5,11 +5,15 @@
 //! integral over each layer, for which there is a closed form, and the optical depth is the mean of the leaf. Levels of
 //! detail whose leaves are too small to have an angle of their own have the mean over all angles.
 
+use std::sync::Arc;
+
 use glam::Vec3;
+use image::RgbaImage;
 
 use super::LeafTissue;
 use super::leaf_textures::{Derivation, mean_optical_depth, thickness_and_absorption, transmission_of};
 use super::optics::{mean_over_leaf, mean_texel};
+use super::surface::filled;
 use super::{Plant, PlantMaterial};
 
 /// The least cosine of a ray to the normal inside a layer.
@@ -40,14 +44,11 @@ impl TissueLight {
     pub fn new(material: &PlantMaterial) -> Option<Self> {
         let tissue = material.tissue?.sanitized();
         let textures = &material.leaf_textures;
-        let filled = |image: &Option<std::sync::Arc<image::GrayImage>>| {
-            image.clone().filter(|image| image.width() > 0 && image.height() > 0)
-        };
         let [mut thickness, mut absorption] = [filled(&textures.thickness), filled(&textures.absorption)];
         if (thickness.is_none() || absorption.is_none())
             && let Some(derived) = thickness_and_absorption(material, Derivation::default())
         {
-            let [of_thickness, of_absorption] = derived.map(std::sync::Arc::new);
+            let [of_thickness, of_absorption] = derived.map(Arc::new);
             thickness.get_or_insert(of_thickness);
             absorption.get_or_insert(of_absorption);
         }
@@ -142,7 +143,7 @@ impl Plant {
 impl PlantMaterial {
     /// Takes `image` for what comes through (sRGB), and its mean over the leaf for the levels of detail that have a factor
     /// on the front instead.
-    pub fn set_transmission(&mut self, image: std::sync::Arc<image::RgbaImage>) {
+    pub fn set_transmission(&mut self, image: Arc<RgbaImage>) {
         let wanted = mean_texel(&image, self).truncate();
         let [inside] = mean_over_leaf(self, |color| [self.gloss.subsurface_albedo(color)]);
         let most = Vec3::splat(Self::MOST_TRANSMISSION);
@@ -157,7 +158,7 @@ impl PlantMaterial {
         self.base_color *= before;
         self.transmission *= behind / before.max(1e-6);
         self.leaf_textures = super::LeafTextures {
-            transmission: through.map(|image| std::sync::Arc::new(scaled(&image, behind))),
+            transmission: through.map(|image| Arc::new(scaled(&image, behind))),
             ..super::LeafTextures::default()
         };
         self.tissue = None;
@@ -165,8 +166,9 @@ impl PlantMaterial {
 
     /// What comes through, with what the tissue does to perpendicular light at every texel: sRGB. `None` without a
     /// tissue and without a texture.
-    pub fn light_through(&self) -> Option<image::RgbaImage> {
-        let given = self.leaf_textures.transmission.as_deref().filter(|image| image.width() > 0 && image.height() > 0);
+    pub fn light_through(&self) -> Option<RgbaImage> {
+        let given = filled(&self.leaf_textures.transmission);
+        let given = given.as_deref();
         let Some(tissue) = self.tissue.map(LeafTissue::sanitized) else { return given.cloned() };
         super::leaf_textures::attenuated_transmission(self, &tissue)
             .or_else(|| given.cloned())
@@ -175,7 +177,7 @@ impl PlantMaterial {
 }
 
 /// The image with its linear colours times `factor`.
-fn scaled(image: &image::RgbaImage, factor: f32) -> image::RgbaImage {
+fn scaled(image: &RgbaImage, factor: f32) -> RgbaImage {
     use crate::math::{linear_to_srgb, srgb_to_linear};
     let code = |code: u8| {
         let value = factor * srgb_to_linear(f32::from(code) / 255.0);

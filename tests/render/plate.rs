@@ -10,8 +10,10 @@ use canopy::{
         lighting::{BakedLighting, ExpressiveLighting, LightingSettings, implicit::AmbientField},
     },
     components::Sun,
+    light::{Atmosphere, AtmosphereParams},
     lod::{FadeBand, Levels},
-    plant::{Gloss, PartKind, Plant, PlantMaterial, PlantMesh, PlantPart},
+    plant::{Gloss, LeafTextures, LeafTissue, PartKind, Plant, PlantMaterial, PlantMesh, PlantPart},
+    reference::{Camera, Film, Instance, LeafModel, Light, PathTracer, ReferenceScene, Shot, TraceSettings},
     render::components::{CanopyCamera, Forest, Ground, SunShadowSettings},
     scatter::{CoverMap, PackedStand, PlantSize, Stand, Tree, packed::DEFAULT_CELL_SIZE},
     scene::Pose,
@@ -239,5 +241,71 @@ fn neighbours_darken_trees_that_are_lit_together_once() {
         // A control: the cover around matters.
         assert!(alone < 0.95 * open, "{what}: {alone} of {open} among neighbours");
         assert!((lit_together / open - 1.0).abs() < 1e-3, "{what}: {lit_together} of {open}, which is what k_a says");
+    }
+}
+
+/// Mean radiance (nits) of the middle of `plant`, traced, seen from above or below at `hour`.
+fn traced(plant: &Plant, above: bool, hour: &str) -> f64 {
+    let plant = Arc::new(plant.clone());
+    let instance = Instance { plant: 0, position: DVec3::ZERO, yaw: 0.0, scale: 1.0, tint: 0.0 };
+    let scene = ReferenceScene::new(&[plant], &[instance], None).expect("a scene").with_leaves(LeafModel::Species);
+    let sun = Sun { instant: instant(hour), fixed_ev100: Some(14.0), ..Sun::default() };
+    let atmosphere = Atmosphere::new(AtmosphereParams::with_visibility_km(sun.visibility_km)).expect("air");
+    let light = Light::of(&sun.light(&atmosphere).expect("a light"), None);
+    let (height, pitch) = if above { (13.0, -89.0) } else { (-7.0, 89.0) };
+    let view = Pose { position: (0.0, height, 0.0), yaw: 0.0, pitch }.viewpoint(0.0, 2.0);
+    let shot = Shot { camera: Camera { view, size: (4, 4), near: 0.0 }, fog: None };
+    let tracer = PathTracer::new(&scene, &light, TraceSettings::default()).expect("a tracer");
+    let mut film = Film::new(&shot).expect("a film");
+    tracer.render(&shot, &mut film, 1024, &mut |_| std::ops::ControlFlow::Continue(())).expect("an image");
+    film.radiance().iter().map(|pixel| f64::from(pixel.y)).sum::<f64>() / 16.0
+}
+
+/// The layered leaf in real time [Franzke 2005, 4.2.2] against that of the path tracer: both over the same leaf without layers, whose
+/// light the other tests compare.
+#[test]
+fn leaves_with_layers_have_the_light_of_the_path_tracer() {
+    let _gpu = gpu();
+    // The code of an sRGB texture whose colour is the transmission that `material` has by its factor.
+    let through = RgbaImage::from_pixel(4, 4, Rgba([69, 69, 69, 255]));
+    let textures = LeafTextures { transmission: Some(Arc::new(through)), ..LeafTextures::default() };
+    let of = |tissue: Option<LeafTissue>| PlantMaterial { tissue, leaf_textures: textures.clone(), ..material() };
+    // A thick leaf, so that the layers matter.
+    let tissue = LeafTissue { max_thickness: 0.002, absorption_range: [900.0; 2], ..LeafTissue::default() };
+    let mut largest = 1.0f64;
+    // The sun at 65, 35 and 10 degrees.
+    for hour in [HOURS[0], HOURS[1], "2026-06-21T04:40+00:00"] {
+        for above in [true, false] {
+            let [plain, layered] = [None, Some(tissue)].map(|tissue| plate(PartKind::Foliage, Vec3::Y, of(tissue)));
+            let drawn = drawn(local(&layered), None, 1e4, above, hour) / drawn(local(&plain), None, 1e4, above, hour);
+            let truth = traced(&layered, above, hour) / traced(&plain, above, hour);
+            let ratio = drawn / truth;
+            assert!((ratio - 1.0).abs() < 0.05, "{hour}, above {above}: {drawn} drawn, {truth} traced");
+            largest = largest.min(truth);
+        }
+    }
+    // A control: the layers matter.
+    assert!(largest < 0.85, "{largest}");
+}
+
+/// A back of its own is seen from below only, and what a texture lets through from both sides.
+#[test]
+fn a_leaf_has_its_own_back() {
+    let _gpu = gpu();
+    let bright = RgbaImage::from_pixel(4, 4, Rgba([255, 255, 255, 255]));
+    let front = PlantMaterial { base_color: Vec3::splat(0.12), transmission: Vec3::ZERO, ..material() };
+    let half = RgbaImage::from_pixel(4, 4, Rgba([188, 188, 188, 255]));
+    let with_back = PlantMaterial {
+        base_color_texture: Some(Arc::new(half)),
+        base_color: Vec3::splat(0.24),
+        leaf_textures: LeafTextures { back: Some(Arc::new(bright)), ..LeafTextures::default() },
+        ..front.clone()
+    };
+    for (above, expected) in [(true, 1.0), (false, 2.0)] {
+        let seen = |material: &PlantMaterial| {
+            drawn(local(&plate(PartKind::Foliage, Vec3::Y, material.clone())), None, 1e4, above, HOURS[0])
+        };
+        let ratio = seen(&with_back) / seen(&front);
+        assert!((ratio / expected - 1.0).abs() < 0.03, "above {above}: {ratio}");
     }
 }

@@ -60,17 +60,16 @@ impl Default for DiffuseTransmission {
 impl DiffuseTransmission {
     /// What comes through at every texel, as large as the larger of the two textures; `None` where neither has texels.
     fn product(&self, factor: Option<&RgbaImage>, color: Option<&RgbaImage>) -> Option<RgbaImage> {
-        let filled =
-            |image: Option<&'_ RgbaImage>| image.filter(|image| image.width() > 0 && image.height() > 0).cloned();
-        let (factor, color) = (filled(factor), filled(color));
-        let sizes = [&factor, &color].into_iter().flatten().map(RgbaImage::dimensions);
+        let [factor, color] =
+            [factor, color].map(|image| image.filter(|image| image.width() > 0 && image.height() > 0));
+        let sizes = [factor, color].into_iter().flatten().map(RgbaImage::dimensions);
         let (width, height) = sizes.max_by_key(|(width, height)| u64::from(*width) * u64::from(*height))?;
         let share = |value: f32| if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) };
         let (share_of_all, tint) = (share(self.factor), Vec3::from(self.color.map(share)));
         Some(RgbaImage::from_fn(width, height, |x, y| {
             let uv = Vec2::new((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
-            let passed = share_of_all * factor.as_ref().map_or(1.0, |image| alpha_of(image, uv));
-            let color = tint * color.as_ref().map_or(Vec3::ONE, |image| color_of(image, uv));
+            let passed = share_of_all * factor.map_or(1.0, |image| alpha_of(image, uv));
+            let color = tint * color.map_or(Vec3::ONE, |image| color_of(image, uv));
             let code = |value: f32| (255.0 * linear_to_srgb(value.clamp(0.0, 1.0)) + 0.5) as u8;
             let [r, g, b] = (passed * color).to_array().map(code);
             Rgba([r, g, b, 255])

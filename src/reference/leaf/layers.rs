@@ -21,15 +21,13 @@
 //!   that for one medium; through layers of 1.33, 1 and 1.33 it is 53 % short at 80 degrees. [`LeafModel::Published`]
 //!   has it.
 //! - The weights add up to 1 over all layers.
-//! - The cosine in a layer is at least [`LEAST_COSINE`]: in the spongy tissue, which refracts like air, a grazing ray
+//! - The cosine in a layer is at least [`LEAST_LAYER_COSINE`]: in the spongy tissue, which refracts like air, a grazing ray
 //!   would never arrive.
 //!
 //! [`LeafModel::Published`]: super::LeafModel::Published
 
 use crate::plant::LeafTissue;
-
-/// The least cosine of a ray to the normal inside a layer.
-pub(crate) const LEAST_COSINE: f32 = 0.05;
+use crate::plant::tissue_light::LEAST_LAYER_COSINE;
 
 /// The three layers, from the side of the viewer.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,7 +53,7 @@ pub(crate) struct TestPoint {
 
 /// The cosine of a ray inside a medium that has met its plane at the cosine `outside` (Snell's law).
 fn refracted(outside: f32, inverse_square: f32) -> f32 {
-    (1.0 - inverse_square * (1.0 - outside * outside)).max(0.0).sqrt().max(LEAST_COSINE)
+    (1.0 - inverse_square * (1.0 - outside * outside)).max(0.0).sqrt().max(LEAST_LAYER_COSINE)
 }
 
 impl Layers {

@@ -7,8 +7,8 @@ use image::{GrayImage, RgbaImage};
 
 use super::LeafModel;
 use super::layers::Layers;
-use crate::plant::leaf_textures::{Derivation, Sign, mean_optical_depth, thickness_and_absorption};
-use crate::plant::surface::{channels_of, color_of, value_of};
+use crate::plant::leaf_textures::{Derivation, EVEN, Sign, mean_optical_depth, thickness_and_absorption};
+use crate::plant::surface::{channels_of, color_of, filled, value_of};
 use crate::plant::{LeafTissue, Measured, PartKind, PlantPart};
 
 /// The leaves of a part, ready to be looked up.
@@ -28,10 +28,6 @@ pub(crate) struct PartLeaf {
     factor: Vec3,
 }
 
-fn filled<T>(image: &Option<Arc<T>>, size: impl Fn(&T) -> (u32, u32)) -> Option<Arc<T>> {
-    image.clone().filter(|image| size(image).0 > 0 && size(image).1 > 0)
-}
-
 impl PartLeaf {
     /// The leaves of `part` by `model`; `None` for wood, and where the standard model is enough.
     pub fn new(part: &PlantPart, model: LeafModel) -> Option<Self> {
@@ -45,8 +41,7 @@ impl PartLeaf {
         let tissue = tissue?.sanitized();
         let published = model == LeafModel::Published;
         let textures = &material.leaf_textures;
-        let [mut thickness, mut absorption] =
-            [&textures.thickness, &textures.absorption].map(|image| filled(image, |image| image.dimensions()));
+        let [mut thickness, mut absorption] = [&textures.thickness, &textures.absorption].map(filled);
         if thickness.is_none() || absorption.is_none() {
             let sign = if published { Sign::Published } else { Sign::Dark };
             if let Some(derived) = thickness_and_absorption(material, Derivation { sign, high_pass: None }) {
@@ -69,8 +64,8 @@ impl PartLeaf {
         Some(Self {
             tissue,
             layers,
-            back: filled(&textures.back, |image| image.dimensions()),
-            bump: filled(&material.normal_texture, |image| image.dimensions()),
+            back: filled(&textures.back),
+            bump: filled(&material.normal_texture),
             thickness,
             absorption,
             contained,
@@ -85,12 +80,12 @@ impl PartLeaf {
 
     /// Thickness in metres at `uv`.
     pub fn thickness(&self, uv: Vec2) -> f32 {
-        self.tissue.max_thickness * self.thickness.as_deref().map_or(0.5, |image| value_of(image, uv))
+        self.tissue.max_thickness * self.thickness.as_deref().map_or(EVEN, |image| value_of(image, uv))
     }
 
     /// Optical depth at `uv` of tissue that is `thickness` metres thick.
     pub fn optical_depth(&self, uv: Vec2, thickness: f32) -> f32 {
-        let absorption = self.absorption.as_deref().map_or(0.5, |image| value_of(image, uv));
+        let absorption = self.absorption.as_deref().map_or(EVEN, |image| value_of(image, uv));
         self.tissue.optical_depth(thickness / self.tissue.max_thickness, absorption)
     }
 

@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::layers::Layers;
+use crate::plant::tissue_light::LEAST_LAYER_COSINE;
 
 /// Height over the shift along the surface by which the start of a ray is raised, so that a curved leaf does not shade
 /// itself: its triangles may meet at up to this slope.
@@ -42,7 +43,7 @@ impl LeafView {
         let away = -(to_viewer - normal * normal.dot(to_viewer)).normalize_or_zero();
         let inside = thickness * (away * point.lateral - normal * point.depth);
         let rest = if behind { 1.0 - point.depth } else { point.depth };
-        let outside = inside + direction * (thickness * rest / cosine.abs().max(super::layers::LEAST_COSINE));
+        let outside = inside + direction * (thickness * rest / cosine.abs().max(LEAST_LAYER_COSINE));
         let shift = (outside - normal * normal.dot(outside)).length();
         // On the plane exactly, whatever was clamped.
         let height = if behind { -thickness - RAISED * shift } else { RAISED * shift };
