@@ -13,7 +13,7 @@ use crate::{
     plant::{
         Gloss, LeafTissue, Plant,
         gltf::{GltfOptions, load_plant},
-        grow::{GrowParameters, grow},
+        grow::{GrowParameters, LeafPainting, Rules},
     },
     scatter::packed::MAX_VARIANTS,
     scene::{GrownForm, Lighting, PlantSource, Quality, Scene, Species},
@@ -25,7 +25,7 @@ pub enum IndividualSource {
     /// By rule.
     Grown {
         /// The rules.
-        parameters: Box<GrowParameters>,
+        rules: Rules,
         /// The source of the rules, for messages.
         from: PathBuf,
         /// Seed of this individual.
@@ -49,8 +49,9 @@ impl IndividualSource {
     /// [`StageError`] for rules or a file that cannot be used.
     pub fn build(&self) -> Result<(Plant, Vec<String>), StageError> {
         match self {
-            Self::Grown { parameters, from, seed, triangles } => {
-                let plant = grow(parameters, *seed, *triangles)
+            Self::Grown { rules, from, seed, triangles } => {
+                let plant = rules
+                    .grow(*seed, *triangles, LeafPainting::Front)
                     .map_err(|source| StageError::Grow { path: from.clone(), source })?;
                 Ok((plant, Vec::new()))
             }
@@ -125,23 +126,24 @@ pub fn plan(scene: &Scene) -> Result<PlantPlan, StageError> {
 fn sources(species: &Species, gloss: Gloss) -> Result<Vec<IndividualSource>, StageError> {
     Ok(match &species.plant {
         PlantSource::Grown(grown) => {
-            let (mut parameters, from) = match &grown.form {
-                GrownForm::Broadleaf => (GrowParameters::broadleaf(), "broadleaf".into()),
-                GrownForm::Conifer => (GrowParameters::conifer(), "conifer".into()),
+            let (mut rules, from) = match &grown.form {
+                GrownForm::Broadleaf => (Rules::Tree(GrowParameters::broadleaf().into()), "broadleaf".into()),
+                GrownForm::Conifer => (Rules::Tree(GrowParameters::conifer().into()), "conifer".into()),
                 GrownForm::File(path) => {
                     let text = std::fs::read_to_string(path)
                         .map_err(|source| StageError::Read { path: path.clone(), source })?;
                     let parameters = GrowParameters::from_ron(&text)
                         .map_err(|source| StageError::Grow { path: path.clone(), source })?;
-                    (parameters, path.clone())
+                    (Rules::Tree(parameters.into()), path.clone())
                 }
+                GrownForm::House(plant) => (Rules::House(plant.clone()), plant.name().into()),
             };
-            if let Some(leaf) = species.leaf {
+            if let (Rules::Tree(parameters), Some(leaf)) = (&mut rules, species.leaf) {
                 parameters.leaves.transmission = leaf.transmission().to_array();
             }
             (0..grown.individuals)
                 .map(|individual| IndividualSource::Grown {
-                    parameters: Box::new(parameters.clone()),
+                    rules: rules.clone(),
                     from: from.clone(),
                     seed: grown.seed.wrapping_add(u64::from(individual)),
                     triangles: grown.triangles as usize,

@@ -105,7 +105,7 @@ impl LeafKind {
             Self::Leathery => return None,
             Self::Needle => (2.2, 55.0, 12.0, 0.0, 0.1, 0.02, 0.02),
             Self::Dead => (2.0, 1.5, 2.0, 0.0, 2.0, 0.002, 0.002),
-            Self::AutumnYellow => (1.5, 4.0, 8.0, 0.0, 0.48, 0.01, 0.003),
+            Self::AutumnYellow => (1.5, 4.0, 8.0, 0.2, 0.48, 0.006, 0.0025),
             Self::AutumnRed => (1.5, 10.0, 6.0, 22.0, 0.0, 0.01, 0.005),
         };
         Some(Constituents { structure, chlorophyll, carotenoid, anthocyanin, brown, water, dry_matter })

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::check::Check;
 use super::lighting::Lighting;
-use crate::plant::{Gloss, LeafKind, LeafTissue, gltf::UpAxis};
+use crate::plant::{Gloss, LeafKind, LeafTissue, gltf::UpAxis, grow::HousePlant};
 
 /// One species.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -89,6 +89,10 @@ pub enum GrownForm {
     Conifer,
     /// Rules from a RON file, relative to the scene file: `form: File("../species/birch.ron")`.
     File(PathBuf),
+    /// A house plant, one by one with curved leaves and all textures of the layered leaf model: `form: House(Leaf)`,
+    /// `House(Stamped("CANOPY"))`, `House(RubberPlant)`, `House(SpiderPlant)`, `House(Begonia)`, `House(Bush)` or
+    /// `House(Courtyard)`.
+    House(HousePlant),
 }
 
 /// Plants read from files.
@@ -213,8 +217,14 @@ impl Species {
             PlantSource::Grown(grown) => {
                 check.count(&format!("{at}.plant.individuals"), grown.individuals, 1..=16);
                 check.count(&format!("{at}.plant.triangles"), grown.triangles, 5_000..=100_000);
-                if let GrownForm::File(path) = &grown.form {
-                    check.path(&format!("{at}.plant.form"), path);
+                match &grown.form {
+                    GrownForm::File(path) => check.path(&format!("{at}.plant.form"), path),
+                    GrownForm::House(plant) => {
+                        if let Err(error) = plant.validate() {
+                            check.problem(&format!("{at}.plant.form"), error.to_string(), "choose other letters");
+                        }
+                    }
+                    GrownForm::Broadleaf | GrownForm::Conifer => {}
                 }
             }
             PlantSource::Gltf(gltf) => gltf.check(at, check),

@@ -19,7 +19,7 @@ use crate::{
     assets::{background, read},
     plant::{
         gltf::{ExternalFiles, GltfOptions, external_files},
-        grow::GrowParameters,
+        grow::{GrowParameters, Rules},
     },
     scene::{GrownForm, PlantSource, Species},
 };
@@ -73,21 +73,22 @@ async fn species(
     let species = Species::parse(&text(bytes, path)?, path)?;
     let individuals = match &species.plant {
         PlantSource::Grown(grown) => {
-            let (mut parameters, from) = match &grown.form {
-                GrownForm::Broadleaf => (GrowParameters::broadleaf(), path.to_owned()),
-                GrownForm::Conifer => (GrowParameters::conifer(), path.to_owned()),
+            let (mut rules, from) = match &grown.form {
+                GrownForm::Broadleaf => (Rules::Tree(GrowParameters::broadleaf().into()), path.to_owned()),
+                GrownForm::Conifer => (Rules::Tree(GrowParameters::conifer().into()), path.to_owned()),
                 GrownForm::File(file) => {
                     let bytes = read::beside(context, file).await.map_err(|source| unreadable(file, source))?;
                     let parameters = GrowParameters::from_ron(&text(&bytes, file)?)
                         .map_err(|source| StageError::Grow { path: file.clone(), source })?;
-                    (parameters, file.clone())
+                    (Rules::Tree(parameters.into()), file.clone())
                 }
+                GrownForm::House(plant) => (Rules::House(plant.clone()), path.to_owned()),
             };
-            if let Some(leaf) = species.leaf {
+            if let (Rules::Tree(parameters), Some(leaf)) = (&mut rules, species.leaf) {
                 parameters.leaves.transmission = leaf.transmission().to_array();
             }
             let individual = |number: u32| Individual::Grown {
-                parameters: Box::new(parameters.clone()),
+                rules: rules.clone(),
                 from: from.clone(),
                 seed: grown.seed.wrapping_add(u64::from(number)),
                 triangles: grown.triangles as usize,

@@ -8,7 +8,7 @@ use crate::{
     plant::{
         Plant,
         gltf::{ExternalFiles, GltfOptions, load_plant_bytes},
-        grow::{GrowParameters, grow},
+        grow::{LeafPainting, Rules},
     },
     scene::{Lighting, Species},
 };
@@ -28,7 +28,7 @@ pub struct Recipe {
 pub enum Individual {
     /// By rule.
     Grown {
-        parameters: Box<GrowParameters>,
+        rules: Rules,
         /// The source of the rules, for messages.
         from: PathBuf,
         seed: u64,
@@ -41,8 +41,9 @@ pub enum Individual {
 impl Individual {
     fn make(&self) -> Result<(Plant, Vec<String>), StageError> {
         match self {
-            Self::Grown { parameters, from, seed, triangles } => {
-                let plant = grow(parameters, *seed, *triangles)
+            Self::Grown { rules, from, seed, triangles } => {
+                let plant = rules
+                    .grow(*seed, *triangles, LeafPainting::Front)
                     .map_err(|source| StageError::Grow { path: from.clone(), source })?;
                 Ok((plant, Vec::new()))
             }

@@ -167,6 +167,9 @@ fn plate_transmission(k: f64) -> f64 {
     if k <= 0.0 {
         return 1.0;
     }
+    if k > 700.0 {
+        return 0.0;
+    }
     ((1.0 - k) * (-k).exp() + k * k * exponential_integral(k)).clamp(0.0, 1.0)
 }
 

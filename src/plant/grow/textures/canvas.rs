@@ -30,6 +30,13 @@ impl Canvas {
         self.pixels[pixel] = self.pixels[pixel] * (1.0 - coverage) + color.extend(1.0) * coverage;
     }
 
+    /// Blends a colour over a pixel that is seen through: what lies there already dims it, to its own value times `pass`
+    /// relative to white.
+    pub fn over_filter(&mut self, pixel: usize, color: Vec3, pass: f32, coverage: f32) {
+        let behind = self.pixels[pixel].w;
+        self.over(pixel, color * (1.0 - behind + behind * pass), coverage);
+    }
+
     /// Darkens a pixel.
     pub fn shade(&mut self, pixel: usize, factor: f32) {
         let old = self.pixels[pixel];

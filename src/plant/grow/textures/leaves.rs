@@ -5,6 +5,7 @@ use std::f32::consts::{PI, TAU};
 use glam::{Vec2, Vec3};
 use image::RgbaImage;
 
+use super::Layer;
 use super::canvas::Canvas;
 use super::lattice::noise;
 use crate::math::smoothstep;
@@ -18,20 +19,48 @@ const GREEN: Vec3 = Vec3::new(0.298, 0.402, 0.178);
 /// Colour of the twig, sRGB.
 const TWIG: Vec3 = Vec3::new(0.34, 0.27, 0.19);
 
-/// Paints the cluster.
-pub(super) fn paint(shape: LeafShape) -> RgbaImage {
+/// Half the thickness texture of a blade without veins, and its absorption.
+const LAMINA: [f32; 2] = [0.42, 0.38];
+/// Fraction of the light through one leaf that a second leaf behind it lets pass, relative to its own.
+const SECOND: f32 = 0.45;
+
+/// Paints one layer of the cluster. All layers have the same leaves.
+pub(super) fn paint(shape: LeafShape, layer: Layer) -> RgbaImage {
+    let (twigs, leaves) = arrange(shape);
+    let outline = Outline::new(shape);
+    let mut canvas = Canvas::new(SIZE);
+    let draw_twigs = |canvas: &mut Canvas| {
+        for (index, twig) in twigs.iter().enumerate() {
+            let (r0, r1) = if index == 0 { (7.0, 3.0) } else { (4.5, 2.0) };
+            twig.draw(canvas, r0, r1, layer.twig(TWIG));
+        }
+    };
+    let size = SIZE as f32;
+    if layer == Layer::Back {
+        // From behind the order is the other way round.
+        for (index, leaf) in leaves.iter().enumerate().rev() {
+            leaf.draw(&mut canvas, &outline, index as u32, size, layer);
+        }
+        draw_twigs(&mut canvas);
+    } else {
+        draw_twigs(&mut canvas);
+        for (index, leaf) in leaves.iter().enumerate() {
+            leaf.draw(&mut canvas, &outline, index as u32, size, layer);
+        }
+    }
+    canvas.finish()
+}
+
+/// The twigs of the cluster, the main one first, and its leaves, the deepest first.
+fn arrange(shape: LeafShape) -> (Vec<Twig>, Vec<Leaf>) {
     let mut random = Random::new(match shape {
         LeafShape::Lobed => 20,
         _ => 10,
     });
-    let outline = Outline::new(shape);
-    let mut canvas = Canvas::new(SIZE);
-    let size = SIZE as f32;
     let mut leaves = Vec::new();
-
     let main = Twig { base: Vec2::new(0.5, 1.0), angle: 0.03, length: 0.68, bend: -0.10 };
-    main.draw(&mut canvas, 7.0, 3.0);
     main.leaves(&mut random, 3, 0.30, 0.25, &mut leaves);
+    let mut twigs = Vec::new();
     for index in 0..6 {
         let side = if index % 2 == 0 { 1.0 } else { -1.0 };
         let along = 0.16 + 0.12 * index as f32 + 0.02 * random.signed();
@@ -42,15 +71,13 @@ pub(super) fn paint(shape: LeafShape) -> RgbaImage {
             length: (0.37 - 0.10 * along) * random.range(0.92, 1.05),
             bend: -side * random.range(0.06, 0.16),
         };
-        twig.draw(&mut canvas, 4.5, 2.0);
         twig.leaves(&mut random, 4, 0.22, 0.24, &mut leaves);
+        twigs.push(twig);
     }
+    twigs.insert(0, main);
     // Deepest leaves first, so that those at the tips of twigs are on top.
     leaves.sort_by(|a, b| a.depth.total_cmp(&b.depth));
-    for (index, leaf) in leaves.iter().enumerate() {
-        leaf.draw(&mut canvas, &outline, index as u32, size);
-    }
-    canvas.finish()
+    (twigs, leaves)
 }
 
 /// A twig in units of the width of the texture. Angles are clockwise from straight up.
@@ -70,12 +97,12 @@ impl Twig {
         (self.base + self.length * along * Vec2::new(middle.sin(), -middle.cos()), angle)
     }
 
-    fn draw(&self, canvas: &mut Canvas, r0: f32, r1: f32) {
+    fn draw(&self, canvas: &mut Canvas, r0: f32, r1: f32, color: Vec3) {
         let (steps, size) = (8, SIZE as f32);
         for step in 0..steps {
             let (a, b) = (step as f32 / steps as f32, (step + 1) as f32 / steps as f32);
             let radius = |t: f32| r0 + (r1 - r0) * t;
-            canvas.stroke(self.at(a).0 * size, self.at(b).0 * size, radius(a), radius(b), TWIG);
+            canvas.stroke(self.at(a).0 * size, self.at(b).0 * size, radius(a), radius(b), color);
         }
     }
 
@@ -123,12 +150,12 @@ impl Leaf {
         }
     }
 
-    fn draw(&self, canvas: &mut Canvas, outline: &Outline, seed: u32, size: f32) {
+    fn draw(&self, canvas: &mut Canvas, outline: &Outline, seed: u32, size: f32, layer: Layer) {
         let (base, length) = (self.base * size, self.length * size);
         let axis = Vec2::new(self.angle.sin(), -self.angle.cos());
         let across = Vec2::new(-axis.y, axis.x);
         let petiole = 0.10 * length;
-        canvas.stroke(base, base + axis * (petiole + 4.0), 2.2, 1.6, Vec3::new(0.42, 0.42, 0.22));
+        canvas.stroke(base, base + axis * (petiole + 4.0), 2.2, 1.6, layer.twig(Vec3::new(0.42, 0.42, 0.22)));
         let foot = base + axis * petiole;
         let blade = length - petiole;
 
@@ -141,19 +168,26 @@ impl Leaf {
                 outline.distance(place, self.width) * blade
             };
             let shadow = inside(center - Vec2::new(5.0, 9.0));
-            if shadow > -12.0 {
+            if layer == Layer::Front && shadow > -12.0 {
                 canvas.shade(pixel, 1.0 - 0.34 * smoothstep(-12.0, 10.0, shadow));
             }
             let distance = inside(center);
             if distance > -0.5 {
                 let place = Place::of(center - foot, axis, across, blade, self.bend);
-                canvas.over(pixel, self.color_at(outline, place, seed), distance + 0.5);
+                match layer {
+                    Layer::Front => canvas.over(pixel, self.color_at(outline, place, seed), distance + 0.5),
+                    Layer::Through => {
+                        let value = self.layer_at(outline, place, seed, layer);
+                        canvas.over_filter(pixel, value, SECOND, distance + 0.5);
+                    }
+                    _ => canvas.over(pixel, self.layer_at(outline, place, seed, layer), distance + 0.5),
+                }
             }
         }
     }
 
-    /// The colour at a position on the blade: midrib, veins, bulges between them, mottling, a lighter rim.
-    fn color_at(&self, outline: &Outline, place: Place, seed: u32) -> Vec3 {
+    /// The veins at a position on the blade.
+    fn veins_at(&self, outline: &Outline, place: Place) -> Veins {
         let half = (outline.half_width(place.along) * self.width).max(1e-3);
         let across = (place.across / half).clamp(-1.0, 1.0);
         let outer = across.abs();
@@ -164,6 +198,13 @@ impl Leaf {
         let phase = vein - vein.floor();
         let nearest = phase.min(1.0 - phase);
         let line = (1.0 - smoothstep(0.02, 0.09, nearest)) * (1.0 - 0.75 * outer) * smoothstep(0.0, 0.08, place.along);
+        Veins { across, midrib, line, phase, nearest }
+    }
+
+    /// The colour at a position on the blade: midrib, veins, bulges between them, mottling, a lighter rim.
+    fn color_at(&self, outline: &Outline, place: Place, seed: u32) -> Vec3 {
+        let Veins { across, midrib, line, phase, .. } = self.veins_at(outline, place);
+        let outer = across.abs();
         let swelling = (TAU * phase).sin() * 0.045 * (1.0 - 0.5 * outer);
         let mottle = 0.06 * noise(24.0 * place.along, 24.0 * place.across, [256, 256], seed)
             + 0.04 * noise(90.0 * place.along, 90.0 * place.across, [1024, 1024], seed + 100);
@@ -173,6 +214,46 @@ impl Leaf {
         let vein_color = self.color * 1.28 + Vec3::new(0.07, 0.06, 0.03);
         (self.color * value).lerp(vein_color, (0.75 * midrib).max(0.42 * line))
     }
+
+    /// The value of a layer other than the front, at a position on the blade.
+    fn layer_at(&self, outline: &Outline, place: Place, seed: u32, layer: Layer) -> Vec3 {
+        let Veins { midrib, line, nearest, .. } = self.veins_at(outline, place);
+        let mottle = 0.6 * noise(24.0 * place.along, 24.0 * place.across, [256, 256], seed)
+            + 0.4 * noise(90.0 * place.along, 90.0 * place.across, [1024, 1024], seed + 100);
+        let between = smoothstep(0.05, 0.40, nearest);
+        // How this leaf differs from the mean, as the front has it, in linear colour.
+        let own = (self.color / GREEN).powf(2.2);
+        let [lamina, absorbs] = LAMINA;
+        match layer {
+            Layer::Front => self.color_at(outline, place, seed),
+            Layer::Back => {
+                let tissue = own * (0.94 + 0.05 * mottle);
+                (0.5 * tissue).lerp(Vec3::new(0.86, 0.80, 0.78), (0.85 * midrib).max(0.60 * line))
+            }
+            Layer::Through => {
+                let glow = own * (0.86 + 0.20 * between + 0.10 * mottle);
+                0.5 * glow * (1.0 - 0.72 * midrib) * (1.0 - 0.42 * line)
+            }
+            Layer::Thickness => Vec3::splat(lamina + (1.0 - lamina) * midrib.max(0.55 * line) + 0.03 * mottle),
+            Layer::Absorption => {
+                Vec3::splat(absorbs + (0.92 - absorbs) * (0.95 * midrib).max(0.75 * line) + 0.05 * mottle)
+            }
+            Layer::Relief => Vec3::splat(0.5 + 0.22 * between - 0.35 * midrib - 0.16 * line + 0.02 * mottle),
+        }
+    }
+}
+
+/// The veins at a position on a leaf.
+struct Veins {
+    /// Distance from the midrib over the half width there, -1..=1.
+    across: f32,
+    /// 1 on the midrib, 0 beside it.
+    midrib: f32,
+    /// 1 on a side vein, 0 beside it.
+    line: f32,
+    /// Position between two side veins, 0..1, and distance to the nearer one, 0..=0.5.
+    phase: f32,
+    nearest: f32,
 }
 
 /// A position on a leaf, in units of the length of its blade.

@@ -6,14 +6,20 @@
 //! Applied Optics 4).
 
 mod bark;
+pub mod blade;
 mod canvas;
-mod lattice;
+pub(super) mod lattice;
+mod layers;
 mod leaves;
+pub(super) mod masonry;
 mod needles;
 
 use std::sync::{Arc, OnceLock};
 
+use glam::Vec3;
 use image::RgbaImage;
+
+pub use layers::paint_layers;
 
 use super::parameters::{BarkKind, LeafShape};
 use crate::math::compute_once;
@@ -50,8 +56,8 @@ pub fn cluster(shape: LeafShape) -> Arc<RgbaImage> {
     PAINTED[slot]
         .get_or_init(|| {
             Arc::new(match shape {
-                LeafShape::Ovate | LeafShape::Lobed => leaves::paint(shape),
-                LeafShape::Needles => needles::paint(),
+                LeafShape::Ovate | LeafShape::Lobed => leaves::paint(shape, Layer::Front),
+                LeafShape::Needles => needles::paint(Layer::Front),
             })
         })
         .clone()
@@ -63,4 +69,34 @@ pub fn coverage(shape: LeafShape) -> f32 {
     let texture = cluster(shape);
     let opaque = texture.pixels().filter(|pixel| pixel[3] >= 128).count();
     opaque as f32 / (texture.width() * texture.height()) as f32
+}
+
+/// One texture of a cluster of leaves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Layer {
+    /// What the upper side reflects, sRGB.
+    Front,
+    /// What the lower side reflects over its mean: linear, half of it.
+    Back,
+    /// What comes through over its mean: linear, half of it.
+    Through,
+    /// Thickness.
+    Thickness,
+    /// Absorption.
+    Absorption,
+    /// Height of the upper side.
+    Relief,
+}
+
+impl Layer {
+    /// The value of a twig that has `color` on the front.
+    fn twig(self, color: Vec3) -> Vec3 {
+        match self {
+            Self::Front => color,
+            Self::Back => Vec3::new(0.62, 0.34, 0.55),
+            Self::Through => Vec3::ZERO,
+            Self::Thickness | Self::Absorption => Vec3::ONE,
+            Self::Relief => Vec3::splat(0.5),
+        }
+    }
 }
