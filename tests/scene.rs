@@ -6,7 +6,7 @@ use canopy::app::parse_lighting;
 use canopy::bake::lighting::SunLight;
 use canopy::light::MoonSetting;
 use canopy::lod::{FadeBand, Levels, Representation};
-use canopy::plant::{Gloss, LeafKind};
+use canopy::plant::{Gloss, LeafKind, grow::HousePlant};
 use canopy::scatter::{LengthUnit, Sequence};
 use canopy::scene::{
     Anchor, GltfPlants, Ground, GroundFile, GrownForm, GrownPlants, InventoryTrees, Lighting, Overrides, Path,
@@ -157,6 +157,20 @@ fn the_kind_of_leaf_is_read() -> Outcome {
     assert_eq!(parse(FULL)?.species[1].leaf, None);
     let scene = parse(&FULL.replace("name: \"pine\",", "name: \"pine\", leaf: Needle,"))?;
     assert_eq!(scene.species[1].leaf, Some(LeafKind::Needle));
+    Ok(())
+}
+
+#[test]
+fn house_plants_are_named_by_their_form() -> Outcome {
+    let text = |form: &str| FULL.replace("form: File(\"birch.ron\")", &format!("form: House({form})"));
+    let form = |scene: &Scene| match &scene.species[2].plant {
+        PlantSource::Grown(grown) => Some(grown.form.clone()),
+        PlantSource::Gltf(_) => None,
+    };
+    assert_eq!(form(&parse(&text("RubberPlant"))?), Some(GrownForm::House(HousePlant::RubberPlant)));
+    assert_eq!(form(&parse(&text("Stamped(\"leaf\")"))?), Some(GrownForm::House(HousePlant::Stamped("leaf".into()))));
+    let wrong = parse(&text("Stamped(\"\u{e9}\")")).err().ok_or("accepted")?.to_string();
+    assert!(wrong.contains("cannot be stamped") && wrong.contains("form"), "{wrong}");
     Ok(())
 }
 
@@ -469,7 +483,7 @@ fn files_that_are_no_scenes_are_refused() -> Outcome {
 fn shipped_scenes_are_valid_and_name_files_that_exist() -> Outcome {
     let folder = FilePath::new(env!("CARGO_MANIFEST_DIR")).join("assets/scenes");
     let mut count = 0;
-    for entry in std::fs::read_dir(&folder)? {
+    for entry in std::fs::read_dir(&folder)?.chain(std::fs::read_dir(folder.join("leaf"))?) {
         let path = entry?.path();
         if path.extension().is_none_or(|extension| extension != "ron") {
             continue;
@@ -497,7 +511,7 @@ fn shipped_scenes_are_valid_and_name_files_that_exist() -> Outcome {
         }
         count += 1;
     }
-    assert!(count >= 2, "only {count} scenes in {}", folder.display());
+    assert!(count >= 9, "only {count} scenes in {}", folder.display());
     Ok(())
 }
 
