@@ -92,8 +92,11 @@ pub struct Ground {
     pub max_distance: f64,
 }
 
-/// The normals that shading uses. Where they are interpolated, light from behind the flat triangle is ignored: some
-/// energy is lost there, none is created, and reflection is no longer exactly reciprocal.
+/// The normals that shading uses. Where they are interpolated, light from behind the flat triangle is ignored, and the
+/// diffuse rest is raised so that a white surface returns all of even light. Of sunlight a surface with few sides returns
+/// somewhat too little in front and too much aside: a prism of `n` sides that stands for a cylinder is off by 2.1, 1.2,
+/// 0.5 and 0.1 % in front and 2.5, 1.3, 0.6 and 0.1 % from the side, for 6, 8, 12 and 24 sides, in the mean over its
+/// rotations. Reflection is not exactly reciprocal there. Decision 0031 has the figures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Normals {
     /// Those of the triangles: exact for the mesh as it is, facets included.
