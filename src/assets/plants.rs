@@ -32,6 +32,8 @@ pub enum IndividualSource {
         seed: u64,
         /// Number of triangles.
         triangles: usize,
+        /// The textures of its leaves.
+        leaves: LeafPainting,
     },
     /// From a file.
     Gltf {
@@ -49,9 +51,9 @@ impl IndividualSource {
     /// [`StageError`] for rules or a file that cannot be used.
     pub fn build(&self) -> Result<(Plant, Vec<String>), StageError> {
         match self {
-            Self::Grown { rules, from, seed, triangles } => {
+            Self::Grown { rules, from, seed, triangles, leaves } => {
                 let plant = rules
-                    .grow(*seed, *triangles, LeafPainting::Front)
+                    .grow(*seed, *triangles, *leaves)
                     .map_err(|source| StageError::Grow { path: from.clone(), source })?;
                 Ok((plant, Vec::new()))
             }
@@ -147,6 +149,7 @@ fn sources(species: &Species, gloss: Gloss) -> Result<Vec<IndividualSource>, Sta
                     from: from.clone(),
                     seed: grown.seed.wrapping_add(u64::from(individual)),
                     triangles: grown.triangles as usize,
+                    leaves: LeafPainting::of(species.tissue),
                 })
                 .collect()
         }

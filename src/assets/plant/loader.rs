@@ -19,7 +19,7 @@ use crate::{
     assets::{background, read},
     plant::{
         gltf::{ExternalFiles, GltfOptions, external_files},
-        grow::{GrowParameters, Rules},
+        grow::{GrowParameters, LeafPainting, Rules},
     },
     scene::{GrownForm, PlantSource, Species},
 };
@@ -92,6 +92,7 @@ async fn species(
                 from: from.clone(),
                 seed: grown.seed.wrapping_add(u64::from(number)),
                 triangles: grown.triangles as usize,
+                leaves: LeafPainting::of(species.tissue),
             };
             (0..grown.individuals).map(individual).collect()
         }

@@ -33,6 +33,8 @@ pub enum Individual {
         from: PathBuf,
         seed: u64,
         triangles: usize,
+        /// The textures of its leaves.
+        leaves: LeafPainting,
     },
     /// The bytes of a glTF file.
     Gltf { path: PathBuf, bytes: Vec<u8>, files: ExternalFiles, options: GltfOptions },
@@ -41,9 +43,9 @@ pub enum Individual {
 impl Individual {
     fn make(&self) -> Result<(Plant, Vec<String>), StageError> {
         match self {
-            Self::Grown { rules, from, seed, triangles } => {
+            Self::Grown { rules, from, seed, triangles, leaves } => {
                 let plant = rules
-                    .grow(*seed, *triangles, LeafPainting::Front)
+                    .grow(*seed, *triangles, *leaves)
                     .map_err(|source| StageError::Grow { path: from.clone(), source })?;
                 Ok((plant, Vec::new()))
             }

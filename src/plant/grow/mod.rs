@@ -32,7 +32,7 @@ pub use parameters::{
     StemParameters,
 };
 
-use super::{Gloss, PartKind, Plant, PlantMaterial, PlantPart};
+use super::{Gloss, LeafTissue, PartKind, Plant, PlantMaterial, PlantPart};
 use random::Random;
 
 /// Possible numbers of triangles of a plant.
@@ -126,6 +126,13 @@ pub enum LeafPainting {
     /// All of the layered leaf model: back, transmission, thickness, absorption, and bump for broad leaves. Takes a
     /// second for the first tree of a shape of leaves, 0.1 s and 8 MB for each further one.
     Layers,
+}
+
+impl LeafPainting {
+    /// What leaves with this tissue, or with none, need.
+    pub fn of(tissue: Option<LeafTissue>) -> Self {
+        if tissue.is_some() { Self::Layers } else { Self::Front }
+    }
 }
 
 /// Grows an individual as [`grow`] does, with the textures of its leaves that `painting` names. All have the same meshes

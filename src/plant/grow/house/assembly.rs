@@ -85,16 +85,19 @@ impl Blade {
         let stamped = matches!(self, Self::Stamped(_));
         let absorption_range = if stamped { [300.0, 6000.0] } else { LeafTissue::default().absorption_range };
         let measured = if stamped { Measured::Leaf } else { Measured::Texel };
-        PlantMaterial {
+        let through = layers.transmission.clone();
+        let mut material = PlantMaterial {
             base_color_texture: Some(front),
             normal_texture: Some(normal),
-            // For who does not read the transmission texture.
-            transmission: Vec3::splat(1.0),
             gloss,
             leaf_textures: layers,
-            tissue: LeafTissue { max_thickness, absorption_range, measured, ..LeafTissue::default() },
+            tissue: Some(LeafTissue { max_thickness, absorption_range, measured, ..LeafTissue::default() }),
             ..PlantMaterial::default()
+        };
+        if let Some(through) = through {
+            material.set_transmission(through);
         }
+        material
     }
 }
 

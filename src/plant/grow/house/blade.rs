@@ -123,11 +123,6 @@ impl BladeGrid {
         high + (low - high) * row as f32 / self.rows as f32
     }
 
-    /// Number of triangles of a leaf.
-    pub fn triangles(&self) -> usize {
-        2 * self.columns * self.rows
-    }
-
     /// Adds a leaf to `mesh`.
     pub fn add(&self, mesh: &mut PlantMesh, pose: &Pose) {
         let along = pose.along.normalize_or(Vec3::Z);
