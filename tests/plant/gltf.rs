@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use canopy::plant::gltf::{GltfOptions, PlantError, PlantReport, Warning, WarningKind, load_plant};
 use canopy::plant::texture::{AlphaFade, alpha_tested_mips, fade_alpha};
-use canopy::plant::{Gloss, LeafColors, LeafKind, PartKind, Plant};
+use canopy::plant::{Gloss, LeafColors, LeafKind, Measured, PartKind, Plant};
 use glam::{Vec2, Vec3};
 use proptest::prelude::*;
 
@@ -215,7 +215,7 @@ fn a_file_that_states_its_diffuse_transmission_is_believed() {
 }
 
 #[test]
-fn textures_of_transmitted_light_count_by_their_mean_over_the_leaf() {
+fn textures_of_transmitted_light_count_texel_by_texel() {
     // The leaves' own picture: its alpha is 1 wherever there is leaf, which is less than half of it.
     let stated = r#","extensions":{"KHR_materials_diffuse_transmission":{"diffuseTransmissionFactor":0.2,
         "diffuseTransmissionTexture":{"index":0},"diffuseTransmissionColorFactor":[0.5,0.5,0.5],
@@ -224,9 +224,7 @@ fn textures_of_transmitted_light_count_by_their_mean_over_the_leaf() {
     let (leaf, warnings) = leafy(stated, &GltfOptions::default());
     assert!((leaf.reflected / plain.reflected - 0.8).abs().max_element() < 1e-3, "{leaf:?}");
     assert!((leaf.transmitted / (0.2 * 0.5 * plain.reflected) - 1.0).abs().max_element() < 0.01, "{leaf:?}");
-    assert!(
-        warnings.iter().any(|w| w.kind == WarningKind::Ignored && w.message.contains("means over the leaf: 0.200"))
-    );
+    assert!(!warnings.iter().any(|warning| warning.message.contains("transmitted light")), "{warnings:?}");
 }
 
 #[test]
@@ -606,4 +604,40 @@ fn real_trees_have_their_triangles() {
             }
         }
     }
+}
+
+#[test]
+fn the_tissue_of_a_leaf_comes_from_extras() {
+    let read = |leaf_members: &'static str| {
+        let file = TreeFile { leaf_members, ..TreeFile::default() };
+        let (plant, warnings) = load_bytes(&file.bytes(), "tree.glb", &GltfOptions::default()).expect("a plant");
+        let leaf = plant.parts.into_iter().find(|part| part.kind == PartKind::Foliage).expect("leaves").material;
+        (leaf, warnings)
+    };
+    let (leaf, warnings) = read(
+        r#","extras":{"canopy_leaf":{"maxThickness":0.0005,"thicknessTexture":{"index":0},"backTexture":{"index":0}}}"#,
+    );
+    let tissue = leaf.tissue.expect("a tissue");
+    // A thickness that a file has was painted.
+    assert_eq!((tissue.max_thickness, tissue.measured), (0.0005, Measured::Leaf));
+    assert!(leaf.leaf_textures.back.is_some() && leaf.leaf_textures.thickness.is_some());
+    assert!(leaf.leaf_textures.absorption.is_none() && leaf.leaf_textures.transmission.is_none());
+    assert!(!warnings.iter().any(|warning| warning.message.contains("canopy_leaf")), "{warnings:?}");
+
+    let (leaf, _) = read(r#","extras":{"canopy_leaf":{"transmissionTexture":{"index":0}}}"#);
+    assert!(leaf.leaf_textures.transmission.is_some() && leaf.tissue.is_some());
+    for (members, word) in [
+        (r#","extras":{"canopy_leaf":{"maxThickness":"much"}}"#, "cannot be read"),
+        (r#","extras":{"canopy_leaf":{"maxTickness":1}}"#, "cannot be read"),
+        (r#","extras":{"canopy_leaf":[]}"#, "not an object"),
+        (r#","extras":{"canopy_leaf":{"maxThickness":-1}}"#, "no leaf has"),
+        (r#","extras":{"canopy_leaf":{"absorptionTexture":{"index":99}}}"#, "does not exist"),
+        (r#","extras":{"canopy_leaf":{"backMaterial":99}}"#, "does not exist"),
+        (r#","extras":{"canopy_leaf":{"volume":true}}"#, "no closed volume"),
+    ] {
+        let (leaf, warnings) = read(members);
+        assert!(warnings.iter().any(|warning| warning.message.contains(word)), "{members}: {warnings:?}");
+        assert!(leaf.tissue.is_none_or(|tissue| tissue == tissue.sanitized() && !tissue.volume));
+    }
+    assert!(read(r#","extras":{"canopy_leaf":null}"#).0.tissue.is_none());
 }
