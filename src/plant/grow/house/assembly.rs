@@ -83,7 +83,7 @@ impl Blade {
         };
         // Letters are not in the colours, so the tissue has to darken them.
         let stamped = matches!(self, Self::Stamped(_));
-        let absorption_range = if stamped { [300.0, 6000.0] } else { LeafTissue::default().absorption_range };
+        let absorption_range = if stamped { [300.0, 12_000.0] } else { LeafTissue::default().absorption_range };
         let measured = if stamped { Measured::Leaf } else { Measured::Texel };
         let through = layers.transmission.clone();
         let mut material = PlantMaterial {

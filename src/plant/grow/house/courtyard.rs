@@ -1,8 +1,8 @@
 //! A courtyard: walls, paving, a door, a bench, a planter, and plants.
 
-use std::f32::consts::FRAC_PI_2;
+use std::f32::consts::{FRAC_PI_2, TAU};
 
-use glam::{Quat, Vec3};
+use glam::{Quat, Vec2, Vec3};
 
 use super::assembly::Assembly;
 use super::shrub::{self, Wall};
@@ -87,6 +87,8 @@ pub(super) fn courtyard(random: &mut Random) -> Assembly {
         assembly.add(&begonia, position, 1.9 * index as f32, scale);
     }
 
+    basin(&mut assembly, &mut random.split(50), Vec3::new(-0.75, ground, -0.35));
+
     // Climbers on the west wall and over the door.
     let west = Wall {
         foot: Vec3::new(-EAST, ground, 1.9),
@@ -145,6 +147,34 @@ fn walls(assembly: &mut Assembly) {
     for y in [0.55, 1.65] {
         let center = Vec3::new(center.x, y, center.z + 0.032);
         solid::block(planks, center, Vec3::new(0.42, 0.06, 0.014), Quat::IDENTITY);
+    }
+}
+
+/// A round planter of stone with a bush, and straps around it.
+fn basin(assembly: &mut Assembly, random: &mut Random, at: Vec3) {
+    let profile = [
+        Vec2::new(0.0, 0.0),
+        Vec2::new(0.46, 0.0),
+        Vec2::new(0.50, 0.05),
+        Vec2::new(0.56, 0.36),
+        Vec2::new(0.62, 0.38),
+        Vec2::new(0.63, 0.40),
+        Vec2::new(0.63, 0.44),
+        Vec2::new(0.61, 0.46),
+        Vec2::new(0.53, 0.46),
+        Vec2::new(0.52, 0.44),
+        Vec2::new(0.51, 0.36),
+    ];
+    solid::turned(assembly.stone(Masonry::Paving), at, &profile, 64);
+    let soil = [Vec2::new(0.515, 0.39), Vec2::new(0.25, 0.42), Vec2::new(0.0, 0.43)];
+    solid::turned(assembly.stone(Masonry::Soil), at, &soil, 48);
+    let bush = shrub::bush(random, 0.7, 0.8);
+    assembly.add(&bush, at + Vec3::Y * 0.42, 0.9, 0.78);
+    for index in 0..7 {
+        let out = potted::around(TAU * index as f32 / 7.0 + 0.3);
+        let axis = (Vec3::Y + 0.35 * out).normalize_or(Vec3::Y);
+        let length = 0.30 + 0.05 * random.signed();
+        potted::tuft(assembly, random, at + Vec3::Y * 0.405 + out * 0.40, axis, length, 34, [2, 14]);
     }
 }
 

@@ -33,8 +33,8 @@ use blade::Pose;
 pub enum HousePlant {
     /// One leaf on its petiole, upright, its upper side to the south (+z): 17 cm long, its tip at 0.5 m.
     Leaf,
-    /// The same leaf with letters stamped into its absorption [Franzke 2005, p. 58]: they are invisible from the front
-    /// and can be read against the light. 1 to [`HousePlant::MOST_LETTERS`] of A to Z, 0 to 9, hyphen and blank.
+    /// The same leaf with letters stamped into its absorption [Franzke 2005, p. 58], to be read against the light. Its
+    /// colours know nothing of them, so the standard model shows none. 1 to [`HousePlant::MOST_LETTERS`] of A to Z, 0 to 9, hyphen and blank.
     Stamped(String),
     /// A rubber plant in a terracotta pot: three stems with large, thick, glossy leaves, 1.1 m high. This and the other
     /// pots stand on a paved square of 2.2 m.
@@ -43,10 +43,10 @@ pub enum HousePlant {
     SpiderPlant,
     /// A begonia in a terracotta pot: a dome of thin pale leaves on red petioles, with pink blossoms, 0.45 m high.
     Begonia,
-    /// A weeping fig grown as a bush: some 2,500 small leaves on seven stems, 1.6 m high.
+    /// A weeping fig grown as a bush: some 4,000 small leaves on seven stems, 1.6 m high.
     Bush,
-    /// A courtyard: plastered walls with a door, paving, a bench, a planter with bushes, ivy on a wall, and all of the
-    /// plants above in pots. 7 m by 6.5 m; the open side is the south.
+    /// A courtyard: plastered walls with a door, paving, a bench, two planters with bushes, climbers on the walls, and all of the
+    /// plants above in pots. 7 m by 7 m; the open side is the south.
     Courtyard,
 }
 
@@ -94,9 +94,9 @@ impl HousePlant {
             Self::Leaf => single(&Blade::Single, detail),
             Self::Stamped(text) => single(&Blade::Stamped(text.to_ascii_uppercase()), detail),
             Self::RubberPlant => on_paving(&potted::rubber(&mut random, detail)),
-            Self::SpiderPlant => on_paving(&potted::spider(&mut random, detail)),
+            Self::SpiderPlant => on_paving(&potted::spider(&mut random, detail, true)),
             Self::Begonia => on_paving(&potted::begonia(&mut random, detail)),
-            Self::Bush => shrub::bush(&mut random, detail),
+            Self::Bush => shrub::bush(&mut random, detail, 1.0),
             Self::Courtyard => courtyard::courtyard(&mut random),
         };
         Ok(assembly.finish(&format!("{} {seed}", self.name())))
@@ -115,7 +115,7 @@ fn on_paving(pot: &Assembly) -> Assembly {
 fn single(blade: &Blade, detail: f32) -> Assembly {
     let mut assembly = Assembly::default();
     let joint = Vec3::new(0.0, 0.335, 0.0);
-    let lean = Vec3::new(0.05, 1.0, -0.22).normalize_or(Vec3::Y);
+    let lean = Vec3::new(0.05, 1.0, -0.48).normalize_or(Vec3::Y);
     let petiole: Vec<(Vec3, f32)> = (0..=14)
         .map(|i| {
             let t = i as f32 / 14.0;
@@ -128,7 +128,7 @@ fn single(blade: &Blade, detail: f32) -> Assembly {
     let pose = Pose {
         joint,
         along: lean,
-        up: Vec3::new(0.08, 0.22, 1.0),
+        up: Vec3::new(0.08, 0.48, 1.0),
         height: 0.175,
         bend: 0.55,
         late: 0.7,

@@ -143,7 +143,7 @@ pub(super) fn rubber(random: &mut Random, detail: f32) -> Assembly {
 }
 
 /// A tuft of straps at `at`, of about the length `length`.
-fn tuft(
+pub(super) fn tuft(
     assembly: &mut Assembly,
     random: &mut Random,
     at: Vec3,
