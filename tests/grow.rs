@@ -1,9 +1,10 @@
 //! Grown trees: what must hold for every species, seed and number of triangles.
 
 use canopy::plant::grow::{
-    BarkKind, CrownShape, GrowError, GrowParameters, LeafShape, Pruning, ROOT_DEPTH, grow, textures,
+    BarkKind, CrownShape, GrowError, GrowParameters, LeafPainting, LeafShape, Pruning, ROOT_DEPTH, grow, grow_painted,
+    textures,
 };
-use canopy::plant::{PartKind, Plant, PlantMesh};
+use canopy::plant::{PartKind, Plant, PlantMesh, PlantPart};
 use glam::{Vec2, Vec3};
 use proptest::prelude::*;
 
@@ -318,5 +319,30 @@ proptest! {
     fn any_seed_grows_a_sound_tree(seed: u64, triangles in 5_000usize..=100_000, conifer: bool) {
         let species = if conifer { GrowParameters::conifer() } else { GrowParameters::broadleaf() };
         check_sound(&grow(&species, seed, triangles).unwrap(), triangles);
+    }
+}
+
+#[test]
+fn further_textures_of_leaves_are_painted_on_request_alone() {
+    for species in [GrowParameters::broadleaf(), GrowParameters::conifer()] {
+        let plain = grow(&species, 3, 5_000).unwrap();
+        let layered = grow_painted(&species, 3, 5_000, LeafPainting::Layers).unwrap();
+        for (a, b) in plain.parts.iter().zip(&layered.parts) {
+            assert_eq!(a.mesh, b.mesh);
+            let texture = |part: &PlantPart| part.material.base_color_texture.clone().expect("a texture");
+            assert!(std::sync::Arc::ptr_eq(&texture(a), &texture(b)));
+            assert!(a.material.leaf_textures.is_empty());
+            if b.kind == PartKind::Wood {
+                assert!(b.material.leaf_textures.is_empty());
+                continue;
+            }
+            let textures = &b.material.leaf_textures;
+            assert!(textures.back.is_some() && textures.transmission.is_some());
+            assert!(textures.thickness.is_some() && textures.absorption.is_some());
+            assert!(a.material.normal_texture.is_none());
+        }
+        let (before, after) = (plain.leaf_colors(), layered.leaf_colors());
+        assert_eq!(before.reflected, after.reflected);
+        assert!((before.transmitted - after.transmitted).abs().max_element() < 0.004, "{before:?} {after:?}");
     }
 }
