@@ -298,6 +298,11 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
 #endif
 #endif
     var visibility = terrain_visibility(ground, look.height);
+    var lit_side = normal;
+#ifdef LAYERED
+    // A large leaf that is lit from behind must not shade itself: its light arrives on the other side.
+    lit_side = select(normal, -normal, dot(normal, light.key_direction) < 0.0);
+#endif
 #ifdef SUN_HARMONICS
     var leaves = LeafSample(1.0, 0.0, 0.0);
 #endif
@@ -308,11 +313,11 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         let entry = in.relative + light.key_direction * in.entry_distance;
         let cascades = cascaded_visibility(entry, light.key_direction, 0.25, in.clip.xy);
 #ifdef SUN_DETAIL
-        leaves = cascaded_leaf_visibility(in.relative, normal, SHADOW_BIAS, in.clip.xy);
+        leaves = cascaded_leaf_visibility(in.relative, lit_side, SHADOW_BIAS, in.clip.xy);
         leaves.detail *= visibility;
 #endif
 #else
-        let cascades = cascaded_visibility(in.relative, normal, SHADOW_BIAS, in.clip.xy);
+        let cascades = cascaded_visibility(in.relative, lit_side, SHADOW_BIAS, in.clip.xy);
 #endif
         visibility *= mix(1.0, cascades.visibility, cascades.weight);
     }

@@ -1,6 +1,6 @@
 //! The sheet of a leaf: its textures, and what they look like in the light, by layers and by the standard model.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -179,7 +179,8 @@ fn trace(
     let (width, distance) = (f64::from(options.width), FAR * f64::from(options.width));
     let view = Viewpoint {
         position: DVec3::new(0.0, if below { -distance } else { distance }, 0.0),
-        yaw: 0.0,
+        // The tip is up on both sides.
+        yaw: if below { PI } else { 0.0 },
         pitch: if below { FRAC_PI_2 } else { -FRAC_PI_2 },
         field_of_view: 2.0 * (0.5 * width * f64::from(shape) / distance).atan(),
     };
