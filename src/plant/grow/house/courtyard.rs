@@ -62,7 +62,7 @@ pub(super) fn courtyard(random: &mut Random) -> Assembly {
         Vec3::new(high.x - 0.01, soil, high.z - 0.02),
     );
     for (index, (x, scale)) in [(1.25, 0.92), (2.05, 1.08), (2.85, 0.86)].into_iter().enumerate() {
-        let bush = shrub::bush(&mut random.split(10 + index as u64), 0.7);
+        let bush = shrub::bush(&mut random.split(10 + index as u64), 0.7, 0.75);
         assembly.add(&bush, Vec3::new(x, soil, -NORTH + 0.34), 1.3 * index as f32, scale);
     }
 
@@ -71,14 +71,19 @@ pub(super) fn courtyard(random: &mut Random) -> Assembly {
     assembly.add(&rubber, Vec3::new(-0.72, ground, -NORTH + 0.34), 0.4, 1.15);
     let tall = potted::rubber(&mut random.split(21), 0.8);
     assembly.add(&tall, Vec3::new(-EAST + 0.45, ground, -NORTH + 0.50), 2.0, 1.45);
-    let spider = potted::spider(&mut random.split(22), 0.7);
-    assembly.add(&spider, Vec3::new(-1.25, ground, -NORTH + 0.62), 0.3, 1.0);
-    assembly.add(&spider, Vec3::new(2.55, ground, -0.35), 2.1, 1.1);
+    let beside = potted::rubber(&mut random.split(23), 0.8);
+    assembly.add(&beside, Vec3::new(-EAST + 0.48, ground, 1.85), 4.0, 1.1);
+    let spider = potted::spider(&mut random.split(22), 0.7, true);
+    assembly.add(&spider, Vec3::new(-1.30, ground, -NORTH + 0.66), 0.3, 1.0);
+    assembly.add(&spider, Vec3::new(2.75, ground, -1.35), 2.1, 1.1);
+    let low = potted::spider(&mut random.split(24), 0.7, false);
+    assembly.add(&low, Vec3::new(-EAST + 0.42, ground + 0.46, 1.12), 1.0, 1.0);
     for (index, (position, scale)) in [
         (Vec3::new(0.42, ground, -NORTH + 0.80), 1.0),
-        (Vec3::new(0.95, ground, -NORTH + 1.02), 0.85),
+        (Vec3::new(0.98, ground, -NORTH + 1.02), 0.85),
         (Vec3::new(-EAST + 0.42, ground + 0.46, 0.15), 0.9),
-        (Vec3::new(2.05, ground, 0.15), 1.15),
+        (Vec3::new(2.15, ground, -0.75), 1.15),
+        (Vec3::new(2.75, ground, -0.45), 0.95),
     ]
     .into_iter()
     .enumerate()

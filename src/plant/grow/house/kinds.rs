@@ -7,7 +7,7 @@ use crate::plant::prospect::Constituents;
 
 /// A large leaf to be looked at by itself, with letters stamped into its tissue or without.
 pub(super) fn single_leaf(letters: Option<&str>) -> BladeStyle {
-    let leaf = Constituents { structure: 1.45, chlorophyll: 26.0, carotenoid: 6.0, ..Constituents::default() };
+    let leaf = Constituents { structure: 1.45, chlorophyll: 31.0, carotenoid: 7.0, ..Constituents::default() };
     let tissue = Tissue::of(&leaf, 0.6);
     BladeStyle {
         size: [1024, 1536],
@@ -89,7 +89,7 @@ pub(super) fn spider() -> BladeStyle {
 pub(super) fn begonia() -> BladeStyle {
     let leaf = Constituents {
         structure: 1.3,
-        chlorophyll: 17.0,
+        chlorophyll: 22.0,
         carotenoid: 5.0,
         anthocyanin: 0.5,
         dry_matter: 0.004,

@@ -91,7 +91,7 @@ pub(super) fn rubber(random: &mut Random, detail: f32) -> Assembly {
     let green = Matter::Stem(Vec3::new(0.135, 0.165, 0.055));
     let sheath = Matter::Stem(Vec3::new(0.30, 0.055, 0.045));
     let grid = Blade::Rubber.grid(cells(10.0, detail), cells(22.0, detail));
-    for (stem, (height, count)) in [(0.80, 17), (0.60, 13), (0.42, 10)].into_iter().enumerate() {
+    for (stem, (height, count)) in [(0.82, 22), (0.60, 16), (0.40, 12)].into_iter().enumerate() {
         let out = around(GOLDEN * 1.7 * stem as f32 + 0.5);
         let foot = Vec3::Y * (soil - 0.02) + out * (0.012 + 0.028 * stem as f32);
         let lean = (Vec3::Y + out * (0.06 + 0.17 * stem as f32)).normalize_or(Vec3::Y);
@@ -104,7 +104,7 @@ pub(super) fn rubber(random: &mut Random, detail: f32) -> Assembly {
             angle += GOLDEN + 0.25 * random.signed();
             let outward = around(angle);
             // The upper leaves stand up, the lower ones spread and sag.
-            let rise = 0.15 + 0.95 * share * share + 0.18 * random.signed();
+            let rise = 0.28 + 0.85 * share * share + 0.16 * random.signed();
             let direction = (outward * rise.cos() + tangent * rise.sin()).normalize_or(outward);
             let petiole = 0.035 + 0.022 * (1.0 - share);
             let stalk =
@@ -118,7 +118,7 @@ pub(super) fn rubber(random: &mut Random, detail: f32) -> Assembly {
                 joint: joint - direction * 0.006,
                 along: direction,
                 up,
-                height: 0.235 * grown * (1.0 + 0.09 * random.signed()),
+                height: 0.27 * grown * (1.0 + 0.09 * random.signed()),
                 bend: 0.38 + 0.45 * (1.0 - share) + 0.22 * random.signed(),
                 late: 0.35,
                 fold: 0.20 + 0.22 * share + 0.06 * random.signed(),
@@ -159,7 +159,7 @@ pub(super) fn tuft(
         let angle = GOLDEN * index as f32 + 0.3 * random.signed();
         let outward = tilt * around(angle);
         // Outer leaves are older: longer, lower, more bent.
-        let rise = 0.40 + 1.05 * share + 0.12 * random.signed();
+        let rise = 0.60 + 0.90 * share + 0.14 * random.signed();
         let direction = (outward * rise.cos() + axis * rise.sin()).normalize_or(outward);
         let up = (axis * rise.cos() - outward * rise.sin()).normalize_or(axis);
         let long = length * (1.0 - 0.35 * share) * (1.0 + 0.16 * random.signed());
@@ -168,8 +168,8 @@ pub(super) fn tuft(
             along: direction,
             up,
             height: long,
-            bend: 1.15 + 1.15 * rise * 0.8 + 0.45 * random.signed(),
-            late: 0.30,
+            bend: 0.95 + 0.85 * rise + 0.40 * random.signed(),
+            late: 0.45,
             fold: 0.42 + 0.1 * random.signed(),
             curl: 0.02,
             waves: (0.0015, 3.0),
@@ -180,19 +180,21 @@ pub(super) fn tuft(
     }
 }
 
-/// A spider plant on a stool.
-pub(super) fn spider(random: &mut Random, detail: f32) -> Assembly {
+/// A spider plant, on a stool or without one and without runners.
+pub(super) fn spider(random: &mut Random, detail: f32, on_stool: bool) -> Assembly {
     let mut assembly = Assembly::default();
-    stool(&mut assembly);
+    if on_stool {
+        stool(&mut assembly);
+    }
     let pot = Pot { foot: 0.080, rim: 0.112, height: 0.18, stone: Masonry::Glaze };
-    let soil = pot.add(&mut assembly, Vec3::Y * STOOL);
+    let soil = pot.add(&mut assembly, if on_stool { Vec3::Y * STOOL } else { Vec3::ZERO });
     let crown = Vec3::Y * (soil + 0.008);
-    tuft(&mut assembly, random, crown, Vec3::Y, 0.44, 74, [4, cells(26.0, detail)]);
+    tuft(&mut assembly, random, crown, Vec3::Y, 0.42, 84, [4, cells(26.0, detail)]);
     // Runners with plantlets.
     let runner = Matter::Stem(Vec3::new(0.34, 0.36, 0.14));
-    for (index, angle) in [0.9f32, 2.35, 3.7, 5.6].into_iter().enumerate() {
+    for (index, angle) in [0.9f32, 2.35, 3.7, 5.6].into_iter().enumerate().filter(|_| on_stool) {
         let out = around(angle);
-        let length = 0.46 + 0.09 * random.signed();
+        let length = 0.36 + 0.07 * random.signed();
         let sag = (out * 0.45 - Vec3::Y).normalize_or(Vec3::NEG_Y);
         let rise = (out + Vec3::Y * (1.0 + 0.3 * random.unit())).normalize_or(out);
         let curve = shoot(crown, rise, sag, length + 0.16 * (index % 2) as f32, [0.0017, 0.0011], 22);
@@ -262,9 +264,9 @@ pub(super) fn begonia(random: &mut Random, detail: f32) -> Assembly {
             (rise - Vec3::Y * 0.45).normalize_or(rise),
             joint.distance(root),
             [0.0026, 0.0016],
-            7,
+            5,
         );
-        solid::tube(assembly.mesh(&red), &stalk, 6);
+        solid::tube(assembly.mesh(&red), &stalk, 5);
         let (joint, _) = on(&stalk, 1.0);
         let facing = (outward * tilt.sin() * 0.8 + Vec3::Y * (0.45 + tilt.cos())).normalize_or(Vec3::Y);
         let facing =

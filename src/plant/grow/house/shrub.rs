@@ -55,48 +55,49 @@ fn leaf(assembly: &mut Assembly, random: &mut Random, grid: &BladeGrid, at: Vec3
     assembly.leaf(&Blade::Fig, grid, &pose);
 }
 
-/// A weeping fig as a bush.
-pub(super) fn bush(random: &mut Random, detail: f32) -> Assembly {
+/// A weeping fig as a bush. `density`: number of its branches, relative to a full one.
+pub(super) fn bush(random: &mut Random, detail: f32, density: f32) -> Assembly {
     let mut assembly = Assembly::default();
-    let bark = Matter::Stem(Vec3::new(0.19, 0.155, 0.115));
+    let bark = Matter::Stem(Vec3::new(0.125, 0.100, 0.075));
     let young = Matter::Stem(Vec3::new(0.13, 0.15, 0.06));
-    let grid = Blade::Fig.grid(2, cells(3.0, detail));
+    let grid = Blade::Fig.grid(2, cells(2.2, detail));
     let stems = 7;
     for stem in 0..stems {
         let out = around(TAU * (stem as f32 + 0.3 * random.signed()) / stems as f32);
-        let spread = if stem == 0 { 0.05 } else { 0.34 + 0.30 * random.unit() };
+        let spread = if stem == 0 { 0.05 } else { 0.24 + 0.26 * random.unit() };
         let along = (Vec3::Y + out * spread).normalize_or(Vec3::Y);
         let foot = out * 0.05 - Vec3::Y * 0.03;
         let length = 1.30 + 0.20 * random.signed() - 0.22 * spread;
         let axis = wander(random, foot, along, length, [0.014, 0.0045], 0.25, 14);
         solid::tube(assembly.mesh(&bark), &axis, 8);
         let mut angle = TAU * random.unit();
-        for branch in 0..13 {
-            let share = (branch as f32 + random.unit()) / 13.0;
-            let (at, tangent) = on(&axis, 0.16 + 0.82 * share);
+        let branches = (17.0 * density).round().max(1.0) as u32;
+        for branch in 0..branches {
+            let share = (branch as f32 + random.unit()) / branches as f32;
+            let (at, tangent) = on(&axis, 0.12 + 0.86 * share);
             angle += 2.4 + 0.5 * random.signed();
             let side = Quat::from_axis_angle(tangent, angle) * tangent.any_orthonormal_vector();
             let direction = (side + tangent * 0.55).normalize_or(side);
             let length = (0.42 - 0.22 * share) * (1.0 + 0.2 * random.signed());
             let twig = wander(random, at, direction, length, [0.0040, 0.0018], 0.20, 7);
             solid::tube(assembly.mesh(&bark), &twig, 5);
-            for shoot in 0..4 {
-                let (at, tangent) = on(&twig, 0.25 + 0.22 * shoot as f32 + 0.08 * random.unit());
+            for shoot in 0..5 {
+                let (at, tangent) = on(&twig, 0.22 + 0.18 * shoot as f32 + 0.08 * random.unit());
                 let turn = TAU * random.unit();
                 let side = Quat::from_axis_angle(tangent, turn) * tangent.any_orthonormal_vector();
                 let direction = (side * 0.8 + tangent).normalize_or(side);
                 let length = 0.12 + 0.06 * random.unit();
-                let tender = wander(random, at, direction, length, [0.0016, 0.0008], -0.5, 4);
-                solid::tube(assembly.mesh(&young), &tender, 4);
+                let tender = wander(random, at, direction, length, [0.0016, 0.0008], -0.5, 3);
+                solid::tube(assembly.mesh(&young), &tender, 3);
                 for index in 0..6 {
                     let (at, tangent) = on(&tender, (index as f32 + 0.6) / 6.0);
                     let turn = PI * index as f32 + 0.5 * random.signed();
-                    leaf(&mut assembly, random, &grid, at, tangent, turn, 0.072);
+                    leaf(&mut assembly, random, &grid, at, tangent, turn, 0.062);
                 }
             }
             for index in 0..4 {
                 let (at, tangent) = on(&twig, 0.2 + 0.2 * index as f32);
-                leaf(&mut assembly, random, &grid, at, tangent, PI * index as f32, 0.078);
+                leaf(&mut assembly, random, &grid, at, tangent, PI * index as f32, 0.066);
             }
         }
     }

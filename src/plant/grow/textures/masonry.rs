@@ -70,8 +70,8 @@ impl Masonry {
                 let even = octaves(u, v, [3, 3], 6, 7);
                 let grain = octaves(u, v, [90, 90], 2, 8);
                 let stain = smoothstep(0.0, 0.7, octaves(u, v, [5, 2], 4, 9));
-                let wall = Vec3::new(0.66, 0.58, 0.46) * (1.0 + 0.07 * even + 0.05 * grain);
-                wall.lerp(Vec3::new(0.42, 0.35, 0.26), 0.35 * stain)
+                let wall = Vec3::new(0.50, 0.425, 0.32) * (1.0 + 0.07 * even + 0.05 * grain);
+                wall.lerp(Vec3::new(0.30, 0.245, 0.18), 0.40 * stain)
             }
             Self::Paving => {
                 // A running bond of two rows.
@@ -80,7 +80,7 @@ impl Masonry {
                 let (x, y) = (across.fract(), (2.0 * v).fract());
                 let edge = x.min(1.0 - x).min(y).min(1.0 - y) + 0.006 * octaves(u, v, [24, 24], 3, 10);
                 let slab = ((across as i32 + 2 * row) as f32 * 0.618).fract();
-                let tone = Vec3::new(0.40, 0.345, 0.27).lerp(Vec3::new(0.33, 0.31, 0.28), slab);
+                let tone = Vec3::new(0.29, 0.245, 0.19).lerp(Vec3::new(0.235, 0.22, 0.195), slab);
                 let face = tone
                     * (0.92 + 0.16 * slab + 0.12 * octaves(u, v, [5, 5], 5, 11))
                     * (1.0 + 0.08 * octaves(u, v, [120, 120], 1, 12));

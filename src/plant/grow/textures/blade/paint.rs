@@ -115,8 +115,8 @@ fn texel(style: &BladeStyle, uv: Vec2, inside: f32, [main, side]: [f32; 2], dome
     let rim = 1.0 - smoothstep(0.0, 0.012, inside);
     let k = style.contrast;
 
-    let shade = 1.0 + k * (0.20 * (dome - 0.5) + 0.13 * patchy + 0.05 * grain + 0.05 * fine.value - 0.10 * fourth);
-    let vein_front = (0.85 * main).max(0.62 * k * side).max(0.22 * k * third).max(0.07 * k * fourth).max(0.25 * rim);
+    let shade = 1.0 + k * (0.20 * (dome - 0.5) + 0.13 * patchy + 0.05 * grain + 0.05 * fine.value - 0.06 * fourth);
+    let vein_front = (0.85 * main).max(0.62 * k * side).max(0.15 * k * third).max(0.05 * k * fourth).max(0.25 * rim);
     let front = (tissue.front * shade).lerp(style.vein.front, vein_front);
     let shade = 1.0 + k * (0.08 * patchy + 0.05 * grain - 0.06 * dome);
     let vein_back = (0.90 * main).max(0.75 * side).max(0.42 * k * third).max(0.18 * k * fourth).max(0.2 * rim);
