@@ -19,7 +19,8 @@ potted_begonia 800x800 2026-06-21T18:00+01:00
 bush 800x800 2026-06-21T18:00+01:00
 courtyard 1024x768 2026-06-21T09:00+01:00"
 
-printf '%-15s %-6s %-9s %9s  %s\n' figure light leaves seconds "samples, standard error of the luminance"
+TIMEFORMAT='%R %U'
+printf '%-15s %-6s %-9s %9s %11s  %s\n' figure light leaves seconds processor "samples, standard error of the luminance"
 while read -r name size evening; do
     for light in front back; do
         from=()
@@ -27,12 +28,12 @@ while read -r name size evening; do
             from=(--along 10s ${evening:+--at "$evening"})
         fi
         for leaf in layers standard; do
-            started=$(date +%s.%N)
-            notes=$("$canopy" reference "assets/scenes/leaf/$name.ron" --out "$out/$name-$light-$leaf.png" --size "$size" \
-                --spp "$samples" --leaf "$leaf" "${from[@]}" 2>&1 >/dev/null)
-            seconds=$(awk -v a="$started" -v b="$(date +%s.%N)" "BEGIN { print b - a }")
-            error=$(grep -o '[0-9]* samples, standard error.*' <<< "$notes" || true)
-            printf '%-15s %-6s %-9s %9.1f  %s\n' "$name" "$light" "$leaf" "$seconds" "${error:-not told}"
+            spent=$({ time "$canopy" reference "assets/scenes/leaf/$name.ron" --out "$out/$name-$light-$leaf.png" \
+                --size "$size" --spp "$samples" --leaf "$leaf" "${from[@]}" > /dev/null 2> "$out/notes.txt"; } 2>&1)
+            error=$(grep -o '[0-9]* samples, standard error.*' "$out/notes.txt" || true)
+            read -r seconds processor <<< "$spent"
+            printf '%-15s %-6s %-9s %9.1f %11.1f  %s\n' "$name" "$light" "$leaf" "$seconds" "$processor" "${error:-not told}"
         done
     done
 done <<< "$figures"
+rm -f "$out/notes.txt"

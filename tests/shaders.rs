@@ -34,10 +34,11 @@ use naga::{
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 
 /// All that the pipelines switch on or off.
-const DEFINES: [&str; 13] = [
+const DEFINES: [&str; 14] = [
     "FOLIAGE",
     "ALPHA_TO_COVERAGE",
     "NORMAL_MAP",
+    "LAYERED",
     "TRANSFER",
     "TRANSFER_COLOR",
     "SUN_HARMONICS",
@@ -57,7 +58,7 @@ fn variants() -> impl Iterator<Item = Vec<&'static str>> {
         DEFINES.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, define)| *define).collect::<Vec<_>>()
     });
     let needs = ["TRANSFER_COLOR", "SUN_HARMONICS", "PLAIN_TOO"];
-    let never_of_crosses = ["NORMAL_MAP", "TRANSFER_COLOR", "SUN_HARMONICS", "SUN_DETAIL"];
+    let never_of_crosses = ["NORMAL_MAP", "LAYERED", "TRANSFER_COLOR", "SUN_HARMONICS", "SUN_DETAIL"];
     // Of the styles, only foliage has a variant, and only without light.
     let styles = ["STYLED", "OWN_NORMALS", "IDENTITIES", "TOON"];
     let style_variant = |defines: &[&str]| match defines {
@@ -70,6 +71,9 @@ fn variants() -> impl Iterator<Item = Vec<&'static str>> {
     let any_of = |defines: &[&str], some: &[&str]| some.iter().any(|define| defines.contains(define));
     all.filter(move |defines| defines.contains(&"TRANSFER") || !any_of(defines, &needs))
         .filter(move |defines| !any_of(defines, &styles) || style_variant(defines))
+        .filter(|defines| {
+            !defines.contains(&"LAYERED") || defines.contains(&"FOLIAGE") && !defines.contains(&"PLAIN_TOO")
+        })
         .filter(|defines| !defines.contains(&"SUN_DETAIL") || defines.contains(&"SUN_HARMONICS"))
         .filter(move |defines| !defines.contains(&"DEPTH_FIRST") || !any_of(defines, &never_of_crosses))
 }

@@ -38,11 +38,11 @@ struct Part {
     cover_weight: f32,
     // Of leaves with layers: the members of `Tissue`.
     optical_depth: f32,
-    shares: vec3<f32>,
-    inverse_squares: vec3<f32>,
+    shares: vec4<f32>,
+    inverse_squares: vec4<f32>,
     perpendicular: vec2<f32>,
-    sky_before: vec3<f32>,
-    sky_behind: vec3<f32>,
+    sky_before: vec4<f32>,
+    sky_behind: vec4<f32>,
 }
 
 @group(2) @binding(0) var color_texture: texture_2d<f32>;
@@ -267,7 +267,8 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let ground = sample_ground(in.relative);
 #ifdef LAYERED
     let tissue = Tissue(
-        part.optical_depth, part.shares, part.inverse_squares, part.perpendicular, part.sky_before, part.sky_behind,
+        part.optical_depth, part.shares.xyz, part.inverse_squares.xyz, part.perpendicular, part.sky_before.xyz,
+        part.sky_behind.xyz,
     );
     let to_viewer = abs(dot(normal, surface.viewer));
     let key_factors = tissue_light(tissue, to_viewer, abs(dot(normal, light.key_direction)));

@@ -223,7 +223,8 @@ fn textures_of_transmitted_light_count_texel_by_texel() {
     let plain = leafy("", &GltfOptions::default()).0;
     let (leaf, warnings) = leafy(stated, &GltfOptions::default());
     assert!((leaf.reflected / plain.reflected - 0.8).abs().max_element() < 1e-3, "{leaf:?}");
-    assert!((leaf.transmitted / (0.2 * 0.5 * plain.reflected) - 1.0).abs().max_element() < 0.01, "{leaf:?}");
+    // To the codes of the texture.
+    assert!((leaf.transmitted - 0.2 * 0.5 * plain.reflected).abs().max_element() < 1e-4, "{leaf:?}");
     assert!(!warnings.iter().any(|warning| warning.message.contains("transmitted light")), "{warnings:?}");
 }
 

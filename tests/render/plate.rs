@@ -270,8 +270,8 @@ fn leaves_with_layers_have_the_light_of_the_path_tracer() {
     let through = RgbaImage::from_pixel(4, 4, Rgba([69, 69, 69, 255]));
     let textures = LeafTextures { transmission: Some(Arc::new(through)), ..LeafTextures::default() };
     let of = |tissue: Option<LeafTissue>| PlantMaterial { tissue, leaf_textures: textures.clone(), ..material() };
-    // A thick leaf, so that the layers matter.
-    let tissue = LeafTissue { max_thickness: 0.002, absorption_range: [900.0; 2], ..LeafTissue::default() };
+    // As thick as a rubber plant's, so that the layers matter.
+    let tissue = LeafTissue { max_thickness: 0.0007, ..LeafTissue::default() };
     let mut largest = 1.0f64;
     // The sun at 65, 35 and 10 degrees.
     for hour in [HOURS[0], HOURS[1], "2026-06-21T04:40+00:00"] {
