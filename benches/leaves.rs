@@ -42,11 +42,11 @@ struct Arguments {
     bench: bool,
 }
 
-fn main() {
+fn main() -> anyhow::Result<()> {
     let arguments = Arguments::parse();
     walks(&arguments);
-    closed_form();
-    times(arguments.rounds);
+    closed_form()?;
+    times(arguments.rounds)
 }
 
 const ANGLES: [f32; 9] = [0.0, 15.0, 30.0, 45.0, 60.0, 70.0, 75.0, 80.0, 85.0];
@@ -190,21 +190,28 @@ fn single(tissue: LeafTissue) -> Arc<Plant> {
     Arc::new(Plant { name: "leaf".into(), parts: vec![PlantPart { kind: PartKind::Foliage, mesh, material }] })
 }
 
-fn film(scene: &ReferenceScene, light: &Light, view: Viewpoint, size: (u32, u32), samples: u32, bounces: u32) -> Film {
+fn film(
+    scene: &ReferenceScene,
+    light: &Light,
+    view: Viewpoint,
+    size: (u32, u32),
+    samples: u32,
+    bounces: u32,
+) -> anyhow::Result<Film> {
     let settings = TraceSettings { bounces, normals: Normals::Flat, ..TraceSettings::default() };
-    let tracer = PathTracer::new(scene, light, settings).expect("the light is possible");
+    let tracer = PathTracer::new(scene, light, settings)?;
     let shot = Shot { camera: Camera { view, size, near: 0.0 }, fog: None };
-    let mut film = Film::new(&shot).expect("the camera is possible");
-    tracer.render(&shot, &mut film, samples, &mut |_| ControlFlow::Continue(())).expect("the film fits");
-    film
+    let mut film = Film::new(&shot)?;
+    tracer.render(&shot, &mut film, samples, &mut |_| ControlFlow::Continue(()))?;
+    Ok(film)
 }
 
-fn closed_form() {
+fn closed_form() -> anyhow::Result<()> {
     let tissue = LeafTissue::default();
     // An untextured leaf has the middle of both ranges.
     let light = TissueLight::of(&tissue, tissue.optical_depth(0.5, 0.5));
     let instance = Instance { plant: 0, position: DVec3::ZERO, yaw: 0.0, scale: 1.0, tint: 0.0 };
-    let scene = ReferenceScene::new(&[single(tissue)], &[instance], None).expect("the scene is possible");
+    let scene = ReferenceScene::new(&[single(tissue)], &[instance], None)?;
     let scene = scene.with_leaves(LeafModel::Layers);
     println!("\nclosed form over test points (8 of them), light from before / from behind:");
     println!("  view  light:    0            30            60            75            85 degrees");
@@ -221,28 +228,25 @@ fn closed_form() {
                 let pitch = f64::from(view.to_radians()) - std::f64::consts::FRAC_PI_2;
                 let position = DVec3::new(0.0, -pitch.sin(), pitch.cos()) * 10.0;
                 let at = Viewpoint { position, yaw: 0.0, pitch, field_of_view: 2e-4 };
-                let traced = film(&scene, &sun, at, (1, 1), 4, 0).radiance()[0].y;
+                let traced = film(&scene, &sun, at, (1, 1), 4, 0)?.radiance()[0].y;
                 let cosines = [view, degrees].map(|angle| angle.to_radians().cos());
                 let factor = light.factors(cosines[0], cosines[1])[usize::from(behind)];
-                factor * 0.4 * 1000.0 * cosine / std::f32::consts::PI / traced
+                Ok::<f32, anyhow::Error>(factor * 0.4 * 1000.0 * cosine / std::f32::consts::PI / traced)
             };
-            line += &format!("{:.3} / {:.3} ", ratio(false), ratio(true));
+            line += &format!("{:.3} / {:.3} ", ratio(false)?, ratio(true)?);
         }
         println!("{line}");
     }
+    Ok(())
 }
 
-fn times(rounds: u32) {
-    let mut plant = grow(&GrowParameters::broadleaf(), 1, 20_000).expect("the broadleaf grows");
+fn times(rounds: u32) -> anyhow::Result<()> {
+    let mut plant = grow(&GrowParameters::broadleaf(), 1, 20_000)?;
     plant.set_leaf_tissue(LeafTissue::default());
     let plant = Arc::new(plant);
     let instance = Instance { plant: 0, position: DVec3::ZERO, yaw: 0.0, scale: 1.0, tint: 0.0 };
-    let scene = |model: LeafModel| {
-        let scene =
-            ReferenceScene::new(std::slice::from_ref(&plant), &[instance], None).expect("the scene is possible");
-        scene.with_leaves(model)
-    };
-    let models = [scene(LeafModel::Standard), scene(LeafModel::Layers)];
+    let scene = || ReferenceScene::new(std::slice::from_ref(&plant), &[instance], None);
+    let models = [scene()?.with_leaves(LeafModel::Standard), scene()?.with_leaves(LeafModel::Layers)];
     let sun = Light {
         key: Some(Disc {
             direction: Vec3::new(0.5, 0.7, 0.4).normalize(),
@@ -256,7 +260,7 @@ fn times(rounds: u32) {
     for _ in 0..rounds.max(1) {
         for (model, total) in models.iter().zip(&mut total) {
             let started = Instant::now();
-            std::hint::black_box(film(model, &sun, view, (320, 240), 8, u32::MAX));
+            std::hint::black_box(film(model, &sun, view, (320, 240), 8, u32::MAX)?);
             *total += started.elapsed();
         }
     }
@@ -265,4 +269,5 @@ fn times(rounds: u32) {
         "\na broadleaf's crown, 320 x 240, 8 samples: standard {standard:.3} s, layers {layers:.3} s, {:.3} times",
         layers / standard
     );
+    Ok(())
 }

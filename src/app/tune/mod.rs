@@ -74,7 +74,7 @@ pub struct Tuned {
 /// Searches the settings of a scene.
 ///
 /// # Errors
-/// Those of [`profile`]; [`ProfileError::NoAnswer`] if no settings reach the goal, with how near it came.
+/// Those of [`profile`](super::profile()); [`ProfileError::NoAnswer`] if no settings reach the goal, with how near it came.
 pub fn tune(options: &TuneOptions, progress: &mut dyn Progress) -> Result<Tuned, AppError> {
     let mut centre = profiled_scene(&options.profile.scene, &options.profile.overrides)?;
     let ladders = ladders(&options.profile.sweeps, &centre)?;
