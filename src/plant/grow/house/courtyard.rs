@@ -62,21 +62,21 @@ pub(super) fn courtyard(random: &mut Random) -> Assembly {
         Vec3::new(high.x - 0.01, soil, high.z - 0.02),
     );
     for (index, (x, scale)) in [(1.25, 0.92), (2.05, 1.08), (2.85, 0.86)].into_iter().enumerate() {
-        let bush = shrub::bush(&mut random.split(10 + index as u64), 0.7, 0.75);
+        let bush = shrub::bush(&mut random.split(10 + index as u64), 0.7, 0.65);
         assembly.add(&bush, Vec3::new(x, soil, -NORTH + 0.34), 1.3 * index as f32, scale);
     }
 
     // Plants in pots.
-    let rubber = potted::rubber(&mut random.split(20), 0.8);
+    let rubber = potted::rubber(&mut random.split(20), 0.6);
     assembly.add(&rubber, Vec3::new(-0.72, ground, -NORTH + 0.34), 0.4, 1.15);
-    let tall = potted::rubber(&mut random.split(21), 0.8);
+    let tall = potted::rubber(&mut random.split(21), 0.6);
     assembly.add(&tall, Vec3::new(-EAST + 0.45, ground, -NORTH + 0.50), 2.0, 1.45);
-    let beside = potted::rubber(&mut random.split(23), 0.8);
+    let beside = potted::rubber(&mut random.split(23), 0.6);
     assembly.add(&beside, Vec3::new(-EAST + 0.48, ground, 1.85), 4.0, 1.1);
-    let spider = potted::spider(&mut random.split(22), 0.7, true);
+    let spider = potted::spider(&mut random.split(22), 0.5, true);
     assembly.add(&spider, Vec3::new(-1.30, ground, -NORTH + 0.66), 0.3, 1.0);
     assembly.add(&spider, Vec3::new(2.75, ground, -1.35), 2.1, 1.1);
-    let low = potted::spider(&mut random.split(24), 0.7, false);
+    let low = potted::spider(&mut random.split(24), 0.5, false);
     assembly.add(&low, Vec3::new(-EAST + 0.42, ground + 0.46, 1.12), 1.0, 1.0);
     for (index, (position, scale)) in [
         (Vec3::new(0.42, ground, -NORTH + 0.80), 1.0),
@@ -173,13 +173,13 @@ fn basin(assembly: &mut Assembly, random: &mut Random, at: Vec3) {
     solid::turned(assembly.stone(Masonry::Paving), at, &profile, 64);
     let soil = [Vec2::new(0.515, 0.39), Vec2::new(0.25, 0.42), Vec2::new(0.0, 0.43)];
     solid::turned(assembly.stone(Masonry::Soil), at, &soil, 48);
-    let bush = shrub::bush(random, 0.7, 0.8);
+    let bush = shrub::bush(random, 0.7, 0.65);
     assembly.add(&bush, at + Vec3::Y * 0.42, 0.9, 0.78);
     for index in 0..7 {
         let out = potted::around(TAU * index as f32 / 7.0 + 0.3);
         let axis = (Vec3::Y + 0.35 * out).normalize_or(Vec3::Y);
         let length = 0.30 + 0.05 * random.signed();
-        potted::tuft(assembly, random, at + Vec3::Y * 0.405 + out * 0.40, axis, length, 34, [2, 14]);
+        potted::tuft(assembly, random, at + Vec3::Y * 0.405 + out * 0.40, axis, length, 30, [2, 10]);
     }
 }
 

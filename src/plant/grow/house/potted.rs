@@ -189,7 +189,7 @@ pub(super) fn spider(random: &mut Random, detail: f32, on_stool: bool) -> Assemb
     let pot = Pot { foot: 0.080, rim: 0.112, height: 0.18, stone: Masonry::Glaze };
     let soil = pot.add(&mut assembly, if on_stool { Vec3::Y * STOOL } else { Vec3::ZERO });
     let crown = Vec3::Y * (soil + 0.008);
-    tuft(&mut assembly, random, crown, Vec3::Y, 0.42, 84, [4, cells(26.0, detail)]);
+    tuft(&mut assembly, random, crown, Vec3::Y, 0.42, 84, [cells(4.0, detail), cells(26.0, detail)]);
     // Runners with plantlets.
     let runner = Matter::Stem(Vec3::new(0.34, 0.36, 0.14));
     for (index, angle) in [0.9f32, 2.35, 3.7, 5.6].into_iter().enumerate().filter(|_| on_stool) {

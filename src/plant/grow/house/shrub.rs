@@ -116,7 +116,7 @@ pub(super) struct Wall {
 /// A climber with `shoots` shoots, which start at the fraction `from` of the wall's width.
 pub(super) fn climber(assembly: &mut Assembly, random: &mut Random, wall: &Wall, from: f32, shoots: usize) {
     let bark = Matter::Stem(Vec3::new(0.15, 0.115, 0.08));
-    let grid = Blade::Begonia.grid(3, 3);
+    let grid = Blade::Begonia.grid(3, 2);
     let point = |x: f32, y: f32, off: f32| wall.foot + wall.along * x + Vec3::Y * y + wall.face * off;
     for _ in 0..shoots {
         let (mut x, mut y) = (wall.width * (from + 0.05 * random.signed()), 0.0);

@@ -266,8 +266,9 @@ mod tests {
         assert_eq!(plain.layers.transmission, stamped.layers.transmission);
         let (thickness, absorption) = (stamped.layers.thickness.unwrap(), stamped.layers.absorption.unwrap());
         assert!(thickness.pixels().all(|texel| *texel == *thickness.get_pixel(0, 0)));
-        let (paper, ink) = (absorption.get_pixel(0, 0)[0], 255);
-        let of = |value: u8| absorption.pixels().filter(|texel| texel[0] == value).count();
-        assert!(of(ink) > 60 && of(paper) > 20_000 && paper < 120, "{} {} {paper}", of(ink), of(paper));
+        let paper = absorption.get_pixel(0, 0)[0];
+        let inked = absorption.pixels().filter(|texel| texel[0] > 200).count();
+        let blank = absorption.pixels().filter(|texel| texel[0] == paper).count();
+        assert!(inked > 30 && blank > 20_000 && paper < 120, "{inked} {blank} {paper}");
     }
 }
