@@ -335,8 +335,34 @@ mod tests {
     }
 
     #[test]
+    fn a_leaf_returns_its_colour_in_the_mean_at_every_roughness() {
+        // One channel has room for the whole lobe, one for some of it, one for none.
+        let (color, through) = (Vec3::new(0.15, 0.43, 0.5), Vec3::new(0.15, 0.5, 0.5));
+        for tenths in 1..=10 {
+            let gloss = Gloss { roughness: tenths as f32 / 10.0, ..Gloss::LEAF };
+            let shares = Shares::glossy(color, through, gloss);
+            let (views, count) = (64, 1 << 10);
+            let mut sum = Vec3::ZERO;
+            for view in 0..views {
+                let height = ((view as f32 + 0.5) / views as f32).sqrt();
+                let viewer = Vec3::new((1.0 - height * height).sqrt(), height, 0.0);
+                let bsdf = Bsdf::new(Vec3::Y, Vec3::Y, shares, viewer);
+                for index in 0..count {
+                    let mut sampler = PathSampler::new(13, view, index);
+                    let scattered = bsdf.sample(sampler.pair().x, sampler.pair());
+                    sum += scattered.map_or(Vec3::ZERO, |scattered| scattered.weight);
+                }
+            }
+            let found = sum / (views as u32 * count) as f32 - through;
+            assert!((found / color - 1.0).abs().max_element() < 0.02, "{tenths}: {found}");
+        }
+    }
+
+    #[test]
     fn the_scattering_function_is_reciprocal() {
-        for gloss in [Gloss::MATT, SHINY, Gloss::LEAF] {
+        let waxy = Gloss { roughness: 0.1, ..SHINY };
+        let downy = Gloss { roughness: 1.0, ..SHINY };
+        for gloss in [Gloss::MATT, SHINY, Gloss::LEAF, waxy, downy] {
             let shares = Shares::glossy(Vec3::new(0.5, 0.3, 0.1), Vec3::splat(0.3), gloss);
             for index in 0..256 {
                 let mut sampler = PathSampler::new(3, 1, index);
