@@ -19,7 +19,8 @@
 //!   no gloss, and there are no normal maps. Light leaves a leaf at the point where it enters it.
 //! - Interpolated normals of wood keep even light, and sunlight in the mean over all sides of a trunk: with six sides it
 //!   is 2 % too dark in front and 2 % too bright aside (see [`Normals`]).
-//! - Against Mitsuba 3 it agrees within noise, 0.1 to 0.5 % (`docs/measurements/independent-check.md`).
+//! - Against Mitsuba 3 no mean of an image differs by more than its noise, mostly 0.3 to 1 %
+//!   (`docs/measurements/independent-check.md`).
 //! - The ground is the smooth surface of which the renderer draws triangles, without the detail of its normal. Rays
 //!   find it up to a set distance and see the sky texture beyond.
 //! - The air between surfaces does not scatter light. There are no stars.
