@@ -1,6 +1,6 @@
 //! The ground truth against numbers that were found without it: another renderer, quadrature, formulas.
 //!
-//! Mitsuba 3 rendered the slab (`scripts/independent`, `docs/measurements/independent-check.md`). Every check has a
+//! Mitsuba 3 rendered the slab (`scripts/independent`, `docs/measurements/independent-check.md`). Most checks have a
 //! control, a scene that is wrong by a little, which the same check must refuse. Tolerances name the standard error
 //! that they cover, and seeds are fixed.
 
