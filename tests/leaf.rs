@@ -4,9 +4,13 @@ use std::f32::consts::{FRAC_PI_2, PI};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use canopy::app::{LeafImages, LeafOptions};
+use canopy::plant::gltf::{GltfOptions, load_plant};
 use canopy::plant::{
-    Gloss, LeafTextures, LeafTissue, Measured, PartKind, Plant, PlantMaterial, PlantMesh, PlantPart, leaf_textures,
+    Gloss, LeafKind, LeafTextures, LeafTissue, Measured, PartKind, Plant, PlantMaterial, PlantMesh, PlantPart,
+    leaf_textures,
 };
+use canopy::progress::Silent;
 use canopy::reference::{
     Camera, Disc, Film, Instance, LeafModel, Light, Normals, PathTracer, ReferenceScene, Shot, TraceSettings,
 };
@@ -358,4 +362,57 @@ fn missing_textures_are_derived_from_the_front() {
     assert_eq!(bump.get_pixel(5, 20).0, [128, 128, 255, 255]);
     // Without any texture one place is as another.
     assert!(leaf_textures::thickness_and_absorption(&PlantMaterial::default(), how).is_none());
+}
+
+/// What `canopy leaf` writes is a whole set of textures, and a plant that has them.
+#[test]
+fn a_front_becomes_a_leaf_with_all_textures() {
+    let folder = tempfile::tempdir().unwrap();
+    let front = folder.path().join("front.png");
+    RgbaImage::from_fn(24, 32, |x, y| {
+        let inside = (2..22).contains(&x) && (2..30).contains(&y);
+        let vein = x == 12;
+        Rgba([if vein { 110 } else { 70 }, if vein { 120 } else { 105 }, 45, if inside { 255 } else { 0 }])
+    })
+    .save(&front)
+    .unwrap();
+    let options = LeafOptions {
+        file: front.clone(),
+        out: folder.path().join("leaf"),
+        material: None,
+        given: LeafImages { back: Some(front.clone()), ..LeafImages::default() },
+        kind: LeafKind::Thin,
+        max_thickness: Some(0.0004),
+        width: 0.08,
+        published: false,
+        high_pass: Some(0.2),
+        samples: 1,
+        quiet: true,
+    };
+    let report = canopy::app::leaf(&options, &mut Silent).unwrap();
+    assert!(report.lines.iter().any(|line| line == "back: given"), "{:?}", report.lines);
+    assert!(report.lines.iter().any(|line| line.starts_with("transmission: derived")), "{:?}", report.lines);
+    assert!(report.files.iter().all(|file| file.exists()));
+    let sheet = image::open(options.out.join("sheet.png")).unwrap().into_rgb8();
+    assert!(sheet.width() > 800 && sheet.pixels().any(|pixel| pixel[1] > pixel[0].saturating_add(20)));
+
+    let (plant, warnings) = load_plant(&options.out.join("leaf.gltf"), &GltfOptions::default()).unwrap();
+    // There is no wood, and a single leaf is small.
+    assert!(warnings.iter().all(|warning| warning.message.contains("no wood")), "{warnings:?}");
+    let [part] = plant.parts.as_slice() else { panic!("one leaf") };
+    let (textures, tissue) = (&part.material.leaf_textures, part.material.tissue.unwrap());
+    assert_eq!((tissue.max_thickness, tissue.measured), (0.0004, Measured::Texel));
+    assert!(textures.back.is_some() && textures.transmission.is_some() && part.material.normal_texture.is_some());
+    assert_eq!(textures.thickness.as_ref().map(|image| image.dimensions()), Some((24, 32)));
+    assert!((plant.height() - 0.08 * 32.0 / 24.0).abs() < 1e-6);
+
+    // What cannot be read names its file.
+    for (file, word) in [("absent.png", "absent.png"), ("leaf/leaf.bin", "leaf.bin")] {
+        let wrong = LeafOptions { file: folder.path().join(file), ..options.clone() };
+        let error = canopy::app::leaf(&wrong, &mut Silent).unwrap_err().to_string();
+        assert!(error.contains(word), "{error}");
+    }
+    let other = LeafOptions { file: options.out.join("leaf.gltf"), material: Some("bark".into()), ..options.clone() };
+    let error = canopy::app::leaf(&other, &mut Silent).unwrap_err().to_string();
+    assert!(error.contains("no such leaf") && error.contains("leaf"), "{error}");
 }
