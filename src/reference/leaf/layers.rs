@@ -51,9 +51,10 @@ pub(crate) struct TestPoint {
     pub lateral: f32,
 }
 
-/// The cosine of a ray inside a medium that has met its plane at the cosine `outside` (Snell's law).
-fn refracted(outside: f32, inverse_square: f32) -> f32 {
-    (1.0 - inverse_square * (1.0 - outside * outside)).max(0.0).sqrt().max(LEAST_LAYER_COSINE)
+/// One over the cosine of a ray inside a medium that has met its plane at the cosine `outside` (Snell's law): its way over
+/// the depth.
+fn slant(outside: f32, inverse_square: f32) -> f32 {
+    (1.0 - inverse_square * (1.0 - outside * outside)).max(0.0).sqrt().max(LEAST_LAYER_COSINE).recip()
 }
 
 impl Layers {
@@ -81,15 +82,15 @@ impl Layers {
         }
     }
 
-    /// Cosines in the layers of a view ray that meets the leaf at the cosine `outside`.
+    /// Ways over depths in the layers, of a view ray that meets the leaf at the cosine `outside`.
     pub fn view(&self, outside: f32) -> [f32; 3] {
-        self.inverse_squares.map(|inverse_square| refracted(outside, inverse_square))
+        self.inverse_squares.map(|inverse_square| slant(outside, inverse_square))
     }
 
     /// The same for the light.
     fn light(&self, outside: f32) -> [f32; 3] {
         match self.one_medium {
-            Some(inverse_square) => [refracted(outside, inverse_square); 3],
+            Some(inverse_square) => [slant(outside, inverse_square); 3],
             None => self.view(outside),
         }
     }
@@ -98,19 +99,16 @@ impl Layers {
     fn for_each_point(&self, mut each: impl FnMut(usize, f32, f32)) {
         let all: u32 = self.points.iter().map(|&count| u32::from(count)).sum();
         for layer in 0..3 {
-            let count = f32::from(self.points[layer]);
-            let weight = match self.one_medium {
-                Some(_) => 1.0 / all.max(1) as f32,
-                None => self.shares[layer] / count,
-            };
+            let piece = self.shares[layer] / f32::from(self.points[layer]);
+            let weight = if self.one_medium.is_some() { 1.0 / all.max(1) as f32 } else { piece };
             for index in 0..self.points[layer] {
-                each(layer, self.shares[layer] * (f32::from(index) + 0.5) / count, weight);
+                each(layer, piece * (f32::from(index) + 0.5), weight);
             }
         }
     }
 
     /// Calls `each` with every test point's layer, depth in it, and what arrives at the viewer of the light there, 0..=1: its
-    /// weight times the attenuation. `view` are the cosines of the view ray in the layers.
+    /// weight times the attenuation. `view` are the view ray's ways over depths in the layers.
     fn for_each_light(
         &self,
         optical_depth: f32,
@@ -120,15 +118,15 @@ impl Layers {
         mut each: impl FnMut(usize, f32, f32),
     ) {
         let light = self.light(light);
-        let through = |layer: usize, cosines: [f32; 3]| self.shares[layer] / cosines[layer];
-        let before = |layer: usize, cosines: [f32; 3]| (0..layer).map(|above| through(above, cosines)).sum::<f32>();
+        let through = |layer: usize, slants: [f32; 3]| self.shares[layer] * slants[layer];
+        let before = |layer: usize, slants: [f32; 3]| (0..layer).map(|above| through(above, slants)).sum::<f32>();
         let beyond = |layer: usize| (layer + 1..3).map(|below| through(below, light)).sum::<f32>();
         let to_viewer: [f32; 3] = std::array::from_fn(|layer| before(layer, view));
         let from_light: [f32; 3] =
             std::array::from_fn(|layer| if behind { beyond(layer) } else { before(layer, light) });
         self.for_each_point(|layer, depth, weight| {
             let rest = if behind { self.shares[layer] - depth } else { depth };
-            let way = to_viewer[layer] + depth / view[layer] + from_light[layer] + rest / light[layer];
+            let way = to_viewer[layer] + depth * view[layer] + from_light[layer] + rest * light[layer];
             each(layer, depth, weight * (-optical_depth * way).exp());
         });
     }
@@ -149,7 +147,7 @@ impl Layers {
     pub fn point(&self, optical_depth: f32, view: [f32; 3], light: f32, behind: bool, choice: f32) -> TestPoint {
         let mut left = choice * self.attenuation(optical_depth, view, light, behind);
         let mut found = TestPoint::default();
-        let slope = |layer: usize| (1.0 - view[layer] * view[layer]).max(0.0).sqrt() / view[layer];
+        let slope = |layer: usize| (view[layer] * view[layer] - 1.0).max(0.0).sqrt();
         self.for_each_light(optical_depth, view, light, behind, |layer, depth, share| {
             if left >= 0.0 && share > 0.0 {
                 found = TestPoint {
@@ -176,7 +174,7 @@ mod tests {
     /// seen perpendicularly at the entry.
     fn way(layers: &Layers, degrees: f32) -> f32 {
         let light = layers.light(degrees.to_radians().cos());
-        (0..3).map(|layer| layers.shares[layer] / light[layer]).sum()
+        (0..3).map(|layer| layers.shares[layer] * light[layer]).sum()
     }
 
     #[test]

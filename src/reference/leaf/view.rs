@@ -14,7 +14,7 @@ const RAISED: f32 = 0.25;
 pub(crate) struct LeafView {
     layers: Layers,
     optical_depth: f32,
-    /// Cosines of the view ray in the layers.
+    /// Ways over depths of the view ray in the layers.
     view: [f32; 3],
     /// What is left of perpendicular light from before and from behind; above 0.
     perpendicular: [f32; 2],
