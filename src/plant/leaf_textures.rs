@@ -17,6 +17,7 @@ use image::{GrayImage, Luma, Rgba, RgbaImage, imageops};
 
 use super::surface::{color_of, filled, value_of};
 use super::{LeafTextures, LeafTissue, Measured, PlantMaterial};
+use crate::math::color::{srgb8, unorm8};
 use crate::math::{linear_to_srgb, luminance};
 
 /// Value of thickness and absorption where nothing tells more.
@@ -98,7 +99,7 @@ pub fn thickness_and_absorption(material: &PlantMaterial, how: Derivation) -> Op
         |value: f32| if high - low < LEAST_CONTRAST { EVEN } else { ((value - low) / (high - low)).clamp(0.0, 1.0) };
     let image = |of: &dyn Fn(f32) -> f32| {
         GrayImage::from_fn(width, height, |x, y| {
-            Luma([code(of(stretched(values[y as usize * width as usize + x as usize])))])
+            Luma([unorm8(of(stretched(values[y as usize * width as usize + x as usize])))])
         })
     };
     let mut thickness = image(&|bright| 1.0 - bright);
@@ -119,10 +120,6 @@ fn percentiles(values: &mut [f32]) -> Option<(f32, f32)> {
     Some((at(0.01), at(0.99)))
 }
 
-fn code(value: f32) -> u8 {
-    (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
-}
-
 /// The image without its slow changes, about its mean. `sigma`: standard deviation of the blur in texels.
 fn high_passed(image: &GrayImage, sigma: f32) -> GrayImage {
     if !(sigma.is_finite() && sigma > 0.0) {
@@ -133,7 +130,7 @@ fn high_passed(image: &GrayImage, sigma: f32) -> GrayImage {
     let mean = image.as_raw().iter().map(|&value| f32::from(value)).sum::<f32>() / count;
     GrayImage::from_fn(image.width(), image.height(), |x, y| {
         let value = mean + f32::from(image.get_pixel(x, y)[0]) - f32::from(blurred.get_pixel(x, y)[0]);
-        Luma([code(value / 255.0)])
+        Luma([unorm8(value / 255.0)])
     })
 }
 
@@ -142,7 +139,7 @@ fn painted(material: &PlantMaterial, of: impl Fn(Vec2) -> Vec3) -> Option<RgbaIm
     let front = filled(&material.base_color_texture)?;
     let size = front.dimensions();
     Some(RgbaImage::from_fn(size.0, size.1, |x, y| {
-        let [r, g, b] = of(center((x, y), size)).to_array().map(|value| code(linear_to_srgb(value)));
+        let [r, g, b] = of(center((x, y), size)).to_array().map(srgb8);
         Rgba([r, g, b, front.get_pixel(x, y)[3]])
     }))
 }
@@ -177,7 +174,7 @@ pub fn bump_of(material: &PlantMaterial, depth: f32) -> Option<RgbaImage> {
             Vec2::new(difference(at(x + width - 1, y), at(x + 1, y)), difference(at(x, y + 1), at(x, y + height - 1)))
                 * (depth * width as f32);
         let normal = Vec3::new(-slope.x, -slope.y, 1.0).normalize_or(Vec3::Z);
-        let [r, g, b] = (0.5 * normal + 0.5).to_array().map(code);
+        let [r, g, b] = (0.5 * normal + 0.5).to_array().map(unorm8);
         Rgba([r, g, b, 255])
     }))
 }
@@ -230,7 +227,7 @@ pub(crate) fn attenuated_transmission(material: &PlantMaterial, tissue: &LeafTis
         let uv = center((x, y), (width, height));
         let depth = tissue.optical_depth(value(&thickness, uv), value(&absorption, uv));
         let through = transmission_at(material, uv) * (mean - depth).exp();
-        let [r, g, b] = through.to_array().map(|value| code(linear_to_srgb(value.clamp(0.0, 1.0))));
+        let [r, g, b] = through.to_array().map(srgb8);
         Rgba([r, g, b, 255])
     }))
 }

@@ -15,6 +15,7 @@ use super::leaf_textures::{Derivation, mean_optical_depth, thickness_and_absorpt
 use super::optics::{mean_over_leaf, mean_texel};
 use super::surface::filled;
 use super::{Plant, PlantMaterial};
+use crate::math::{color::srgb8, srgb_to_linear};
 
 /// The least cosine of a ray to the normal inside a layer.
 pub const LEAST_LAYER_COSINE: f32 = 0.05;
@@ -178,12 +179,7 @@ impl PlantMaterial {
 
 /// The image with its linear colours times `factor`.
 fn scaled(image: &RgbaImage, factor: f32) -> RgbaImage {
-    use crate::math::{linear_to_srgb, srgb_to_linear};
-    let code = |code: u8| {
-        let value = factor * srgb_to_linear(f32::from(code) / 255.0);
-        (255.0 * linear_to_srgb(value.clamp(0.0, 1.0)) + 0.5) as u8
-    };
-    let table: [u8; 256] = std::array::from_fn(|at| code(at as u8));
+    let table: [u8; 256] = std::array::from_fn(|code| srgb8(factor * srgb_to_linear(code as f32 / 255.0)));
     let mut image = image.clone();
     image.pixels_mut().for_each(|texel| texel.0[..3].iter_mut().for_each(|value| *value = table[usize::from(*value)]));
     image

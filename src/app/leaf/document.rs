@@ -8,8 +8,8 @@ use crate::plant::{LeafTissue, PlantMaterial};
 pub const BUFFER: &str = "leaf.bin";
 
 /// The document of an upright leaf of `size` (width and height in metres), its stalk at the origin, and the bytes of its buffer.
-/// Textures have the names that [`super::leaf`] gives them.
-pub fn document(material: &PlantMaterial, [width, height]: [f32; 2]) -> (String, Vec<u8>) {
+/// `files` names the textures that there are, without their endings, as [`super::leaf`] writes them.
+pub fn document(material: &PlantMaterial, files: &[&str], [width, height]: [f32; 2]) -> (String, Vec<u8>) {
     let half = 0.5 * width;
     let positions = [[-half, 0.0, 0.0], [half, 0.0, 0.0], [half, height, 0.0], [-half, height, 0.0]];
     let uvs = [[0.0f32, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]];
@@ -20,16 +20,6 @@ pub fn document(material: &PlantMaterial, [width, height]: [f32; 2]) -> (String,
     bytes.extend(uvs.as_flattened().iter().flat_map(|value| value.to_le_bytes()));
     bytes.extend(indices.iter().flat_map(|index| index.to_le_bytes()));
 
-    let textures = &material.leaf_textures;
-    let present = [
-        ("front", material.base_color_texture.is_some()),
-        ("back", textures.back.is_some()),
-        ("transmission", textures.transmission.is_some()),
-        ("thickness", textures.thickness.is_some()),
-        ("absorption", textures.absorption.is_some()),
-        ("bump", material.normal_texture.is_some()),
-    ];
-    let files: Vec<&str> = present.iter().filter(|(_, there)| *there).map(|(name, _)| *name).collect();
     let texture = |name: &str| files.iter().position(|file| *file == name).map(|index| json!({ "index": index }));
     let tissue = material.tissue.unwrap_or_default();
     let LeafTissue { max_thickness, absorption_range, layers, refraction, test_points, measured, volume } = tissue;

@@ -86,28 +86,18 @@ pub fn leaf(options: &LeafOptions, progress: &mut dyn Progress) -> Result<LeafRe
     let mut report = LeafReport::default();
     complete(&mut material, options, &mut report.lines);
 
-    let textures = &material.leaf_textures;
-    let color =
-        |image: &Option<Arc<RgbaImage>>| image.as_ref().map(|image| DynamicImage::ImageRgba8((**image).clone()));
-    let grey = |image: &Option<Arc<GrayImage>>| image.as_ref().map(|image| DynamicImage::ImageLuma8((**image).clone()));
-    let images = [
-        ("front", color(&material.base_color_texture)),
-        ("back", color(&textures.back)),
-        ("transmission", color(&textures.transmission)),
-        ("thickness", grey(&textures.thickness)),
-        ("absorption", grey(&textures.absorption)),
-        ("bump", color(&material.normal_texture)),
-    ];
-    for (name, image) in &images {
+    let mut names = Vec::new();
+    for (name, image) in textures(&material) {
         let Some(image) = image else { continue };
         let path = options.out.join(format!("{name}.png"));
-        write_image(&path, image)?;
+        write_image(&path, &image)?;
+        names.push(name);
         report.files.push(path);
     }
     let shape =
         material.base_color_texture.as_ref().map_or(1.0, |image| image.height() as f32 / image.width().max(1) as f32);
     let path = options.out.join("leaf.gltf");
-    let (text, buffer) = document::document(&material, [options.width, options.width * shape]);
+    let (text, buffer) = document::document(&material, &names, [options.width, options.width * shape]);
     let beside = options.out.join(document::BUFFER);
     write(&beside, &buffer)?;
     write(&path, text.as_bytes())?;
@@ -120,6 +110,22 @@ pub fn leaf(options: &LeafOptions, progress: &mut dyn Progress) -> Result<LeafRe
     image.save(&path, &[("Title", title), ("Software", format!("canopy {}", env!("CARGO_PKG_VERSION")))])?;
     report.files.push(path);
     Ok(report)
+}
+
+/// The textures of a leaf by the names of their files.
+fn textures(material: &PlantMaterial) -> [(&'static str, Option<DynamicImage>); 6] {
+    let color =
+        |image: &Option<Arc<RgbaImage>>| image.as_ref().map(|image| DynamicImage::ImageRgba8((**image).clone()));
+    let grey = |image: &Option<Arc<GrayImage>>| image.as_ref().map(|image| DynamicImage::ImageLuma8((**image).clone()));
+    let textures = &material.leaf_textures;
+    [
+        ("front", color(&material.base_color_texture)),
+        ("back", color(&textures.back)),
+        ("transmission", color(&textures.transmission)),
+        ("thickness", grey(&textures.thickness)),
+        ("absorption", grey(&textures.absorption)),
+        ("bump", color(&material.normal_texture)),
+    ]
 }
 
 /// Derives what is missing; `lines` say so.

@@ -5,12 +5,12 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec2, Vec3};
-use image::{Rgb, RgbImage, imageops};
+use image::{DynamicImage, Rgb, RgbImage, imageops};
 
-use super::LeafOptions;
+use super::{LeafOptions, textures};
 use crate::{
     app::{AppError, text::Writer},
-    math::{linear_to_srgb, luminance},
+    math::{color::srgb8, luminance},
     plant::{PartKind, Plant, PlantMaterial, PlantMesh, PlantPart},
     progress::Progress,
     reference::{
@@ -62,8 +62,7 @@ pub fn draw(
     let plant = plant(material, options.width, shape);
     let columns = LIGHTS.len() as u32;
     let block = NAMES + columns * (cell[0] + GAP);
-    let textures = 6 * (SMALL + GAP);
-    let width = GAP + (2 * block).max(textures) + GAP;
+    let width = GAP + (2 * block).max(6 * (SMALL + GAP)) + GAP;
     let top = TITLE + SMALL + 2 * CAPTION + GAP;
     let height = top + CAPTION + 2 * (cell[1] + GAP) + lines.len() as u32 * 22 + 2 * GAP;
     let mut sheet = RgbImage::from_pixel(width, height, Rgb(PAPER));
@@ -93,7 +92,7 @@ pub fn draw(
                 let exposure = *exposure.get_or_insert_with(|| exposure_for(&pixels));
                 for (at, pixel) in pixels.into_iter().enumerate() {
                     let (column, row) = (at as u32 % cell[0], at as u32 / cell[0]);
-                    sheet.put_pixel(x + column, y + row, shown(pixel * exposure));
+                    sheet.put_pixel(x + column, y + row, Rgb((pixel * exposure).to_array().map(srgb8)));
                 }
                 progress.advance(1);
                 if progress.is_cancelled() {
@@ -111,23 +110,10 @@ pub fn draw(
 }
 
 fn draw_textures(sheet: &mut RgbImage, writer: &Writer, material: &PlantMaterial) {
-    let textures = &material.leaf_textures;
-    let grey = |image: &Option<Arc<image::GrayImage>>| {
-        image.as_ref().map(|image| image::DynamicImage::ImageLuma8((**image).clone()).into_rgba8())
-    };
-    let color = |image: &Option<Arc<image::RgbaImage>>| image.as_ref().map(|image| (**image).clone());
-    let all = [
-        ("front", color(&material.base_color_texture)),
-        ("back", color(&textures.back)),
-        ("transmission", color(&textures.transmission)),
-        ("thickness", grey(&textures.thickness)),
-        ("absorption", grey(&textures.absorption)),
-        ("bump", color(&material.normal_texture)),
-    ];
-    for (index, (name, image)) in all.into_iter().enumerate() {
+    for (index, (name, image)) in textures(material).into_iter().enumerate() {
         let x = 2 * GAP + index as u32 * (SMALL + GAP);
         writer.write(sheet, (x as f32, (TITLE + SMALL + 4) as f32), 17.0, FAINT, name);
-        let Some(image) = image else { continue };
+        let Some(image) = image.map(DynamicImage::into_rgba8) else { continue };
         let scale = SMALL as f32 / image.width().max(image.height()) as f32;
         let side = |texels: u32| ((texels as f32 * scale).round() as u32).max(1);
         let small = imageops::resize(&image, side(image.width()), side(image.height()), imageops::FilterType::Triangle);
@@ -196,8 +182,4 @@ fn exposure_for(pixels: &[Vec3]) -> f32 {
     let leaf: Vec<f32> = pixels.iter().map(|pixel| luminance(*pixel)).filter(|value| *value != SURROUNDINGS).collect();
     let mean = leaf.iter().sum::<f32>() / leaf.len().max(1) as f32;
     if mean > 0.0 && mean.is_finite() { SHOWN / mean } else { 1.0 }
-}
-
-fn shown(linear: Vec3) -> Rgb<u8> {
-    Rgb(linear.to_array().map(|value| (255.0 * linear_to_srgb(value.clamp(0.0, 1.0))).round() as u8))
 }

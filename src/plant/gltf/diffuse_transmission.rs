@@ -26,7 +26,7 @@ use image::{Rgba, RgbaImage};
 use serde::Deserialize;
 
 use super::error::{WarningKind, Warnings};
-use crate::math::linear_to_srgb;
+use crate::math::color::srgb8;
 use crate::plant::PlantMaterial;
 use crate::plant::optics::{mean_over_leaf, mean_texel};
 use crate::plant::surface::{alpha_of, color_of};
@@ -70,8 +70,7 @@ impl DiffuseTransmission {
             let uv = Vec2::new((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
             let passed = share_of_all * factor.map_or(1.0, |image| alpha_of(image, uv));
             let color = tint * color.map_or(Vec3::ONE, |image| color_of(image, uv));
-            let code = |value: f32| (255.0 * linear_to_srgb(value.clamp(0.0, 1.0)) + 0.5) as u8;
-            let [r, g, b] = (passed * color).to_array().map(code);
+            let [r, g, b] = (passed * color).to_array().map(srgb8);
             Rgba([r, g, b, 255])
         }))
     }
