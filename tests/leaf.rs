@@ -357,6 +357,9 @@ fn missing_textures_are_derived_from_the_front() {
     assert!((linear(through.get_pixel(5, 20)[1]) - expected.y).abs() < 2e-3);
     let back = leaf_textures::back_of(&material).unwrap();
     assert!(back.get_pixel(5, 20)[2] > 55 && back.get_pixel(5, 20)[3] == 255);
+    // The factor on the base colour once was in the texture, and counted twice.
+    let tinted = PlantMaterial { base_color: Vec3::splat(0.5), ..material.clone() };
+    assert_eq!(leaf_textures::back_of(&tinted), Some(back));
     let bump = leaf_textures::bump_of(&material, 0.01).unwrap();
     assert_ne!(bump.get_pixel(15, 20)[0], bump.get_pixel(17, 20)[0]);
     assert_eq!(bump.get_pixel(5, 20).0, [128, 128, 255, 255]);

@@ -150,10 +150,12 @@ pub fn transmission_of(material: &PlantMaterial) -> Option<RgbaImage> {
     painted(material, |uv| material.transmitted(front_at(material, uv)))
 }
 
-/// A back for a leaf of which only the front is known: paler by 0.3 of its luminance. `None` without a front texture.
+/// A back for a leaf of which only the front is known: paler by 0.3 of its luminance. The factor on the base colour is not in
+/// it, as it counts for the back too. `None` without a front texture.
 pub fn back_of(material: &PlantMaterial) -> Option<RgbaImage> {
+    let front = filled(&material.base_color_texture)?;
     painted(material, |uv| {
-        let front = front_at(material, uv);
+        let front = color_of(&front, uv);
         front + PALER * luminance(front)
     })
 }
