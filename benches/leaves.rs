@@ -1,26 +1,25 @@
 //! How near are the layers of a leaf to a walk of photons through its tissue, and what do they cost?
 //!
-//! Three tables:
+//! Two tables:
 //! - The light that a leaf sends back and lets through over the angle of incidence, relative to perpendicular light: photons
 //!   that walk through three slabs of the same indices of refraction and the same absorption, scattered isotropically, refracted
 //!   and reflected at every interface; the layered model; the standard model, which has 1 everywhere. What the outer
 //!   surface mirrors is left out, as it is the gloss of all models.
-//! - The closed form of the renderer against the test points of the path tracer.
 //! - The time of the path tracer with layers over that without, same scene and samples, in turns.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use canopy::plant::LeafTissue;
 use canopy::plant::grow::{GrowParameters, grow};
 use canopy::plant::tissue_light::TissueLight;
-use canopy::plant::{Gloss, LeafTextures, LeafTissue, PartKind, Plant, PlantMaterial, PlantMesh, PlantPart};
 use canopy::reference::{
     Camera, Disc, Film, Instance, LeafModel, Light, Normals, PathTracer, ReferenceScene, Shot, TraceSettings,
 };
 use canopy::scene::Viewpoint;
 use clap::Parser;
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec3};
 
 /// Layers of leaves: error against a walk of photons, and cost.
 #[derive(Parser, Debug)]
@@ -45,7 +44,6 @@ struct Arguments {
 fn main() -> anyhow::Result<()> {
     let arguments = Arguments::parse();
     walks(&arguments);
-    closed_form()?;
     times(arguments.rounds)
 }
 
@@ -77,13 +75,13 @@ fn walks(arguments: &Arguments) {
     }
 }
 
-/// The factors of the layers in the mean over all views.
+/// The factors of the layers on light that comes to the front, in the mean over all views.
 fn over_views(light: &TissueLight, to_light: f32) -> [f32; 2] {
     const VIEWS: u32 = 64;
     let mut sum = [0.0; 2];
     for step in 0..VIEWS {
         let view = (step as f32 + 0.5) / VIEWS as f32;
-        let factors = light.factors(view, to_light);
+        let factors = [light.factors(true, view, to_light)[0], light.factors(false, view, to_light)[1]];
         (0..2).for_each(|side| sum[side] += factors[side] * 2.0 * view / VIEWS as f32);
     }
     sum
@@ -171,25 +169,6 @@ impl Slabs {
     }
 }
 
-fn single(tissue: LeafTissue) -> Arc<Plant> {
-    let corners = [(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)];
-    let mesh = PlantMesh {
-        positions: corners.iter().map(|(u, v)| 0.1 * Vec3::new(u - 0.5, 0.0, v - 0.5)).collect(),
-        normals: vec![Vec3::Y; 4],
-        uvs: corners.iter().map(|(u, v)| Vec2::new(*u, *v)).collect(),
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-    };
-    let material = PlantMaterial {
-        base_color: Vec3::splat(0.4),
-        transmission: Vec3::ONE,
-        gloss: Gloss::MATT,
-        leaf_textures: LeafTextures::default(),
-        tissue: Some(tissue),
-        ..PlantMaterial::default()
-    };
-    Arc::new(Plant { name: "leaf".into(), parts: vec![PlantPart { kind: PartKind::Foliage, mesh, material }] })
-}
-
 fn film(
     scene: &ReferenceScene,
     light: &Light,
@@ -204,40 +183,6 @@ fn film(
     let mut film = Film::new(&shot)?;
     tracer.render(&shot, &mut film, samples, &mut |_| ControlFlow::Continue(()))?;
     Ok(film)
-}
-
-fn closed_form() -> anyhow::Result<()> {
-    let tissue = LeafTissue::default();
-    // An untextured leaf has the middle of both ranges.
-    let light = TissueLight::of(&tissue, tissue.optical_depth(0.5, 0.5));
-    let instance = Instance { plant: 0, position: DVec3::ZERO, yaw: 0.0, scale: 1.0, tint: 0.0 };
-    let scene = ReferenceScene::new(&[single(tissue)], &[instance], None)?;
-    let scene = scene.with_leaves(LeafModel::Layers);
-    println!("\nclosed form over test points (8 of them), light from before / from behind:");
-    println!("  view  light:    0            30            60            75            85 degrees");
-    for view in [0.0f32, 30.0, 60.0, 75.0, 85.0] {
-        let mut line = format!("  {view:4}         ");
-        for degrees in [0.0f32, 30.0, 60.0, 75.0, 85.0] {
-            let ratio = |behind: bool| {
-                let (sine, cosine) = degrees.to_radians().sin_cos();
-                let direction = Vec3::new(sine, if behind { -cosine } else { cosine }, 0.0);
-                let sun = Light {
-                    key: Some(Disc { direction, illuminance: Vec3::splat(1000.0), angular_radius: 0.0 }),
-                    ..Light::even(Vec3::ZERO)
-                };
-                let pitch = f64::from(view.to_radians()) - std::f64::consts::FRAC_PI_2;
-                let position = DVec3::new(0.0, -pitch.sin(), pitch.cos()) * 10.0;
-                let at = Viewpoint { position, yaw: 0.0, pitch, field_of_view: 2e-4 };
-                let traced = film(&scene, &sun, at, (1, 1), 4, 0)?.radiance()[0].y;
-                let cosines = [view, degrees].map(|angle| angle.to_radians().cos());
-                let factor = light.factors(cosines[0], cosines[1])[usize::from(behind)];
-                Ok::<f32, anyhow::Error>(factor * 0.4 * 1000.0 * cosine / std::f32::consts::PI / traced)
-            };
-            line += &format!("{:.3} / {:.3} ", ratio(false)?, ratio(true)?);
-        }
-        println!("{line}");
-    }
-    Ok(())
 }
 
 fn times(rounds: u32) -> anyhow::Result<()> {

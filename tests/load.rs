@@ -149,7 +149,8 @@ fn a_scene_is_built_beside_the_program_and_shown() {
     }
     let at_plants: Vec<(u64, u64)> =
         progress.iter().filter(|(_, seen)| seen.step == "Plants").map(|(_, seen)| (seen.done, seen.total)).collect();
-    assert!(!at_plants.is_empty() && at_plants.iter().all(|(done, total)| done <= total && *total == 3));
+    // A frame that takes longer than the plants hears of them in the notes alone.
+    assert!(at_plants.iter().all(|(done, total)| done <= total && *total == 3), "{at_plants:?}");
     assert!(at_plants.is_sorted(), "{at_plants:?}");
 
     // At rest nothing changes any more.

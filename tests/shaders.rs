@@ -296,12 +296,10 @@ fn gpu_structs_are_what_the_shaders_think() {
             lobe_gain,
             lobe_room,
             cover_weight,
-            optical_depth,
-            shares,
-            inverse_squares,
-            perpendicular,
-            sky_before,
-            sky_behind
+            front_reflected,
+            front_transmitted,
+            back_reflected,
+            back_transmitted
         }
     );
     twin!(

@@ -36,13 +36,11 @@ struct Part {
     lobe_gain: f32,
     lobe_room: f32,
     cover_weight: f32,
-    // Of leaves with layers: the members of `Tissue`.
-    optical_depth: f32,
-    shares: vec4<f32>,
-    inverse_squares: vec4<f32>,
-    perpendicular: vec2<f32>,
-    sky_before: vec4<f32>,
-    sky_behind: vec4<f32>,
+    // Of leaves with layers, of the front and of the back: the factors of `Tissue`.
+    front_reflected: vec4<f32>,
+    front_transmitted: vec4<f32>,
+    back_reflected: vec4<f32>,
+    back_transmitted: vec4<f32>,
 }
 
 @group(2) @binding(0) var color_texture: texture_2d<f32>;
@@ -267,8 +265,9 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let ground = sample_ground(in.relative);
 #ifdef LAYERED
     let tissue = Tissue(
-        part.optical_depth, part.shares.xyz, part.inverse_squares.xyz, part.perpendicular, part.sky_before.xyz,
-        part.sky_behind.xyz,
+        select(part.front_reflected, part.back_reflected, behind),
+        select(part.front_transmitted, part.back_transmitted, behind),
+        select(part.back_transmitted, part.front_transmitted, behind),
     );
     let to_viewer = abs(dot(normal, surface.viewer));
     let key_factors = tissue_light(tissue, to_viewer, abs(dot(normal, light.key_direction)));

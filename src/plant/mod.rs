@@ -16,6 +16,7 @@ pub(crate) mod surface;
 pub mod texture;
 mod tissue;
 pub mod tissue_light;
+pub(crate) mod tissue_slabs;
 
 use std::collections::HashMap;
 use std::sync::Arc;

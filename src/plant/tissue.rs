@@ -71,6 +71,10 @@ pub struct LeafTissue {
     /// Indices of refraction of the three: [`LeafTissue::REFRACTION`]. Default (1.33, 1, 1.33): the spongy tissue is 50
     /// to 80 % air.
     pub refraction: [f32; 3],
+    /// Optical depth of scattering through the leaf, isotropic: [`LeafTissue::SCATTERING`]. It decides how the colours
+    /// change with the angle. Default 2: in infrared light, which it does not absorb, a leaf then returns about as much as
+    /// it lets through, as leaves do.
+    pub scattering: f32,
     /// Test points in the three, at which the incoming light is looked at: each 0..=[`LeafTissue::MOST_POINTS`]. A layer
     /// that is there has at least one. More: the penumbra has finer steps. Default (4, 3, 1).
     pub test_points: [u8; 3],
@@ -87,6 +91,7 @@ impl Default for LeafTissue {
             absorption_range: [600.0, 3000.0],
             layers: [0.45, 0.4, 0.15],
             refraction: [1.33, 1.0, 1.33],
+            scattering: 2.0,
             test_points: [4, 3, 1],
             measured: Measured::Texel,
             volume: false,
@@ -101,6 +106,8 @@ impl LeafTissue {
     pub const ABSORPTION: RangeInclusive<f32> = 0.0..=1e6;
     /// Range of the indices of refraction.
     pub const REFRACTION: RangeInclusive<f32> = 1.0..=3.0;
+    /// Range of the optical depth of scattering.
+    pub const SCATTERING: RangeInclusive<f32> = 1.0..=10.0;
     /// The most test points in a layer.
     pub const MOST_POINTS: u8 = 8;
 
@@ -126,6 +133,7 @@ impl LeafTissue {
             }),
             layers,
             refraction: pairs(self.refraction, Self::REFRACTION, default.refraction),
+            scattering: within(self.scattering, Self::SCATTERING, default.scattering),
             test_points,
             ..self
         }
@@ -150,12 +158,14 @@ mod tests {
             absorption_range: [-1.0, f32::INFINITY],
             layers: [0.0, f32::NAN, 9.0],
             refraction: [0.0, 9.0, f32::NAN],
+            scattering: f32::NEG_INFINITY,
             test_points: [0, 0, 200],
             ..LeafTissue::default()
         };
         let tame = wild.sanitized();
         assert_eq!((tame.max_thickness, tame.absorption_range), (0.0003, [0.0, 1e6]));
         assert_eq!((tame.refraction, tame.test_points), ([1.0, 3.0, 1.33], [0, 1, 8]));
+        assert_eq!(tame.scattering, 1.0);
         assert!((tame.layers.iter().sum::<f32>() - 1.0).abs() < 1e-6 && tame.layers[0] == 0.0);
         assert_eq!(LeafTissue { layers: [0.0; 3], ..wild }.sanitized().layers, LeafTissue::default().layers);
         assert_eq!(tame.sanitized(), tame);

@@ -1,46 +1,108 @@
-//! What a leaf's tissue leaves of the light, as integrals over its layers: the real-time form of the layered model
-//! [Franzke 2005, 3.2; 4.2.2], which the bakes and the renderer share.
+//! How the light of a leaf with a tissue changes with the angle: what the path tracer, the bakes and the renderer share.
 //!
-//! The path tracer looks at the light at test points (`reference/leaf/layers.rs`). Here the sum over these is an
-//! integral over each layer, for which there is a closed form, and the optical depth is the mean of the leaf. Levels of
-//! detail whose leaves are too small to have an angle of their own have the mean over all angles.
+//! The tissue is solved as three slabs that absorb and scatter ([`super::tissue_slabs`]), once for a species. What is
+//! left of it is four polynomials: the light that is sent back and that is let through, from the front and from the
+//! back, over that of perpendicular light. A leaf is then the product of that of the light's angle and that of the
+//! viewer's, which is reciprocal, and exact for the light that comes from one direction and leaves in all.
+//!
+//! Levels of detail whose leaves are too small to have an angle of their own have the mean over all angles.
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use image::RgbaImage;
 
 use super::LeafTissue;
 use super::leaf_textures::{Derivation, mean_optical_depth, thickness_and_absorption, transmission_of};
 use super::optics::{mean_over_leaf, mean_texel};
 use super::surface::filled;
+use super::tissue_slabs::Slabs;
 use super::{Plant, PlantMaterial};
 use crate::math::{color::srgb8, srgb_to_linear};
 
 /// The least cosine of a ray to the normal inside a layer.
 pub const LEAST_LAYER_COSINE: f32 = 0.05;
-/// Cosines per angle of the mean over all angles.
-const ANGLES: u32 = 16;
-/// Cosines to the viewer for which the sky's factors are stored.
-pub const SKY_COSINES: [f32; 3] = [0.1, 0.55, 1.0];
+/// Cosines at which a polynomial is exact.
+const EXACT: [f64; 4] = [1.0, 0.7, 0.35, 0.08];
+/// The most optical depth of absorption: beyond it nothing is left that has an angle.
+const MOST_ABSORPTION: f64 = 5.0;
+/// The least value of a polynomial.
+const LEAST: f32 = 1e-3;
 
-/// The tissue of a leaf with one optical depth.
+/// A factor on light over its cosine to the leaf, 1 where it is perpendicular: a polynomial of degree 3, constant first.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TissueLight {
-    /// Absorption times thickness.
-    pub optical_depth: f32,
-    /// Shares of the three layers; their sum is 1.
-    pub shares: Vec3,
-    /// Squares of their inverse indices of refraction.
-    pub inverse_squares: Vec3,
+pub struct AngleFactor(pub Vec4);
+
+impl AngleFactor {
+    /// That of a Lambertian leaf.
+    pub const LAMBERT: Self = Self(Vec4::X);
+
+    /// Through `values` at the cosines [`EXACT`], over the first of them.
+    fn through(values: [f64; 4]) -> Self {
+        if values[0] <= 0.0 {
+            return Self::LAMBERT;
+        }
+        // Newton's divided differences, multiplied out.
+        let mut differences = values.map(|value| value / values[0]);
+        for order in 1..4 {
+            for i in (order..4).rev() {
+                differences[i] = (differences[i] - differences[i - 1]) / (EXACT[i] - EXACT[i - order]);
+            }
+        }
+        let mut polynomial = [0.0; 4];
+        for (difference, node) in differences.iter().zip(EXACT).rev() {
+            // polynomial * (x - node) + difference
+            for i in (0..4).rev() {
+                let lower = if i > 0 { polynomial[i - 1] } else { *difference };
+                polynomial[i] = lower - node * polynomial[i];
+            }
+        }
+        let found = Self(Vec4::from(polynomial.map(|value| value as f32)));
+        if found.0.is_finite() { found } else { Self::LAMBERT }
+    }
+
+    /// The factor at a cosine, 0..=1: positive.
+    pub fn at(self, cosine: f32) -> f32 {
+        let [a, b, c, d] = self.0.to_array();
+        (((d * cosine + c) * cosine + b) * cosine + a).max(LEAST)
+    }
+
+    /// The mean over even light, by the cosine.
+    pub fn mean(self) -> f32 {
+        self.0.dot(Vec4::new(1.0, 2.0 / 3.0, 0.5, 0.4)).max(LEAST)
+    }
+
+    /// The greatest value.
+    fn most(self) -> f32 {
+        (0..=16).map(|step| self.at(step as f32 / 16.0)).fold(0.0, f32::max)
+    }
 }
 
-/// The mean of `exp(-x t)` over `t` in 0..1.
-fn mean_exp(x: f32) -> f32 {
-    if x.abs() < 1e-2 { 1.0 - 0.5 * x } else { (1.0 - (-x).exp()) / x }
+/// One side of a leaf: factors on the light that comes from a direction, or is seen from it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LeafSide {
+    /// On light that is sent back.
+    pub reflected: AngleFactor,
+    /// On light that enters here and comes out on the other side; the same as on light from there that comes out here.
+    pub transmitted: AngleFactor,
+}
+
+/// The tissue of a leaf in the mean over its mask.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TissueLight {
+    /// The front.
+    pub front: LeafSide,
+    /// The back.
+    pub back: LeafSide,
 }
 
 impl TissueLight {
+    /// A leaf that is the same from all angles.
+    pub const LAMBERT: Self = {
+        let side = LeafSide { reflected: AngleFactor::LAMBERT, transmitted: AngleFactor::LAMBERT };
+        Self { front: side, back: side }
+    };
+
     /// The leaf of `material`, in the mean over its mask; `None` where it has no tissue.
     pub fn new(material: &PlantMaterial) -> Option<Self> {
         let tissue = material.tissue?.sanitized();
@@ -57,75 +119,54 @@ impl TissueLight {
         Some(Self::of(&tissue, optical_depth))
     }
 
-    /// A tissue, sanitized, of this optical depth.
+    /// A tissue, sanitized, of this optical depth of absorption.
     pub fn of(tissue: &LeafTissue, optical_depth: f32) -> Self {
-        Self {
-            // Beyond this nothing is left; infinity would make sums of NaN.
-            optical_depth: optical_depth.clamp(0.0, 1e4),
-            shares: Vec3::from(tissue.layers),
-            inverse_squares: Vec3::from(tissue.refraction.map(|index| 1.0 / (index * index))),
-        }
-    }
-
-    /// One over the cosines in the layers of a ray that meets the leaf at the cosine `outside`.
-    fn slants(&self, outside: f32) -> [f32; 3] {
-        let sine = (1.0 - outside * outside).max(0.0);
-        let cosines = (1.0 - self.inverse_squares * sine).max(Vec3::ZERO).map(f32::sqrt);
-        cosines.max(Vec3::splat(LEAST_LAYER_COSINE)).recip().to_array()
-    }
-
-    /// What is left of the light from the cosine `light` at the cosine `view`, both 0..=1, from before and from behind: 0..=1. The
-    /// twin of `tissue_light` in `shaders/common/tissue.wgsl`. As seen from the front; the light from behind is the same on
-    /// the back, that from before nearly.
-    pub fn attenuation(&self, view: f32, light: f32) -> [f32; 2] {
-        let (view, light) = (self.slants(view), self.slants(light));
-        let depth = (self.optical_depth * self.shares).to_array();
-        let (mut before, mut behind) = (0.0f32, 0.0f32);
-        let (mut above, mut seen) = (0.0f32, 0.0f32);
-        let mut below: f32 = (0..3).map(|layer| depth[layer] * light[layer]).sum();
-        for layer in 0..3 {
-            let (to_viewer, to_light) = (depth[layer] * view[layer], depth[layer] * light[layer]);
-            below -= to_light;
-            before += self.shares[layer] * (-above).exp() * mean_exp(to_viewer + to_light);
-            // Symmetric in both, so that no exponent is positive.
-            let (most, least) = (to_viewer.max(to_light), to_viewer.min(to_light));
-            behind += self.shares[layer] * (-(seen + below.max(0.0)) - least).exp() * mean_exp(most - least);
-            above += to_viewer + to_light;
-            seen += to_viewer;
-        }
-        [before, behind]
-    }
-
-    /// The same over that of perpendicular light seen perpendicularly, which the leaf's colours contain: 0..=1.
-    pub fn factors(&self, view: f32, light: f32) -> [f32; 2] {
-        let (left, whole) = (self.attenuation(view, light), self.attenuation(1.0, 1.0));
-        [0, 1].map(|side| (left[side] / whole[side].max(f32::MIN_POSITIVE)).min(1.0))
-    }
-
-    /// The factors in even light, at the cosine `view`.
-    pub fn in_even_light(&self, view: f32) -> [f32; 2] {
-        let mut sum = [0.0; 2];
-        for step in 0..ANGLES {
-            let light = (step as f32 + 0.5) / ANGLES as f32;
-            let factors = self.factors(view, light);
-            for side in 0..2 {
-                sum[side] += factors[side] * 2.0 * light / ANGLES as f32;
+        let front = Slabs {
+            shares: tissue.layers.map(f64::from),
+            indices: tissue.refraction.map(f64::from),
+            absorption: f64::from(optical_depth).clamp(0.0, MOST_ABSORPTION),
+            scattering: f64::from(tissue.scattering),
+        };
+        let side = |slabs: Slabs| {
+            let leaving = slabs.leaving(EXACT);
+            LeafSide {
+                reflected: AngleFactor::through(leaving.map(|leaving| leaving.before)),
+                transmitted: AngleFactor::through(leaving.map(|leaving| leaving.behind)),
             }
-        }
-        sum
+        };
+        Self { front: side(front), back: side(front.reversed()) }
     }
 
-    /// The factors in the mean over leaves of all angles, in light from anywhere.
+    /// The side that is seen, and the other.
+    pub fn sides(&self, front: bool) -> [LeafSide; 2] {
+        if front { [self.front, self.back] } else { [self.back, self.front] }
+    }
+
+    /// Factors on light from the cosine `light`, seen at the cosine `view` of the front or the back, from before and from
+    /// behind. Above 0; 1 for perpendicular light seen perpendicularly. The twin of `tissue_light` in
+    /// `shaders/common/tissue.wgsl`.
+    pub fn factors(&self, front: bool, view: f32, light: f32) -> [f32; 2] {
+        let [seen, other] = self.sides(front);
+        [seen.reflected.at(view) * seen.reflected.at(light), seen.transmitted.at(view) * other.transmitted.at(light)]
+    }
+
+    /// The factors in even light.
+    pub fn in_even_light(&self, front: bool, view: f32) -> [f32; 2] {
+        let [seen, other] = self.sides(front);
+        [seen.reflected.at(view) * seen.reflected.mean(), seen.transmitted.at(view) * other.transmitted.mean()]
+    }
+
+    /// The factors in the mean over leaves of all angles, seen from both sides in light from anywhere.
     pub fn mean(&self) -> [f32; 2] {
-        let mut sum = [0.0; 2];
-        for step in 0..ANGLES {
-            let view = (step as f32 + 0.5) / ANGLES as f32;
-            let factors = self.in_even_light(view);
-            for side in 0..2 {
-                sum[side] += factors[side] * 2.0 * view / ANGLES as f32;
-            }
-        }
-        sum
+        let [front, back] = [self.front, self.back].map(|side| side.reflected.mean());
+        [0.5 * (front * front + back * back), self.front.transmitted.mean() * self.back.transmitted.mean()]
+    }
+
+    /// The most that a leaf returns of even light over that of perpendicular light seen perpendicularly, from before and
+    /// from behind.
+    pub fn most(&self, front: bool) -> [f32; 2] {
+        let [seen, other] = self.sides(front);
+        [seen.reflected.most() * seen.reflected.mean(), seen.transmitted.most() * other.transmitted.mean()]
     }
 }
 
@@ -194,30 +235,59 @@ mod tests {
     }
 
     #[test]
-    fn perpendicular_light_is_that_of_lambert_and_beer() {
-        let [before, behind] = leaf(0.5).attenuation(1.0, 1.0);
-        assert!((behind - (-0.5f32).exp()).abs() < 1e-6);
-        assert!((before - (1.0 - (-1.0f32).exp())).abs() < 1e-6);
-        assert_eq!(leaf(0.5).factors(1.0, 1.0), [1.0; 2]);
+    fn perpendicular_light_has_the_colours_as_they_are() {
+        for front in [true, false] {
+            let factors = leaf(0.3).factors(front, 1.0, 1.0);
+            assert!(factors.iter().all(|factor| (factor - 1.0).abs() < 1e-5), "{factors:?}");
+        }
     }
 
     #[test]
-    fn factors_are_finite_symmetric_and_fall_with_the_angle() {
-        for depth in [0.0, 1e-6, 0.3, 5.0, f32::INFINITY] {
-            for view in [0.0, 0.3, 1.0] {
-                let mut last = [0.0; 2];
-                for step in 0..=20 {
-                    let light = step as f32 / 20.0;
-                    let (left, other) = (leaf(depth).attenuation(view, light), leaf(depth).attenuation(light, view));
-                    assert!(left.iter().all(|value| (0.0..=1.0 + 1e-6).contains(value)), "{left:?}");
-                    assert!((left[0] - other[0]).abs() < 1e-6, "{left:?} {other:?}");
-                    assert!(left[0] >= last[0] - 1e-6 && left[1] >= last[1] - 1e-6);
-                    last = left;
-                }
+    fn polynomials_follow_the_slabs() {
+        for (absorption, scattering, bar) in [(0.27, 2.0, 0.02), (0.5, 4.0, 0.01), (0.0, 2.0, 0.01), (0.5, 1.0, 0.05)] {
+            let tissue = LeafTissue { scattering, ..LeafTissue::default() };
+            let light = TissueLight::of(&tissue, absorption);
+            let slabs = Slabs {
+                shares: tissue.layers.map(f64::from),
+                indices: tissue.refraction.map(f64::from),
+                absorption: f64::from(absorption),
+                scattering: f64::from(scattering),
+            };
+            let cosines: [f64; 16] = std::array::from_fn(|i| 1.0 - i as f64 / 16.0);
+            let leaving = slabs.leaving(cosines);
+            for (found, cosine) in leaving.iter().zip(cosines) {
+                let ratio =
+                    |value: f64, whole: f64, factor: AngleFactor| factor.at(cosine as f32) as f64 * whole / value;
+                let back = ratio(found.before, leaving[0].before, light.front.reflected);
+                let through = ratio(found.behind, leaving[0].behind, light.front.transmitted);
+                assert!((back - 1.0).abs() < bar && (through - 1.0).abs() < bar, "{cosine}: {back} {through}");
             }
-            assert!(leaf(depth).mean().iter().all(|value| (0.0..=1.0 + 1e-6).contains(value)));
         }
-        // A leaf without absorption is Lambert.
-        assert!(leaf(0.0).mean().iter().all(|value| (value - 1.0).abs() < 1e-6));
+    }
+
+    #[test]
+    fn factors_are_positive_and_reciprocal_for_any_tissue() {
+        let strange = LeafTissue { layers: [0.0, 1.0, 0.0], refraction: [3.0, 1.0, 3.0], ..LeafTissue::default() };
+        for tissue in [LeafTissue::default(), strange.sanitized()] {
+            for depth in [0.0, 1e-6, 0.3, 5.0, f32::INFINITY] {
+                let light = TissueLight::of(&tissue, depth);
+                for (view, from) in [(0.0, 0.5), (0.3, 0.9), (1.0, 0.01)] {
+                    let (there, back) = (light.factors(true, view, from), light.factors(true, from, view));
+                    assert!(there.iter().all(|factor| *factor > 0.0 && *factor < 20.0), "{there:?}");
+                    assert_eq!(there[0], back[0]);
+                    // Through the leaf the other way.
+                    assert_eq!(there[1], light.factors(false, from, view)[1]);
+                }
+                assert!(light.mean().iter().all(|factor| (1e-6..4.0).contains(factor)));
+            }
+        }
+    }
+
+    #[test]
+    fn the_mean_of_a_factor_is_its_integral() {
+        let factor = leaf(0.4).front.transmitted;
+        let cosines = (0..1000).map(|i| (i as f32 + 0.5) / 1000.0);
+        let mean = cosines.map(|cosine| 2e-3 * cosine * factor.at(cosine)).sum::<f32>();
+        assert!((factor.mean() - mean).abs() < 1e-4, "{} {mean}", factor.mean());
     }
 }

@@ -57,6 +57,14 @@ impl Shares {
         Self { reflected: whole.reflected - specular_albedo, lobe, ..whole }
     }
 
+    /// The same with less diffuse light where the factors `before` and `behind` on it would make more light than there is.
+    pub fn with_room_for(self, [before, behind]: [f32; 2]) -> Self {
+        let most = self.reflected * before + self.transmitted * behind;
+        let room = Vec3::ONE - self.lobe.as_ref().map_or(Vec3::ZERO, Lobe::albedo);
+        let factor = (room / most.max(Vec3::splat(f32::MIN_POSITIVE))).min_element().clamp(0.0, 1.0);
+        self.with_diffuse(factor)
+    }
+
     /// The same with `factor` times the diffuse light.
     fn with_diffuse(self, factor: f32) -> Self {
         Self { reflected: self.reflected * factor, transmitted: self.transmitted * factor, ..self }

@@ -47,6 +47,11 @@ impl Lobe {
         (strength.max_element() > 0.0).then_some(Self { strength, width, before: 0.75 / gain, peak })
     }
 
+    /// The fraction of the light that the lobe reflects in the mean over all directions.
+    pub fn albedo(&self) -> Vec3 {
+        self.strength * (self.before / 0.75)
+    }
+
     /// Approximate light that the lobe reflects to a viewer at the cosine `to_viewer` to the normal, summed over
     /// channels.
     pub fn weight(&self, to_viewer: f32) -> f32 {

@@ -269,6 +269,7 @@ fn check_tissue(tissue: &LeafTissue, at: &str, check: &mut Check) {
     for (number, absorption) in tissue.absorption_range.into_iter().enumerate() {
         check.number(&format!("{at}.absorption_range[{number}]"), absorption, LeafTissue::ABSORPTION, "1/m");
     }
+    check.number(&format!("{at}.scattering"), tissue.scattering, LeafTissue::SCATTERING, "");
     for number in 0..3 {
         check.number(&format!("{at}.layers[{number}]"), tissue.layers[number], 0.0..=1.0, "");
         check.number(&format!("{at}.refraction[{number}]"), tissue.refraction[number], LeafTissue::REFRACTION, "");

@@ -22,12 +22,14 @@ pub fn document(material: &PlantMaterial, files: &[&str], [width, height]: [f32;
 
     let texture = |name: &str| files.iter().position(|file| *file == name).map(|index| json!({ "index": index }));
     let tissue = material.tissue.unwrap_or_default();
-    let LeafTissue { max_thickness, absorption_range, layers, refraction, test_points, measured, volume } = tissue;
+    let LeafTissue { max_thickness, absorption_range, layers, refraction, scattering, test_points, measured, volume } =
+        tissue;
     let mut leaf = json!({
         "maxThickness": max_thickness,
         "absorptionRange": absorption_range,
         "layers": layers,
         "refraction": refraction,
+        "scattering": scattering,
         "testPoints": test_points,
         "measured": measured,
         "volume": volume,

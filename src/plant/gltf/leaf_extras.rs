@@ -9,7 +9,7 @@
 //!     "absorptionTexture": { "index": 5 },   red channel, 0..1
 //!     "maxThickness": 0.0003,                metres; further members as in `LeafTissue`:
 //!     "absorptionRange": [600, 3000], "layers": [0.45, 0.4, 0.15], "refraction": [1.33, 1, 1.33],
-//!     "testPoints": [4, 3, 1], "measured": "Leaf", "volume": false
+//!     "scattering": 2, "testPoints": [4, 3, 1], "measured": "Leaf", "volume": false
 //! } }
 //! ```
 //!
@@ -47,6 +47,7 @@ pub(super) struct LeafExtras {
     absorption_range: Option<[f32; 2]>,
     layers: Option<[f32; 3]>,
     refraction: Option<[f32; 3]>,
+    scattering: Option<f32>,
     test_points: Option<[u8; 3]>,
     measured: Option<Measured>,
     volume: bool,
@@ -89,6 +90,7 @@ impl LeafExtras {
             absorption_range: self.absorption_range.unwrap_or(usual.absorption_range),
             layers: self.layers.unwrap_or(usual.layers),
             refraction: self.refraction.unwrap_or(usual.refraction),
+            scattering: self.scattering.unwrap_or(usual.scattering),
             test_points: self.test_points.unwrap_or(usual.test_points),
             measured: self.measured.unwrap_or_else(|| material.leaf_textures.measured()),
             volume: self.volume,

@@ -13,13 +13,15 @@
 //! ```
 //!
 //! At a test point the light has the way `s` through the tissue behind it and the way `t` to the viewer before it, and is
-//! attenuated by `exp(-a (t + s))` (eq. 3.4), `a` being the optical depth of the leaf. A leaf's light is the mean over
-//! the test points, weighted by the share of tissue that each stands for.
+//! attenuated by `exp(-a (t + s))` (eq. 3.4), `a` being the optical depth of the leaf. The thesis's leaf has the mean over
+//! the test points, weighted by the share of tissue that each stands for ([`LeafModel::Published`]).
 //!
 //! # Differences from the thesis
+//! - This attenuation decides only how dark a texel is under perpendicular light. With the angle it falls, where that of a
+//!   tissue which scatters rises, by a quarter at 60 degrees: how the light of a leaf changes with the angle follows from
+//!   three slabs that scatter (`plant/tissue_slabs.rs`). Test points are where its shadow rays start.
 //! - The way of the light is that of a ray which is refracted at each layer. The correction that is printed (eq. 3.5) is
-//!   that for one medium; through layers of 1.33, 1 and 1.33 it is 53 % short at 80 degrees. [`LeafModel::Published`]
-//!   has it.
+//!   that for one medium; through layers of 1.33, 1 and 1.33 it is 53 % short at 80 degrees.
 //! - The weights add up to 1 over all layers.
 //! - The cosine in a layer is at least [`LEAST_LAYER_COSINE`]: in the spongy tissue, which refracts like air, a grazing ray
 //!   would never arrive.
@@ -55,6 +57,11 @@ pub(crate) struct TestPoint {
 /// the depth.
 fn slant(outside: f32, inverse_square: f32) -> f32 {
     (1.0 - inverse_square * (1.0 - outside * outside)).max(0.0).sqrt().max(LEAST_LAYER_COSINE).recip()
+}
+
+/// Shift along the plane over the depth of a ray whose way over the depth is `slant`.
+fn slope(slant: f32) -> f32 {
+    (slant * slant - 1.0).max(0.0).sqrt()
 }
 
 impl Layers {
@@ -143,17 +150,31 @@ impl Layers {
         self.attenuation(optical_depth, [1.0; 3], 1.0, behind)
     }
 
+    /// The test point that `choice`, 0..1, picks by the share of the tissue that each stands for.
+    pub fn even_point(&self, view: [f32; 3], choice: f32) -> TestPoint {
+        let (mut above, mut lateral) = (0.0, 0.0);
+        let mut layer = 0;
+        while layer < 2 && choice >= above + self.shares[layer] {
+            above += self.shares[layer];
+            lateral += self.shares[layer] * slope(view[layer]);
+            layer += 1;
+        }
+        let piece = self.shares[layer] / f32::from(self.points[layer].max(1));
+        let index = ((choice - above) / piece).floor().clamp(0.0, f32::from(self.points[layer].max(1)) - 1.0);
+        let depth = piece * (index + 0.5);
+        TestPoint { depth: above + depth, lateral: lateral + depth * slope(view[layer]) }
+    }
+
     /// The test point that `choice`, 0..1, picks; each has the probability of its share in [`Self::attenuation`].
     pub fn point(&self, optical_depth: f32, view: [f32; 3], light: f32, behind: bool, choice: f32) -> TestPoint {
         let mut left = choice * self.attenuation(optical_depth, view, light, behind);
         let mut found = TestPoint::default();
-        let slope = |layer: usize| (view[layer] * view[layer] - 1.0).max(0.0).sqrt();
         self.for_each_light(optical_depth, view, light, behind, |layer, depth, share| {
             if left >= 0.0 && share > 0.0 {
                 found = TestPoint {
                     depth: self.shares[..layer].iter().sum::<f32>() + depth,
-                    lateral: (0..layer).map(|above| self.shares[above] * slope(above)).sum::<f32>()
-                        + depth * slope(layer),
+                    lateral: (0..layer).map(|above| self.shares[above] * slope(view[above])).sum::<f32>()
+                        + depth * slope(view[layer]),
                 };
             }
             left -= share;
@@ -251,6 +272,12 @@ mod tests {
             }
             last = depth;
             mean += depth / 1000.0;
+        }
+        // Without attenuation every point has the share of its tissue, as it has where the slabs decide.
+        for step in 0..1000 {
+            let choice = (step as f32 + 0.5) / 1000.0;
+            let (one, other) = (front.even_point(view, choice), front.point(0.0, view, 1.0, true, choice));
+            assert!((one.depth - other.depth).abs() < 1e-5 && (one.lateral - other.lateral).abs() < 1e-5);
         }
         // Seen perpendicularly all points of a leaf have equal light from behind: their mean depth is that of their tissue.
         let (mut even, mut picked) = (0.0, 0.0);

@@ -1,9 +1,10 @@
 //! The layered leaf model [Franzke 2005, 3.2]: what the tissue of a leaf does to the light that its textures colour.
 //!
 //! A leaf is a plane with a thickness. Its colours come from textures: front, back, transmission. The tissue between the
-//! leaf's plane and a virtual plane behind it decides how much of the light is left on its way ([`layers`]), and where
-//! the light is looked at: rays to the light start inside the leaf, up to some tenths of a millimetre beside the point
-//! that is seen, so that shadows have a soft edge.
+//! leaf's plane and a virtual plane behind it decides how dark a texel is and where the light is looked at ([`layers`]):
+//! rays to the light start inside the leaf, up to some tenths of a millimetre beside the point that is seen, so that
+//! shadows have a soft edge. How the light changes with the angle follows from the same three layers as slabs that scatter
+//! ([`crate::plant::tissue_light`]).
 //!
 //! | part | file |
 //! |---|---|
@@ -12,8 +13,7 @@
 //! | one point of a leaf, seen from somewhere | `view.rs` |
 //!
 //! # Cost
-//! Three sums of eight exponentials for each surface of a path, where a leaf is; `docs/measurements/leaves.md` has the
-//! times. A species without a tissue is traced by the standard model and pays nothing.
+//! Two polynomials for each direction of light, where a leaf is; `docs/measurements/leaves.md` has the times. A species without a tissue is traced by the standard model and pays nothing.
 //!
 //! # Limits
 //! - Rays to the light have the direction of the light outside (the thesis allows itself that error).
@@ -39,8 +39,8 @@ pub enum LeafModel {
     Standard,
     /// By the layers of their tissue, with all textures; where the material has no tissue, by those of a usual leaf.
     Layers,
-    /// The same as the thesis prints it: the light's way is that through one medium (eq. 3.5), all test points have equal
-    /// weights, the absorption texture is the luminance of the transmission, and colours are attenuated whatever they were measured
-    /// through.
+    /// The same as the thesis prints it: light falls with the angle by its way to the test points and back, which is that
+    /// through one medium (eq. 3.5), all test points have equal weights, the absorption texture is the luminance of the
+    /// transmission, and colours are attenuated whatever they were measured through.
     Published,
 }

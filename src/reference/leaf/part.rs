@@ -5,10 +5,11 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 use image::{GrayImage, RgbaImage};
 
-use super::LeafModel;
 use super::layers::Layers;
+use super::{LeafModel, LeafView};
 use crate::plant::leaf_textures::{Derivation, EVEN, Sign, mean_optical_depth, thickness_and_absorption};
 use crate::plant::surface::{channels_of, color_of, filled, value_of};
+use crate::plant::tissue_light::TissueLight;
 use crate::plant::{LeafTissue, Measured, PartKind, PlantPart};
 
 /// The leaves of a part, ready to be looked up.
@@ -17,6 +18,10 @@ pub(crate) struct PartLeaf {
     tissue: LeafTissue,
     /// Seen from the front and from the back.
     layers: [Layers; 2],
+    /// How the light changes with the angle; `None` for the thesis's leaf.
+    light: Option<TissueLight>,
+    /// The most that the angle changes even light from before and from behind, on the front and on the back.
+    most: [[f32; 2]; 2],
     /// Colour of the back, without the factor on the base colour.
     back: Option<Arc<RgbaImage>>,
     bump: Option<Arc<RgbaImage>>,
@@ -52,18 +57,20 @@ impl PartLeaf {
         }
         let front = Layers::new(&tissue, published);
         let layers = [front, front.reversed()];
+        let mean = mean_optical_depth(&tissue, material, [thickness.as_deref(), absorption.as_deref()]);
+        let light = (!published).then(|| TissueLight::of(&tissue, mean));
+        let most = [true, false].map(|front| light.map_or([1.0; 2], |light| light.most(front)));
         let measured = if published { Measured::Nothing } else { tissue.measured };
         let contained = match measured {
             Measured::Texel => None,
-            Measured::Leaf => {
-                let mean = mean_optical_depth(&tissue, material, [thickness.as_deref(), absorption.as_deref()]);
-                Some(layers.map(|layers| [false, true].map(|behind| layers.perpendicular(mean, behind))))
-            }
+            Measured::Leaf => Some(layers.map(|layers| [false, true].map(|behind| layers.perpendicular(mean, behind)))),
             Measured::Nothing => Some([[1.0; 2]; 2]),
         };
         Some(Self {
             tissue,
             layers,
+            light,
+            most,
             back: filled(&textures.back),
             bump: filled(&material.normal_texture),
             thickness,
@@ -83,15 +90,29 @@ impl PartLeaf {
         self.tissue.max_thickness * self.thickness.as_deref().map_or(EVEN, |image| value_of(image, uv))
     }
 
+    /// Whether the optical depth of a texel changes its light.
+    pub fn knows_texels(&self) -> bool {
+        self.contained.is_some() || self.light.is_none()
+    }
+
     /// Optical depth at `uv` of tissue that is `thickness` metres thick.
     pub fn optical_depth(&self, uv: Vec2, thickness: f32) -> f32 {
         let absorption = self.absorption.as_deref().map_or(EVEN, |image| value_of(image, uv));
         self.tissue.optical_depth(thickness / self.tissue.max_thickness, absorption)
     }
 
-    /// The layers from the front or from the back.
-    pub fn layers(&self, front: bool) -> Layers {
-        self.layers[usize::from(!front)]
+    /// A point of the front or the back, seen at the cosine `to_viewer`, 0..=1.
+    pub fn view(&self, front: bool, optical_depth: f32, to_viewer: f32) -> LeafView {
+        let layers = self.layers[usize::from(!front)];
+        match &self.light {
+            Some(light) => LeafView::slabs(layers, light.sides(front), to_viewer),
+            None => LeafView::test_points(layers, optical_depth, to_viewer),
+        }
+    }
+
+    /// The most that the angle changes even light from before and from behind.
+    pub fn most(&self, front: bool) -> [f32; 2] {
+        self.most[usize::from(!front)]
     }
 
     /// Linear colour of the back at `uv`; `None` where it is that of the front.

@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::{LeafView, PartLeaf};
+use super::PartLeaf;
 use crate::plant::PlantPart;
 use crate::reference::bsdf::Bsdf;
 use crate::reference::camera::WorldRay;
@@ -35,7 +35,7 @@ impl ReferenceScene {
         let measured =
             leaf.is_volume().then(|| tracer.and_then(|tracer| depth_of(tracer, point, side, given))).flatten();
         let body = LeafBody { thickness: measured.unwrap_or(given), volume: measured.is_some() };
-        let optical_depth = leaf.optical_depth(point.uv, body.thickness);
+        let optical_depth = if leaf.knows_texels() { leaf.optical_depth(point.uv, body.thickness) } else { 0.0 };
 
         let mut colored = *point;
         if !front && let Some(back) = leaf.back(point.uv) {
@@ -51,8 +51,9 @@ impl ReferenceScene {
 
         let mut surface = self.on_plant(instance, &colored, normals, |placed, geometric, shading| {
             let shares = placed.shares(&colored, gloss.unwrap_or_default());
+            let shares = shares.with_room_for(leaf.most(front));
             Bsdf::new(geometric, shading, shares, to_viewer)
-                .with_tissue(|cosine| LeafView::new(leaf.layers(front), optical_depth, cosine))
+                .with_tissue(|cosine| leaf.view(front, optical_depth, cosine))
         });
         if let Anchor::Plant { leaf, .. } = &mut surface.anchor {
             *leaf = Some(body);

@@ -16,10 +16,7 @@ use crate::{
     light::sh::MAX_BANDS,
     lod::level_distance::inverse_height,
     math::luminance,
-    plant::{
-        LeafColors, LeafTissue, PlantMaterial, lobe_gain, lobe_room,
-        tissue_light::{SKY_COSINES, TissueLight},
-    },
+    plant::{LeafColors, PlantMaterial, lobe_gain, lobe_room, tissue_light::TissueLight},
     scatter::PlantSize,
     style::layers,
 };
@@ -146,22 +143,17 @@ pub struct PartUniform {
     pub lobe_room: f32,
     /// Factor on the cover around it: 0 where its k_a holds the shade of the trees around already, else 1.
     pub cover_weight: f32,
-    /// Of the tissue of leaves with layers ([`TissueLight`]): absorption times thickness; 0 without.
-    pub optical_depth: f32,
     /// Alignment.
-    pub padding: [u32; 2],
-    /// Shares of the layers.
-    pub shares: [f32; 4],
-    /// Squares of their inverse indices of refraction.
-    pub inverse_squares: [f32; 4],
-    /// What is left of perpendicular light from before, and from behind.
-    pub perpendicular: [f32; 2],
-    /// Alignment.
-    pub more_padding: [u32; 2],
-    /// Factors on even light from before at [`SKY_COSINES`].
-    pub sky_before: [f32; 4],
-    /// The same from behind.
-    pub sky_behind: [f32; 4],
+    pub padding: [u32; 3],
+    /// Of leaves with layers, the factors of an angle on the light that is sent back and let through, of the front and of
+    /// the back ([`TissueLight`]).
+    pub front_reflected: [f32; 4],
+    /// The second of them.
+    pub front_transmitted: [f32; 4],
+    /// The third.
+    pub back_reflected: [f32; 4],
+    /// The last.
+    pub back_transmitted: [f32; 4],
 }
 
 /// Words of four coefficients after the first, of all bands.
@@ -296,8 +288,7 @@ fn cover_weight(lighting: &BakedLighting) -> f32 {
 /// What the shaders know of a part's material.
 pub fn part_uniform(material: &PlantMaterial, lighting: &BakedLighting, tissue: Option<TissueLight>) -> PartUniform {
     let gloss = material.gloss.sanitized();
-    let tissue = tissue.unwrap_or_else(|| TissueLight::of(&LeafTissue::default(), 0.0));
-    let even = SKY_COSINES.map(|cosine| tissue.in_even_light(cosine));
+    let tissue = tissue.unwrap_or(TissueLight::LAMBERT);
     PartUniform {
         base_color: material.base_color.to_array(),
         realigned: realigned(lighting),
@@ -308,14 +299,11 @@ pub fn part_uniform(material: &PlantMaterial, lighting: &BakedLighting, tissue: 
         lobe_gain: lobe_gain(gloss.roughness),
         lobe_room: lobe_room(gloss.roughness),
         cover_weight: cover_weight(lighting),
-        optical_depth: tissue.optical_depth,
-        padding: [0; 2],
-        shares: tissue.shares.extend(0.0).to_array(),
-        inverse_squares: tissue.inverse_squares.extend(0.0).to_array(),
-        perpendicular: tissue.attenuation(1.0, 1.0).map(|left| left.max(1e-30)),
-        more_padding: [0; 2],
-        sky_before: Vec3::from(even.map(|[before, _]| before)).extend(0.0).to_array(),
-        sky_behind: Vec3::from(even.map(|[_, behind]| behind)).extend(0.0).to_array(),
+        padding: [0; 3],
+        front_reflected: tissue.front.reflected.0.to_array(),
+        front_transmitted: tissue.front.transmitted.0.to_array(),
+        back_reflected: tissue.back.reflected.0.to_array(),
+        back_transmitted: tissue.back.transmitted.0.to_array(),
     }
 }
 
