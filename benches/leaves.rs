@@ -31,7 +31,7 @@ struct Arguments {
     #[arg(long, default_value_t = 0.5)]
     absorption: f32,
     /// Optical depths of scattering through the leaf.
-    #[arg(long, value_delimiter = ',', default_value = "1,4,16")]
+    #[arg(long, value_delimiter = ',', default_value = "1,2,4,10")]
     scattering: Vec<f32>,
     /// Rounds of the timing.
     #[arg(long, default_value_t = 5)]
@@ -50,11 +50,11 @@ fn main() -> anyhow::Result<()> {
 const ANGLES: [f32; 9] = [0.0, 15.0, 30.0, 45.0, 60.0, 70.0, 75.0, 80.0, 85.0];
 
 fn walks(arguments: &Arguments) {
-    let tissue = LeafTissue::default();
-    let light = TissueLight::of(&tissue, arguments.absorption);
     println!("light over that at 0 degrees, absorption {}:", arguments.absorption);
     println!("  scattering  angle  sent back: walk layers  off   let through: walk layers  off");
     for &scattering in &arguments.scattering {
+        let tissue = LeafTissue { scattering, ..LeafTissue::default() }.sanitized();
+        let light = TissueLight::of(&tissue, arguments.absorption);
         let walk = |degrees: f32| {
             let slabs = Slabs { tissue, absorption: arguments.absorption, scattering };
             slabs.walk(degrees.to_radians().cos(), arguments.photons)
