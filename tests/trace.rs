@@ -323,3 +323,36 @@ fn a_line_that_needs_no_more_gets_no_more() {
     };
     assert_eq!((count(ControlFlow::Continue(())), count(ControlFlow::Break(()))), (5, 1));
 }
+
+#[test]
+fn rays_that_leave_long_thin_triangles_do_not_meet_them() {
+    // The sides of a pole of 8 m: each triangle is 4 cm wide.
+    let sides = 48;
+    let corner = |i: u32, y: f32| {
+        let angle = std::f32::consts::TAU * i as f32 / sides as f32;
+        Vec3::new(0.3 * angle.cos(), y, 0.3 * angle.sin())
+    };
+    let positions = (0..2 * sides).map(|i| corner(i % sides, if i < sides { 0.0 } else { 8.0 })).collect();
+    let triangles = (0..sides).flat_map(|i| {
+        let j = (i + 1) % sides;
+        [[i, i + sides, j], [j, i + sides, j + sides]]
+    });
+    let tracer = PlantTracer::new(&plant(vec![part(PartKind::Wood, positions, triangles.collect())]));
+    let mut left = 0;
+    for i in 0..20_000 {
+        let (direction, place) = spread(i);
+        let angle = std::f32::consts::TAU * place.x;
+        let from = Vec3::new(2.0 * angle.cos(), 1.0 + 6.0 * place.y, 2.0 * angle.sin());
+        let Some(hit) = tracer.closest(&ray(from, -from.with_y(0.0).normalize())) else { continue };
+        let point = tracer.point(&hit);
+        // Away from the pole, which is convex.
+        let outwards =
+            if point.geometric_normal.dot(from) < 0.0 { -point.geometric_normal } else { point.geometric_normal };
+        if outwards.dot(direction) > 1e-3 {
+            let found = tracer.closest(&ray(point.leave(direction), direction));
+            assert!(found.is_none(), "{i}: {found:?}");
+            left += 1;
+        }
+    }
+    assert!(left > 9000, "{left}");
+}

@@ -3,11 +3,17 @@
 //!
 //! The ray is sheared onto the axis of its largest component; each edge then has a sign that both triangles at that
 //! edge compute from the same two products, so that they agree.
+//!
+//! The distance comes from these products too. On a long thin triangle they are large against its area, and so is
+//! their rounding: where it could hide on which side of the triangle the ray starts, the distance is found in f64.
+
+use glam::Vec3;
 
 /// A ray's shear, found once a ray.
 #[derive(Clone, Copy)]
 pub(super) struct Shear {
     origin: [f32; 3],
+    direction: [f32; 3],
     axes: [usize; 3],
     x: f32,
     y: f32,
@@ -41,6 +47,7 @@ impl Shear {
         let inverse = 1.0 / direction[last];
         Self {
             origin,
+            direction,
             axes: [first, second, last],
             x: direction[first] * inverse,
             y: direction[second] * inverse,
@@ -77,7 +84,21 @@ impl Shear {
             return None;
         }
         let inverse = 1.0 / determinant;
-        let t = (u * az + v * bz + w * cz) * (self.z * inverse);
+        let mut t = (u * az + v * bz + w * cz) * (self.z * inverse);
+        let products = (cx * by).abs() + (ax * cy).abs() + (bx * ay).abs();
+        let rounding = 4.0 * f32::EPSILON * products * az.abs().max(bz.abs()).max(cz.abs());
+        if t.abs() <= rounding * (self.z * inverse).abs() {
+            t = self.distance(corners);
+        }
         (t > 0.0 && t < t_max).then_some(Crossing { t, u: v * inverse, v: w * inverse })
+    }
+
+    /// Signed distance to the plane of a triangle along the ray.
+    #[cold]
+    fn distance(&self, corners: &[[f32; 3]; 3]) -> f32 {
+        let [a, b, c] = corners.map(|corner| Vec3::from(corner).as_dvec3());
+        let (origin, direction) = (Vec3::from(self.origin).as_dvec3(), Vec3::from(self.direction).as_dvec3());
+        let normal = (b - a).cross(c - a);
+        (normal.dot(a - origin) / normal.dot(direction)) as f32
     }
 }
