@@ -299,8 +299,8 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
 #endif
     var visibility = terrain_visibility(ground, look.height);
     var lit_side = normal;
-#ifdef LAYERED
-    // A large leaf that is lit from behind must not shade itself: its light arrives on the other side.
+#ifdef FOLIAGE
+    // A leaf that is lit from behind must not shade itself: its light arrives on the other side.
     lit_side = select(normal, -normal, dot(normal, light.key_direction) < 0.0);
 #endif
 #ifdef SUN_HARMONICS

@@ -44,17 +44,24 @@ struct Varying {
     @location(1) normal: vec3<f32>,
 }
 
+// Height of a tile's skirt. It covers gaps that are narrower than a pixel.
+const SKIRT_PIXELS: f32 = 1.5;
+
 @vertex
 fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: u32) -> Varying {
     let tile = tiles[instance];
-    let v = vertices[tile.first + index];
-    let grid = vec2(f32(index % TILE_SIDE), f32(index / TILE_SIDE));
+    // The vertices of the skirt follow those of the tile.
+    let in_skirt = index >= TILE_SIDE * TILE_SIDE;
+    let at = select(index, index - TILE_SIDE * TILE_SIDE, in_skirt);
+    let v = vertices[tile.first + at];
+    let grid = vec2(f32(at % TILE_SIDE), f32(at / TILE_SIDE));
     let xz = tile.origin + grid * tile.spacing;
     let distance = max(length(xz), tile.clearance);
     let k = clamp((distance - tile.morph_start) / (tile.morph_end - tile.morph_start), 0.0, 1.0);
     let height = mix(v.height, v.parent_height, k);
     var out: Varying;
     out.relative = vec3(xz.x, height - tile.camera_height, xz.y);
+    out.relative.y -= select(0.0, SKIRT_PIXELS * length(out.relative) / frame.focal_length_pixels, in_skirt);
     out.clip = frame.clip_from_relative * vec4(out.relative, 1.0);
     out.normal = mix(decode_octahedral_y(v.normal), decode_octahedral_y(v.parent_normal), k);
     return out;

@@ -1,6 +1,10 @@
 //! Cameras and stands at the end of what is possible: an image of finite colours, and no complaint of the device.
 
-use canopy::{app::RenderedImage, assets::Stage, scene::Pose};
+use canopy::{
+    app::{RenderedImage, Renderer},
+    assets::Stage,
+    scene::Pose,
+};
 use glam::DVec2;
 
 use super::{NOON, draw, showing};
@@ -91,4 +95,40 @@ fn a_camera_inside_a_trunk_is_drawn_without_a_complaint() {
         assert!((1e-5..0.95).contains(&light), "mean luminance {light}");
     }
     assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+/// Pixels in the lower half that are far brighter than the four around them.
+fn specks(picture: &RenderedImage) -> usize {
+    let (width, height) = (picture.width as usize, picture.height as usize);
+    let at = |x: usize, y: usize| {
+        picture.pixels[3 * (y * width + x)..][..3].iter().map(|&code| i32::from(code)).sum::<i32>()
+    };
+    let bright = |x: usize, y: usize| {
+        let around = [at(x - 1, y), at(x + 1, y), at(x, y - 1), at(x, y + 1)];
+        at(x, y) > around.into_iter().max().unwrap_or_default() + 60
+    };
+    (height / 2 + 4..height - 1).map(|y| (1..width - 1).filter(|&x| bright(x, y)).count()).sum()
+}
+
+/// Tiles round the vertices of a common edge differently: the bright sky once shone through single pixels of the ground.
+#[test]
+fn the_sky_does_not_shine_through_the_seams_of_the_ground() {
+    let _gpu = gpu();
+    let stage = few().stage;
+    let mut renderer = Renderer::new((480, 270), None, 1).unwrap_or_else(|error| panic!("{error}"));
+    renderer.show(&stage);
+    let mut last = None;
+    for number in 0..6 {
+        let along = f64::from(number);
+        // Away from the trees, towards the low sun.
+        let pose = pose((-40.0 - 17.7 * along, 6.0 + along, 5.0 - 31.0 * along), 290.0, 0.0);
+        let picture = draw(&mut renderer, &stage, &pose.viewpoint(0.0, 50.0), "2026-06-21T19:00+01:00");
+        keep(&picture, &format!("trap-seams-{number}"));
+        assert_eq!(specks(&picture), 0, "{number}");
+        last = Some(picture);
+    }
+    // A control.
+    let mut picture = last.expect("pictures");
+    picture.pixels[3 * (200 * 480 + 100)..][..3].fill(255);
+    assert_eq!(specks(&picture), 1);
 }

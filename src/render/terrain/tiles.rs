@@ -26,7 +26,7 @@ use crate::{
         report::FrameReport,
         view::PreparedFrame,
     },
-    terrain::tiles::{Tile, TileSettings, tile_indices},
+    terrain::tiles::{Tile, TileSettings, skirt_indices, tile_indices},
 };
 
 /// Finest vertex spacing in metres.
@@ -51,7 +51,7 @@ pub struct GpuTerrain {
 impl FromWorld for GpuTerrain {
     fn from_world(world: &mut World) -> Self {
         let device = world.resource::<RenderDevice>();
-        let indices = tile_indices();
+        let indices = [tile_indices(), skirt_indices()].concat();
         Self {
             cache: None,
             tiles: GrowingBuffer::new(device, "canopy_terrain_tiles"),

@@ -37,6 +37,23 @@ pub fn tile_indices() -> Vec<u32> {
     indices
 }
 
+/// The triangles of every tile's skirt, a wall around it that faces outwards: `24 N` indices. An index of at least `(N + 1)²`
+/// is that of the vertex `(N + 1)²` before it, lowered. Where a neighbour has more vertices at the common edge, or rounds
+/// them otherwise, pixels between the two would show the sky.
+pub fn skirt_indices() -> Vec<u32> {
+    let (side, lowered) = (SIDE as u32, (SIDE * SIDE) as u32);
+    let last = side - 1;
+    // Around the tile, counter-clockwise seen from above, from the north-western corner.
+    let around = (0..last)
+        .map(|row| row * side)
+        .chain((0..last).map(|column| last * side + column))
+        .chain((1..side).rev().map(|row| row * side + last))
+        .chain((1..side).rev());
+    let ring: Vec<u32> = around.collect();
+    let walls = ring.iter().zip(ring.iter().cycle().skip(1));
+    walls.flat_map(|(&from, &to)| [from, from + lowered, to + lowered, from, to + lowered, to]).collect()
+}
+
 pub(super) fn vertices(terrain: &Terrain, origin: DVec2, spacing: f64) -> Vec<TileVertex> {
     let mut vertices = Vec::with_capacity(SIDE * SIDE);
     for row in 0..SIDE {
@@ -73,6 +90,24 @@ pub(super) fn triangulated_height([nw, ne, sw, se]: [f64; 4], u: f64, v: f64) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_skirt_goes_around_the_tile_and_faces_outwards() {
+        let count = (SIDE * SIDE) as u32;
+        let position = |i: u32| {
+            let (at, height) = (i % count, if i < count { 0.0 } else { -1.0 });
+            Vec3::new((at % SIDE as u32) as f32, height, (at / SIDE as u32) as f32)
+        };
+        let middle = Vec3::new(0.5, 0.0, 0.5) * TILE_QUADS as f32;
+        let mut area = 0.0;
+        for triangle in skirt_indices().chunks(3) {
+            let [a, b, c] = [0, 1, 2].map(|i| position(triangle[i]));
+            let normal = (b - a).cross(c - a);
+            assert!(normal.y == 0.0 && normal.dot(a.with_y(0.0) - middle) > 0.0, "{a} {b} {c}");
+            area += 0.5 * normal.length();
+        }
+        assert_eq!((skirt_indices().len(), area), (24 * TILE_QUADS, 4.0 * TILE_QUADS as f32));
+    }
 
     #[test]
     fn triangles_face_up_and_cover_the_tile_once() {

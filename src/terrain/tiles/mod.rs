@@ -40,7 +40,7 @@
 //! before `start_l` (its diagonal is `sqrt(2) N s_l`), a whole one wholly behind `end_(l-1)`. Where a tile of level `l`
 //! meets one of level `l - 1`, both hold on the common edge: the coarse side does not morph yet, the fine side has
 //! become the coarse mesh. Tiles two levels apart cannot meet. What remains are T-junctions whose vertices lie on the
-//! coarse edge up to rounding (1e-4 m).
+//! coarse edge up to rounding (1e-4 m): a skirt of a pixel or two around each tile covers them ([`skirt_indices`]).
 
 mod deviation;
 mod mesh;
@@ -52,7 +52,7 @@ use glam::{DVec2, DVec3};
 use super::height_bounds::BoundsInMetres;
 use super::{Terrain, TerrainError};
 
-pub use mesh::{TileVertex, tile_indices};
+pub use mesh::{TileVertex, skirt_indices, tile_indices};
 
 /// Quads along a side of a tile's mesh.
 pub const TILE_QUADS: usize = 32;
