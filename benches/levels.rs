@@ -6,6 +6,8 @@
 //! | `reductions` | the publication's reductions [Franzke 2005, figs. 4.9, 4.19 to 4.23] on plants of their size |
 //! | `errors` | each level against the supersampled full model in the same light: four sides and above, three suns, 16 to 512 pixels |
 //! | `cost` | a frame of many trees as each level |
+//! | `pop` | what a frame changes while a tree shrinks by one percent a frame |
+//! | `shimmer` | what a frame changes while the demo's camera turns by a tenth of a pixel a frame |
 //!
 //! `cargo bench --bench levels -- errors cost` runs those parts; without arguments all run. `CANOPY_DATA` is the folder
 //! with `trees/`; without it grown trees stand in. Results: `docs/measurements/levels-of-detail.md`.
@@ -16,6 +18,8 @@
 mod cost;
 #[path = "levels/errors.rs"]
 mod errors;
+#[path = "levels/motion.rs"]
+mod motion;
 #[path = "levels/shapes.rs"]
 mod shapes;
 
@@ -39,6 +43,12 @@ fn main() {
     }
     if runs("cost") {
         cost::cost();
+    }
+    if runs("pop") {
+        motion::pop();
+    }
+    if runs("shimmer") {
+        motion::shimmer();
     }
 }
 

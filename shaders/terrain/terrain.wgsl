@@ -84,13 +84,31 @@ struct Seen {
     color: GroundColor,
 }
 
+// The most places along a pixel on the ground at which its colour is looked up.
+const MOST_PLACES: f32 = 4.0;
+
+// The colour of the ground in a pixel. Seen at a flat angle the pixel is long and narrow on the ground: one lookup as wide
+// as it is long would smear what lies side by side.
+fn color_of_pixel(in: Varying, normal: vec3<f32>, cover: f32, far: f32) -> GroundColor {
+    let distance = max(length(in.relative), 1e-3);
+    let across = distance / frame.focal_length_pixels;
+    let along = across / max(abs(dot(normal, in.relative)) / distance, 0.05);
+    let places = clamp(ceil(0.7 * along / across), 1.0, MOST_PLACES);
+    let footprint = max(across, along / places);
+    let stride = in.relative.xz / max(length(in.relative.xz), 1e-3) * (along / places);
+    let first = frame.camera.xz + in.relative.xz - 0.5 * (places - 1.0) * stride;
+    var sum = GroundColor(vec3(0.0), vec2(0.0), 0.0);
+    for (var place = 0.0; place < places; place += 1.0) {
+        let color = ground_color(first + place * stride, 1.0 - normal.y, cover, far, footprint);
+        sum.albedo += color.albedo;
+        sum.tilt += color.tilt;
+        sum.ambient_visibility += color.ambient_visibility;
+    }
+    return GroundColor(sum.albedo / places, sum.tilt / places, sum.ambient_visibility / places);
+}
+
 fn seen_at(in: Varying) -> Seen {
     let normal = normalize(in.normal);
-    let xz = frame.camera.xz + in.relative.xz;
-    let distance = max(length(in.relative), 1e-3);
-    // Width of a pixel on the slope, where it is widest.
-    let facing = abs(dot(normal, in.relative)) / distance;
-    let footprint = distance / (frame.focal_length_pixels * max(facing, 0.05));
     let ground = sample_ground(in.relative);
     let uv = (in.relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;
     let outside = max(max(-uv.x, uv.x - 1.0), max(-uv.y, uv.y - 1.0)) > 0.0;
@@ -98,7 +116,7 @@ fn seen_at(in: Varying) -> Seen {
     let undrawn = select(ground.undrawn_cover, frame.mean_cover, outside);
     let cover = undrawn + select(ground.cover, 0.0, outside);
     let far = undrawn / max(cover, 1e-3);
-    return Seen(normal, ground, outside, cover, undrawn, far, ground_color(xz, 1.0 - normal.y, cover, far, footprint));
+    return Seen(normal, ground, outside, cover, undrawn, far, color_of_pixel(in, normal, cover, far));
 }
 
 @fragment

@@ -134,11 +134,19 @@ impl Studio {
     /// # Errors
     /// [`AppError::Stand`] for a plant that cannot stand.
     pub fn show(&mut self, representation: Option<Representation>) -> Result<(), AppError> {
+        self.show_levels(representation.map(Levels::only))
+    }
+
+    /// Shows the tree as one of `levels`, by its size in the image; with `None` it is gone.
+    ///
+    /// # Errors
+    /// [`AppError::Stand`] for a plant that cannot stand.
+    pub fn show_levels(&mut self, levels: Option<Levels>) -> Result<(), AppError> {
         let world = self.renderer.app().world_mut();
         if let Some(forest) = self.forest.take() {
             world.despawn(forest);
         }
-        if let Some(representation) = representation {
+        if let Some(levels) = levels {
             let tree = Tree { position: DVec3::ZERO, yaw: 0.0, scale: 1.0, variant: 0, tint: 0.0, index: 0 };
             let stand = PackedStand::new(&Stand { trees: vec![tree] }, DEFAULT_CELL_SIZE, &[self.plant.size()])?;
             let forest = Forest {
@@ -146,7 +154,7 @@ impl Studio {
                 plants: Arc::new(vec![self.plant.clone()]),
                 suns: Arc::from([]),
                 origin: DVec3::ZERO,
-                levels: Levels::only(representation),
+                levels,
                 view_distance: 1e5,
             };
             self.forest = Some(world.spawn(forest).id());
