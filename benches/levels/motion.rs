@@ -96,7 +96,7 @@ fn drift(stage: &Stage, times: u32) -> [f64; 3] {
     renderer.show(stage);
     let camera = &stage.scene.camera;
     let start = camera.start;
-    let pixel = (0.5 * f64::from(camera.field_of_view)).to_radians().tan() * 2.0 / f64::from(SIZE.1);
+    let pixel = (0.5 * camera.field_of_view).to_radians().tan() * 2.0 / f64::from(SIZE.1);
     let pictures: Vec<Vec<f64>> = (0..FRAMES)
         .map(|frame| {
             let mut pose = start;

@@ -85,7 +85,7 @@ struct Seen {
 }
 
 // The most places along a pixel on the ground at which its colour is looked up.
-const MOST_PLACES: f32 = 4.0;
+const MOST_PLACES: f32 = 2.0;
 
 // The colour of the ground in a pixel. Seen at a flat angle the pixel is long and narrow on the ground: one lookup as wide
 // as it is long would smear what lies side by side.
@@ -119,12 +119,21 @@ fn seen_at(in: Varying) -> Seen {
     return Seen(normal, ground, outside, cover, undrawn, far, color_of_pixel(in, normal, cover, far));
 }
 
+// Relief that leaves level ground at least half of the light: in a low sun its slopes would be black blots, as nothing that
+// small shades the ground between them.
+fn limited_tilt(tilt: vec2<f32>) -> vec2<f32> {
+    let sun = light.key_direction;
+    let most = 0.5 * max(sun.y, 0.0) / max(length(sun.xz), 1e-3);
+    return tilt * min(1.0, most / max(length(tilt), 1e-4));
+}
+
 @fragment
 fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let seen = seen_at(in);
     var surface: Surface;
     surface.albedo = seen.color.albedo;
-    surface.normal = normalize(seen.normal + vec3(seen.color.tilt.x, 0.0, seen.color.tilt.y));
+    let tilt = limited_tilt(seen.color.tilt);
+    surface.normal = normalize(seen.normal + vec3(tilt.x, 0.0, tilt.y));
     surface.transmission = vec3(0.0);
     // What is seen as crowns is lit as their tops are.
     surface.ambient_visibility = mix(seen.color.ambient_visibility, 0.85, seen.far);
