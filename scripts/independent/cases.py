@@ -7,6 +7,7 @@ import canopy
 import gloss
 import meshes
 import other
+import tissue
 from air import Air, view_directions
 from canopy import camera
 from foliage import Foliage
@@ -190,6 +191,31 @@ def fog(bench):
         yield Row("slab in fog, %s away" % name, green(bench.canopy.render(request)), np.stack(theirs)[..., None])
 
 
+def layers(bench):
+    """A leaf with layers over the angle of the light, against slabs of the same tissue in Mitsuba. Canopy keeps polynomials."""
+    mi = other.variant()
+    leaf = meshes.polygons([[0, 0, 0]], [[0.0, 1, 0]], 0.5, 4)
+    for scattering in (1.0, 4.0):
+        extras = {"maxThickness": 0.0004, "absorptionRange": [2500, 2500], "scattering": scattering}
+        meshes.write_glb(bench.folder / "layers.glb", leaf, (0.2,) * 3, True, extras)
+        slabs = tissue.slabs(mi, 0.5, scattering)
+        for what, pitch in (("sent back", -90), ("let through", 90)):
+            def ours(degrees):
+                request = {"plants": [canopy.plant(bench.folder / "layers.glb")], "trees": [canopy.tree()], "samples": 64, "seeds": 8,
+                           "camera": camera((0, -pitch / 9, 0), 0, pitch, 0.1, (4, 4)),
+                           "sun": {"azimuth": 35, "elevation": 90 - degrees, "illuminance": 1000}}
+                return green(bench.canopy.render(request)).mean((1, 2, 3), keepdims=True) / np.cos(np.radians(degrees))
+
+            def theirs(degrees):
+                sent = tissue.sent(mi, slabs, degrees, what == "sent back", bench.samples(512), 8)
+                return sent.mean((1, 2, 3), keepdims=True)
+
+            whole = ours(0).mean(), theirs(0).mean()
+            for degrees in (45, 60, 75):
+                name = "light at %d° %s by a leaf, scattering %g" % (degrees, what, scattering)
+                yield Row(name, ours(degrees) / whole[0], theirs(degrees) / whole[1], same=False)
+
+
 def prisms(bench):
     """Wood with interpolated normals against the cylinder that it stands for. The models differ: the row tells by how much."""
     mi = other.variant()
@@ -218,5 +244,5 @@ def prisms(bench):
 
 
 # Those with a name here need trees.
-CASES = {case.__name__: case for case in (furnace, slab, glossy, hills, trees, several, fog, prisms)}
+CASES = {case.__name__: case for case in (furnace, slab, glossy, hills, trees, several, fog, layers, prisms)}
 NEED_TREES = {"trees", "several"}

@@ -69,8 +69,8 @@ def level_plane(half_sides=(50.0, 500.0, 5e3, 5e4)):
     return np.array(positions), np.tile([0.0, 1, 0], (len(positions), 1)), np.array(triangles)
 
 
-def write_glb(path, mesh, color, foliage):
-    """One mesh of one colour for Canopy."""
+def write_glb(path, mesh, color, foliage, tissue=None):
+    """One mesh of one colour for Canopy; its leaves may have layers, with these extras."""
     parts = [(mesh, color, foliage)]
     if foliage:
         # Canopy moves a plant without wood to the origin: a millimetre of wood just under the ground keeps its place.
@@ -95,6 +95,8 @@ def write_glb(path, mesh, color, foliage):
         name = "leaves" if leaf else "bark"
         materials.append({"name": name, "alphaMode": "MASK" if leaf else "OPAQUE", "doubleSided": True,
                           "pbrMetallicRoughness": {"baseColorFactor": [*map(float, base), 1.0], "metallicFactor": 0.0}})
+        if leaf and tissue is not None:
+            materials[-1]["extras"] = {"canopy_leaf": tissue}
         meshes.append({"primitives": [{"attributes": attributes, "indices": indices, "material": len(materials) - 1}]})
     nodes = [{"mesh": i, "name": materials[i]["name"]} for i in range(len(meshes))]
     document = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": list(range(len(nodes)))}], "nodes": nodes,
