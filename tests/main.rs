@@ -28,6 +28,7 @@ mod render;
 mod scatter;
 mod scene;
 mod shaders;
+mod shapefiles;
 mod support;
 mod terrain;
 mod terrain_kinds;

@@ -88,7 +88,9 @@ impl Placement {
             Some(Map::Across { from: SystemMap::new(from)?, to: SystemMap::new(reference?.system())? })
         };
         // A system that the scene or the file states, where the terrain has another one.
-        let stated = trees.coordinates.or(inventory.epsg.and_then(CoordinateSystem::from_epsg));
+        let named = inventory.epsg.and_then(CoordinateSystem::from_epsg);
+        let described = || inventory.wkt.as_deref().and_then(CoordinateSystem::from_wkt);
+        let stated = trees.coordinates.or(named).or_else(described);
         if let Some(system) = stated
             && inventory.coordinates == Coordinates::Planar
             && (trees.coordinates.is_some() || trees.anchor == Anchor::Terrain)

@@ -20,7 +20,7 @@ pub enum Trees {
     None,
     /// Placed by rule.
     Scattered(ScatteredTrees),
-    /// Read from a table of text or GeoJSON.
+    /// Read from a table of text, GeoJSON or a shapefile.
     Inventory(InventoryTrees),
 }
 
@@ -70,7 +70,7 @@ impl Default for ScatteredTrees {
     }
 }
 
-/// Trees from a table of text (CSV) with a header line, or from GeoJSON. Columns are found by name in the words of the large
+/// Trees from a table of text (CSV) with a header line, from GeoJSON, or from a shapefile. Columns are found by name in the words of the large
 /// public tables ([`scatter::inventory`](crate::scatter::inventory)): `x` and `y` in metres or `lon` and `lat` (required),
 /// `dbh` or a girth, `height`, `species`; a unit in a column's name or a cell (`dbh_cm`, `12 m`) overrides the one stated
 /// here.

@@ -99,6 +99,12 @@ impl From<CoordinateSystem> for Written {
 }
 
 impl CoordinateSystem {
+    /// The system that a text in WKT or in the words of PROJ.4 describes, as `.prj` files have it; `None` where it is not
+    /// understood.
+    pub fn from_wkt(text: &str) -> Option<Self> {
+        super::read::system_of_wkt(text)
+    }
+
     /// The system that an EPSG code stands for, by the definitions of the registry: degrees, UTM on a datum that is WGS84 to a
     /// metre (WGS84, NAD83, ETRS89, GDA), 3857, or a projection with the unit of its coordinates. Codes of state plane systems
     /// together with heights (8700 to 8790) are in feet. Other codes from 1024 to 32767 are taken as projections in metres;

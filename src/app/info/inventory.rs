@@ -7,18 +7,16 @@ use glam::DVec2;
 use super::page::{Page, length};
 use crate::{
     app::AppError,
-    assets::StageError,
     math::digits::grouped,
-    scatter::{Coordinates, Inventory, InventoryOptions, parse_inventory},
+    scatter::{Coordinates, Inventory, InventoryOptions, read_inventory},
 };
 
 /// Species that are listed by name.
 const LISTED: usize = 12;
 
 pub(super) fn describe_file(page: &mut Page, path: &Path) -> Result<(), AppError> {
-    let bytes = std::fs::read(path).map_err(|source| StageError::Read { path: path.to_owned(), source })?;
     let name = path.display().to_string();
-    let inventory = parse_inventory(&bytes, &name, InventoryOptions::default())?;
+    let inventory = read_inventory(path, InventoryOptions::default())?;
     page.title(format!("{name}: an inventory of {} trees", grouped(inventory.rows.len())));
     page.inset(|page| {
         for column in &inventory.columns {

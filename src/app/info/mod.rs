@@ -27,7 +27,7 @@ pub fn info(path: &Path) -> Result<String, AppError> {
         "glb" | "gltf" => plant::describe_file(&mut page, path)?,
         "png" => terrain::describe_image(&mut page, path)?,
         "tif" | "tiff" | "asc" | "hgt" | "vrt" => terrain::describe_file(&mut page, path)?,
-        "csv" | "tsv" | "geojson" | "json" => inventory::describe_file(&mut page, path)?,
+        "csv" | "tsv" | "geojson" | "json" | "shp" => inventory::describe_file(&mut page, path)?,
         "ron" => scene::describe_file(&mut page, path)?,
         // A pipe, such as `/dev/stdin`, has no name that could say more; a scene can be read from it.
         _ if is_pipe(path) => scene::describe_file(&mut page, path)?,

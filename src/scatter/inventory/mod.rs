@@ -1,4 +1,4 @@
-//! Tree inventories: tables of text or GeoJSON with one tree a row.
+//! Tree inventories: tables of text, GeoJSON or shapefiles with one tree a row.
 //!
 //! Columns are found by their names, in any order, in the words of the large public tables (`names.rs` has them), and by
 //! what their cells hold:
@@ -24,6 +24,7 @@ mod geojson;
 mod names;
 mod place;
 mod select;
+mod shapefile;
 mod sizes;
 mod species;
 mod text;
@@ -134,7 +135,7 @@ pub struct InventoryTree {
     pub height_m: Option<f64>,
     /// Species as written in the file, genus and epithet joined; not empty.
     pub species: Option<String>,
-    /// Line in the file, from 1; of GeoJSON the number of the feature.
+    /// Line in the file, from 1; of GeoJSON and shapefiles the number of the feature.
     pub line: u64,
 }
 
@@ -147,6 +148,8 @@ pub struct Inventory {
     pub coordinates: Coordinates,
     /// The EPSG code of the coordinates, if the file states it.
     pub epsg: Option<u32>,
+    /// The coordinate system in the words of the file, WKT, if it has such a text.
+    pub wkt: Option<String>,
     /// The columns in the order of the file.
     pub columns: Vec<Column>,
     /// What was assumed, not used or left out: a sentence each.
@@ -162,12 +165,17 @@ pub struct Column {
     pub meaning: Option<String>,
 }
 
-/// Reads an inventory from a file.
+/// Reads an inventory from a file: a table of text, GeoJSON, or the `.shp` of a shapefile with the files beside it.
 ///
 /// # Errors
 /// [`ScatterError::Io`] for a file that cannot be read; otherwise as [`parse_inventory`].
 pub fn read_inventory(path: &Path, options: InventoryOptions) -> Result<Inventory, ScatterError> {
     let bytes = std::fs::read(path).map_err(|source| ScatterError::Io { path: path.to_owned(), source })?;
+    if shapefile::recognises(&bytes) {
+        let (table, place, wkt) = shapefile::read(path, &bytes)?;
+        let inventory = Reading::new(table, Some(place), &path.display().to_string(), options)?.finish()?;
+        return Ok(Inventory { wkt, ..inventory });
+    }
     parse_inventory(&bytes, &path.display().to_string(), options)
 }
 
@@ -301,7 +309,14 @@ impl<'a> Reading<'a> {
         notes.append(&mut self.sizes.notes);
         notes.append(&mut self.species.notes);
         notes.append(&mut self.notes);
-        Ok(Inventory { rows: trees, coordinates: self.place.coordinates(), epsg: self.table.epsg, columns, notes })
+        Ok(Inventory {
+            rows: trees,
+            coordinates: self.place.coordinates(),
+            epsg: self.table.epsg,
+            wkt: None,
+            columns,
+            notes,
+        })
     }
 
     /// Refuses a table of which half of the rows or more cannot be read as written: it is another table than it seems.

@@ -34,7 +34,7 @@ const BINARY: [(&[u8], &str); 6] = [
     (b"SQLite format 3\0", "a GeoPackage or another SQLite database"),
     (b"PK\x03\x04", "a ZIP archive, such as a spreadsheet (.xlsx, .ods) or a packed shapefile"),
     (b"\xD0\xCF\x11\xE0", "a spreadsheet of an old Excel (.xls)"),
-    (b"\x00\x00\x27\x0A", "a shapefile"),
+    (b"\x00\x00\x27\x0A", "a shapefile without the files beside it"),
     (b"fgb\x03", "a FlatGeobuf file"),
     (b"PAR1", "a Parquet file"),
 ];

@@ -16,6 +16,8 @@ mod mosaic;
 mod sentinels;
 mod side_files;
 
+pub(super) use side_files::of_wkt as system_of_wkt;
+
 use std::borrow::Cow;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Read, Seek};

@@ -96,7 +96,7 @@ impl Auxiliary {
 }
 
 /// The system of a text in WKT or in the words of PROJ.4.
-pub(super) fn of_wkt(text: &str) -> Option<CoordinateSystem> {
+pub(in crate::terrain) fn of_wkt(text: &str) -> Option<CoordinateSystem> {
     let text = text.trim();
     if text.starts_with("+proj") {
         return of_definition(text);
