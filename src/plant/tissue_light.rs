@@ -1,6 +1,6 @@
 //! How the light of a leaf with a tissue changes with the angle: what the path tracer, the bakes and the renderer share.
 //!
-//! The tissue is solved as three slabs that absorb and scatter ([`super::tissue_slabs`]), once for a species. What is
+//! The tissue is solved as three slabs that absorb and scatter (`tissue_slabs.rs`), once for a species. What is
 //! left of it is four polynomials: the light that is sent back and that is let through, from the front and from the
 //! back, over that of perpendicular light. A leaf is then the product of that of the light's angle and that of the
 //! viewer's, which is reciprocal, and exact for the light that comes from one direction and leaves in all.
