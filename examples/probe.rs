@@ -27,8 +27,8 @@ use canopy::light::{Atmosphere, AtmosphereParams, LightSettings, LightState, Sun
 use canopy::plant::gltf::{GltfOptions, load_plant};
 use canopy::plant::{Gloss, Plant};
 use canopy::reference::{
-    Camera, Disc, Film, Fog, Ground, GroundColor, GroundShape, Instance, Light, Normals, PathTracer, ReferenceScene,
-    Shot, TraceSettings,
+    Camera, Disc, Film, Fog, Ground, GroundColor, GroundShape, Instance, LeafModel, Light, Normals, PathTracer,
+    ReferenceScene, Shot, TraceSettings,
 };
 use canopy::scene::Viewpoint;
 use canopy::terrain::{HeightField, Surroundings, Terrain};
@@ -149,7 +149,8 @@ fn render(request: &Request) -> Outcome<Vec<u8>> {
         tint: tree.tint,
     };
     let instances: Vec<Instance> = request.trees.iter().map(instance).collect();
-    let scene = ReferenceScene::new(&plants, &instances, request.ground.as_ref().map(ground).transpose()?)?;
+    let scene = ReferenceScene::new(&plants, &instances, request.ground.as_ref().map(ground).transpose()?)?
+        .with_leaves(LeafModel::Species);
     let light = light(request)?;
     let CameraRequest { position, yaw, pitch, field_of_view, width, height } = request.camera;
     let view = Viewpoint {
