@@ -159,8 +159,10 @@ impl Layers {
             lateral += self.shares[layer] * slope(view[layer]);
             layer += 1;
         }
-        let piece = self.shares[layer] / f32::from(self.points[layer].max(1));
-        let index = ((choice - above) / piece).floor().clamp(0.0, f32::from(self.points[layer].max(1)) - 1.0);
+        let points = f32::from(self.points[layer].max(1));
+        let piece = self.shares[layer] / points;
+        // Shares may add up to a little less than 1: then a layer without thickness is picked.
+        let index = if piece > 0.0 { ((choice - above) / piece).floor().clamp(0.0, points - 1.0) } else { 0.0 };
         let depth = piece * (index + 0.5);
         TestPoint { depth: above + depth, lateral: lateral + depth * slope(view[layer]) }
     }
@@ -298,5 +300,9 @@ mod tests {
         assert!(layers.attenuation(0.5, layers.view(0.0), 0.0, true).is_finite());
         assert!((layers.perpendicular(0.5, true) - (-0.5f32).exp()).abs() < 1e-6);
         assert!(layers.point(f32::INFINITY, layers.view(0.3), 0.2, false, 0.99).depth.is_finite());
+        // Shares that add up to a little less than 1 once gave NaN for the last choice.
+        let short = Layers { shares: [0.99, 0.0, 0.0], ..layers };
+        let TestPoint { depth, lateral } = short.even_point(short.view(0.3), 0.999);
+        assert!(depth == 0.99 && lateral.is_finite());
     }
 }

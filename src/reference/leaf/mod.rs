@@ -13,7 +13,8 @@
 //! | one point of a leaf, seen from somewhere | `view.rs` |
 //!
 //! # Cost
-//! Two polynomials for each direction of light, where a leaf is; `docs/measurements/leaves.md` has the times. A species without a tissue is traced by the standard model and pays nothing.
+//! Two polynomials for each direction of light, where a leaf is; `docs/measurements/leaves.md` has the times. A species
+//! without a tissue is traced by the standard model and pays nothing.
 //!
 //! # Limits
 //! - Rays to the light have the direction of the light outside (the thesis allows itself that error).
