@@ -17,7 +17,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use canopy::{
-    app::{LeafModel, LightGroup, ReferenceOptions, RenderedImage, Renderer, View, parse_size, reference},
+    app::{
+        LeafModel, LightGroup, Output, ReferenceOptions, RenderedImage, Renderer, Selection, Still, View, parse_size,
+        reference,
+    },
     assets::Stage,
     math::{luminance, srgb_to_linear},
     progress::Silent,
@@ -132,8 +135,9 @@ fn draw(arguments: &Arguments, case: &Case) -> anyhow::Result<RenderedImage> {
 fn trace(arguments: &Arguments, case: &Case, samples: u32, out: &Path) -> anyhow::Result<PathBuf> {
     let options = ReferenceOptions {
         scene: case.scene.clone().into(),
-        out: out.to_owned(),
-        at: Some(case.at),
+        output: Output::Stills(vec![Still { out: out.to_owned(), at: Some(case.at) }]),
+        selection: Selection::All,
+        part: None,
         view: View::Scene,
         size: arguments.size,
         samples,
@@ -145,7 +149,8 @@ fn trace(arguments: &Arguments, case: &Case, samples: u32, out: &Path) -> anyhow
         overrides: Overrides::default(),
         quiet: true,
     };
-    Ok(reference(&options, &mut Silent)?)
+    reference(&options, &mut Silent)?;
+    Ok(out.to_owned())
 }
 
 fn read(file: &Path) -> anyhow::Result<RenderedImage> {

@@ -18,7 +18,8 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use canopy::{
     app::{
-        LeafModel, LightGroup, ReferenceOptions, RenderedImage, Renderer, View, parse_lighting, parse_size, reference,
+        LeafModel, LightGroup, Output, ReferenceOptions, RenderedImage, Renderer, Selection, Still, View,
+        parse_lighting, parse_size, reference,
     },
     assets::Stage,
     math::srgb_to_linear,
@@ -170,8 +171,9 @@ fn draw(arguments: &Arguments, scene: &Scene, light: Option<&str>, at: LocalTime
 fn trace(arguments: &Arguments, scene: &Scene, at: LocalTime, out: &Path) -> anyhow::Result<RenderedImage> {
     let options = ReferenceOptions {
         scene: scene.clone().into(),
-        out: out.to_owned(),
-        at: Some(at),
+        output: Output::Stills(vec![Still { out: out.to_owned(), at: Some(at) }]),
+        selection: Selection::All,
+        part: None,
         view: View::Scene,
         size: arguments.size,
         samples: arguments.spp,
@@ -183,8 +185,8 @@ fn trace(arguments: &Arguments, scene: &Scene, at: LocalTime, out: &Path) -> any
         overrides: Overrides { lighting: Some(canopy::scene::Lighting::Local), ..Overrides::default() },
         quiet: true,
     };
-    let file = reference(&options, &mut Silent)?;
-    let image = image::open(&file).with_context(|| file.display().to_string())?.to_rgb8();
+    reference(&options, &mut Silent)?;
+    let image = image::open(out).with_context(|| out.display().to_string())?.to_rgb8();
     Ok(RenderedImage { width: image.width(), height: image.height(), pixels: image.into_raw() })
 }
 

@@ -31,6 +31,7 @@ fn run(arguments: Arguments) -> Outcome {
             Ok(options) => trace_reference(&options).into(),
             Err(error) => Outcome::Usage(error),
         },
+        Some(Command::Merge(merge)) => merge_films(&cli::merge_options(merge), common.quiet).into(),
         Some(Command::Bake(bake)) => match cli::baked_scene(&bake, &common) {
             Some((scene, overrides)) => bake_plants(&scene, &overrides, common.quiet).into(),
             None => match cli::bake_options(bake, &common) {
@@ -80,12 +81,20 @@ fn render_pictures(options: &canopy::app::RenderOptions) -> anyhow::Result<()> {
 fn trace_reference(options: &canopy::app::ReferenceOptions) -> anyhow::Result<()> {
     canopy::app::listen_to_interrupts()?;
     let mut bars = Bars::new(options.quiet);
-    let file = canopy::app::reference(options, &mut bars)?;
+    let files = canopy::app::reference(options, &mut bars)?;
     drop(bars);
     if options.quiet {
         return Ok(());
     }
-    cli::print_lines([file.display()])
+    cli::print_lines(files.iter().map(|file| file.display()))
+}
+
+fn merge_films(options: &canopy::app::MergeOptions, quiet: bool) -> anyhow::Result<()> {
+    canopy::app::listen_to_interrupts()?;
+    let mut bars = Bars::new(quiet);
+    let files = canopy::app::merge(options, &mut bars)?;
+    drop(bars);
+    if quiet { Ok(()) } else { cli::print_lines(files.iter().map(|file| file.display())) }
 }
 
 fn bake_levels(options: &canopy::app::BakeOptions) -> anyhow::Result<()> {

@@ -87,3 +87,74 @@ fn a_frame_that_fails_does_not_stop_the_others_and_ends_with_3() -> Outcome {
     assert!(said(&resumed).contains("2 of 3 images are finished already"), "{}", said(&resumed));
     Ok(())
 }
+
+#[test]
+fn pieces_of_a_traced_sequence_and_parts_of_its_samples_have_the_bytes_of_the_whole() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let file = folder.path().join("grove.ron");
+    std::fs::write(&file, scene(40))?;
+    let name = file.display().to_string();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let trace = |out: &str, more: &[&str]| {
+        let out = at(out);
+        let fixed = ["reference", &name, "--out", &out, "--size", "32x18", "--spp", "6"];
+        canopy(&fixed.into_iter().chain(more.iter().copied()).collect::<Vec<_>>())
+    };
+    let good = |output: std::process::Output| assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    let sequence = ["--frames", "3", "--fps", "1"];
+    good(trace("whole", &sequence)?);
+    for piece in ["2/2", "1/2"] {
+        good(trace("pieces", &[&sequence[..], &["--chunk", piece]].concat())?);
+    }
+    let whole = bytes(&folder.path().join("whole"))?;
+    assert_eq!(whole.keys().collect::<Vec<_>>(), ["0000.png", "0001.png", "0002.png"]);
+    assert!(whole["0000.png"] != whole["0002.png"], "the camera moves");
+    assert_eq!(bytes(&folder.path().join("pieces"))?, whole);
+
+    // Unequal parts of the samples of all images; folders merge by name.
+    for part in ["1", "2", "3", "4"] {
+        good(trace(&format!("part-{part}"), &[&sequence[..], &["--part", &format!("{part}/4")]].concat())?);
+    }
+    let merged = at("merged");
+    let parts = ["3", "1", "4", "2"].map(|part| at(&format!("part-{part}")));
+    let merge = |parts: &[&str], more: &[&str]| canopy(&[&["merge"], parts, more].concat());
+    let all = parts.each_ref().map(String::as_str);
+    good(merge(&all, &["--out", &merged])?);
+    assert_eq!(bytes(&folder.path().join("merged"))?, whole);
+
+    // The same of single images in radiance.
+    good(trace("whole.exr", &[])?);
+    for part in ["1", "2"] {
+        good(trace(&format!("half-{part}.film"), &["--part", &format!("{part}/2")])?);
+    }
+    let [first, second, exr] = ["half-1.film", "half-2.film", "half.exr"].map(at);
+    good(merge(&[&first, &second], &["--out", &exr])?);
+    assert_eq!(std::fs::read(&exr)?, std::fs::read(at("whole.exr"))?);
+
+    // What does not fit together is refused with its place.
+    let alone = at("part-1/0000.film");
+    for (parts, more, words) in [
+        (vec![&*first], vec!["--out", &*exr], "samples 4 to 6 of 6 are missing"),
+        (vec![&*second], vec!["--out", &*exr], "samples 1 to 3 of 6 are missing"),
+        (vec![&*first, &*first], vec!["--out", &*exr], "both have sample 1"),
+        (vec![&*first, &*parts[0]], vec!["--out", &*exr], "is a folder and"),
+        (vec![&*first, "nowhere.film"], vec!["--out", &*exr], "no such file or folder"),
+        (vec![&*first, &*second], vec!["--out", "half.jpg"], "must end in .exr, .png or .film"),
+        (vec![&*merged], vec!["--out", &*exr], "there are no films (.film) in this folder"),
+        (vec![&*name], vec!["--out", &*exr], "not a checkpoint of a reference render"),
+    ] {
+        let output = merge(&parts, &more)?;
+        assert_eq!(output.status.code(), Some(1), "{words}");
+        assert!(said(&output).contains(words), "{}", said(&output));
+    }
+    let other = trace("other.film", &["--part", "2/2", "--seed", "5"])?;
+    good(other);
+    let different = merge(&[&first, &at("other.film")], &["--out", &exr])?;
+    assert!(said(&different).contains("are not parts of one image"), "{}", said(&different));
+    let early = at("early.png");
+    good(merge(&[&alone], &["--out", &early, "--incomplete"])?);
+    let wrong = trace("part.png", &["--part", "1/2"])?;
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(said(&wrong).contains("must end in .film"), "{}", said(&wrong));
+    Ok(())
+}

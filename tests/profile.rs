@@ -195,3 +195,45 @@ fn a_search_climbs_to_the_least_error_and_writes_what_a_scene_file_can_have() ->
     );
     Ok(())
 }
+
+#[test]
+fn a_profile_compares_styles_stock_bevy_and_the_scene_with_itself() -> Outcome {
+    let _gpu = gpu();
+    let folder = tempfile::tempdir()?;
+    let (scene, out) = (scene(folder.path())?, folder.path().join("report"));
+    let out_name = out.display().to_string();
+    let fixed = ["profile", &scene, "--out", &out_name, "--size", "96x54", "--frames", "2", "--warm-up", "1"];
+    let what = ["--sweep", "style=photograph,watercolour", "--control", "--against", "stock", "--peer-trees", "40"];
+    let how = ["--supersample", "1", "--rounds", "2", "--pictures", "2"];
+    let output = canopy(&[&fixed[..], &what, &how].concat())?;
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    let report = read_report(&out.join("report.json"))?;
+    let labels: Vec<&str> = report.points.iter().map(|point| point.label.as_str()).collect();
+    let [written, again, style, stock] = labels[..] else { return Err(format!("{labels:?}").into()) };
+    assert_eq!([written, again, style], ["as written", "as written, again", "style=watercolour"]);
+    assert!(stock.starts_with("stock Bevy, 40 of "), "{stock}");
+    let pixels = |point: usize| -> Result<image::RgbImage, image::ImageError> {
+        Ok(image::open(out.join(format!("images/{point:03}/0000.png")))?.to_rgb8())
+    };
+    let drawn = (0..4).map(pixels).collect::<Result<Vec<_>, _>>()?;
+    assert!(drawn[0] == drawn[1], "the same scene has the same image");
+    for point in &report.points {
+        assert!(point.rounds.len() == 2 && point.summary.frame.is_some_and(|frame| frame.p50 > 0.0), "{}", point.label);
+    }
+    // A watercolour is no photograph with errors; stock Bevy's photograph is one.
+    let errors: Vec<bool> = report.points.iter().map(|point| point.summary.error.is_some()).collect();
+    assert_eq!(errors, [true, true, false, true]);
+    // Stock Bevy draws trees before the sky: its image has dark and bright halves, and is not ours.
+    let mean = |rows: std::ops::Range<u32>| {
+        let sum: u32 = rows
+            .clone()
+            .flat_map(|y| (0..96).map(move |x| (x, y)))
+            .map(|(x, y)| u32::from(drawn[3].get_pixel(x, y).0[1]))
+            .sum();
+        f64::from(sum) / f64::from(96 * rows.len() as u32)
+    };
+    assert!(mean(0..8) > 1.2 * mean(40..54) && drawn[3] != drawn[0], "{} and {}", mean(0..8), mean(40..54));
+    let wrong = canopy(&["profile", &scene, "--sweep", "style=oil"])?;
+    assert!(said(&wrong).contains("photograph, watercolour, lines, toon"), "{}", said(&wrong));
+    Ok(())
+}

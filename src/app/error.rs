@@ -34,6 +34,9 @@ pub enum AppError {
     /// A comparison of images.
     #[error(transparent)]
     Compare(#[from] super::CompareError),
+    /// Films that do not fit together.
+    #[error(transparent)]
+    Merge(#[from] super::MergeError),
     /// A profile.
     #[error(transparent)]
     Profile(#[from] super::ProfileError),

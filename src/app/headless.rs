@@ -38,7 +38,7 @@ use chrono::{DateTime, Utc};
 
 use super::{
     Frame, RenderOptions, RenderPlan, RenderReport, adapter, camera, error::AppError, fingerprint::fingerprint,
-    interrupt, notes::notes, rendered_image::RenderedImage,
+    interrupt, notes::notes, plan::PlanRequest, rendered_image::RenderedImage,
 };
 use crate::{
     assets::Stage,
@@ -144,7 +144,7 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
 
 /// Checks whether the images can be written.
 fn check_writable(options: &RenderOptions) -> Result<(), AppError> {
-    for file in RenderPlan::first_files(&options.output) {
+    for file in PlanRequest::from(options).first_files() {
         files::check_writable(&file).map_err(|source| AppError::Write { path: file, source })?;
     }
     Ok(())
@@ -291,6 +291,11 @@ impl Renderer {
     /// The Bevy app.
     pub(super) fn world(&self) -> &World {
         self.app.world()
+    }
+
+    /// The render world.
+    pub(super) fn render_world(&self) -> &World {
+        self.app.sub_app(RenderApp).world()
     }
 
     /// Shows `stage`: its ground, its forest, its quality.

@@ -12,12 +12,14 @@ mod bake;
 mod camera;
 mod compare;
 mod error;
+mod film_notes;
 mod fingerprint;
 mod fly;
 mod headless;
 mod info;
 mod interrupt;
 mod leaf;
+mod merge;
 mod notes;
 mod parse;
 mod plan;
@@ -25,6 +27,7 @@ mod profile;
 mod reference;
 mod rendered_image;
 mod request;
+pub mod stock;
 mod text;
 mod tone;
 mod tune;
@@ -41,14 +44,15 @@ pub use headless::{Renderer, UpdateTime, render};
 pub use info::info;
 pub use interrupt::{Interrupt, listen as listen_to_interrupts, received as interrupt_received};
 pub use leaf::{LeafImages, LeafOptions, LeafReport, leaf};
+pub use merge::{MergeError, MergeOptions, merge};
 pub use parse::{
     ArgumentError, parse_chunk, parse_exposure, parse_flip, parse_frames, parse_leaf_kind, parse_lighting,
-    parse_milliseconds, parse_palette, parse_paper, parse_pixels_per_degree, parse_pose, parse_positive, parse_samples,
-    parse_seconds, parse_size, parse_style,
+    parse_milliseconds, parse_palette, parse_paper, parse_part, parse_pixels_per_degree, parse_pose, parse_positive,
+    parse_samples, parse_seconds, parse_size, parse_style,
 };
 pub use plan::{Frame, PlanError, RenderPlan};
 pub use profile::{
-    BaselineRow, Combination, FrameTime, LevelCount, Machine, Memory, Method, PROFILE_VERSION, PictureRecord,
+    BaselineRow, Combination, FrameTime, LevelCount, Machine, Memory, Method, PROFILE_VERSION, Peer, PictureRecord,
     PointRecord, PointSummary, ProfileError, ProfileOptions, ProfileReport, ReferenceKind, ReportFiles, Round,
     SettingError, SettingInfo, Sweep, ViewRecord, Views, against, profile, profiled_scene, read_report, set_setting,
     settings_of,
@@ -56,7 +60,7 @@ pub use profile::{
 pub use reference::reference;
 pub use rendered_image::RenderedImage;
 pub use request::{
-    BakeOptions, Clock, FlyOptions, LeafKind, LeafModel, LightGroup, Output, ReferenceOptions, RenderOptions,
+    BakeOptions, Clock, FlyOptions, LeafKind, LeafModel, LightGroup, Output, Part, ReferenceOptions, RenderOptions,
     RenderReport, Selection, Still, View,
 };
 pub use tune::{Goal, TuneOptions, Tuned, tune};

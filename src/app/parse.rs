@@ -1,6 +1,6 @@
 //! Parses the values of command-line arguments.
 
-use super::Selection;
+use super::{Part, Selection};
 use crate::{
     bake::lighting::{SunLight, implicit::ImplicitSettings},
     math::names,
@@ -47,8 +47,8 @@ pub enum ArgumentError {
     /// Not a time in seconds.
     #[error("`{0}` is not a time in seconds (expected a number from 0 up, as in 12.5s)")]
     Seconds(String),
-    /// Not a piece of a sequence.
-    #[error("`{0}` is not a piece of a sequence (expected its number and how many there are, as in 2/8)")]
+    /// Not a piece of a sequence, or a part of samples.
+    #[error("`{0}` is not one of several pieces (expected its number and how many there are, as in 2/8)")]
     Chunk(String),
     /// Not numbers of frames.
     #[error("`{0}` is not a list of frames (expected numbers and ranges, as in 10-19,30)")]
@@ -205,6 +205,17 @@ pub fn parse_chunk(text: &str) -> Result<Selection, ArgumentError> {
         text.split_once('/').and_then(|(number, of)| Some((number.trim().parse().ok()?, of.trim().parse().ok()?)));
     let chunk = parts.filter(|(_, of): &(u32, u32)| *of > 0);
     chunk.map(|(number, of)| Selection::Chunk { number, of }).ok_or_else(|| ArgumentError::Chunk(text.to_owned()))
+}
+
+/// Reads `2/8`: one of several parts of the samples.
+///
+/// # Errors
+/// [`ArgumentError::Chunk`].
+pub fn parse_part(text: &str) -> Result<Part, ArgumentError> {
+    match parse_chunk(text)? {
+        Selection::Chunk { number, of } if (1..=of).contains(&number) => Ok(Part { number, of }),
+        _ => Err(ArgumentError::Chunk(text.to_owned())),
+    }
 }
 
 /// Reads `10-19,30`: numbers of frames and ranges of them, both ends included.

@@ -6,7 +6,7 @@ use std::path::{Path as FilePath, PathBuf};
 
 use chrono::{DateTime, Utc};
 
-use super::request::{Clock, Output, RenderOptions, Selection, View};
+use super::request::{Clock, Output, Part, RenderOptions, Selection, View};
 use crate::scene::{LocalTime, Path, Pose, Scene, Viewpoint};
 
 /// Default frames per second of a flight.
@@ -79,24 +79,60 @@ pub enum PlanError {
     /// An image's name does not end in `.png`.
     #[error("`{}` does not end in .png, the format of all images; call it {}", .0.display(), .0.with_extension("png").display())]
     NoPng(PathBuf),
+    /// A file of another kind.
+    #[error("`{}` is no name for this image; it must end in {endings}", file.display())]
+    Ending {
+        /// The file.
+        file: PathBuf,
+        /// What it can end in.
+        endings: String,
+    },
     /// Two images of a request would overwrite each other.
     #[error("`{}` is named twice; give each image its own file", .0.display())]
     SameFile(PathBuf),
 }
 
-impl RenderPlan {
-    /// Checks `options` against `scene`, without planning the frames.
+/// Endings of the images of a render.
+const PNG: &[&str] = &["png"];
+
+/// What a plan follows from, besides the scene.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PlanRequest<'a> {
+    /// The images.
+    pub output: &'a Output,
+    /// Where the camera is.
+    pub view: View,
+    /// Which frames of a sequence.
+    pub selection: &'a Selection,
+    /// What files may end in. The first is that of the files in a folder.
+    pub endings: &'static [&'static str],
+}
+
+impl<'a> From<&'a RenderOptions> for PlanRequest<'a> {
+    fn from(options: &'a RenderOptions) -> Self {
+        Self { output: &options.output, view: options.view, selection: &options.selection, endings: PNG }
+    }
+}
+
+impl PlanRequest<'_> {
+    /// Checks the request against `scene`, without planning the frames.
     ///
     /// # Errors
     /// Those of [`RenderPlan::new`].
-    pub fn check(options: &RenderOptions, scene: &Scene) -> Result<(), PlanError> {
-        Flight::new(options.view, scene)?;
-        match &options.output {
-            Output::Stills(_) if options.selection != Selection::All => Err(PlanError::NoSequence),
+    pub fn check(&self, scene: &Scene) -> Result<(), PlanError> {
+        Flight::new(self.view, scene)?;
+        match self.output {
+            Output::Stills(_) if *self.selection != Selection::All => Err(PlanError::NoSequence),
             Output::Stills(stills) => {
                 for (number, still) in stills.iter().enumerate() {
-                    if !is_png(&still.out) {
-                        return Err(PlanError::NoPng(still.out.clone()));
+                    if !ends_in(&still.out, self.endings) {
+                        let file = still.out.clone();
+                        return Err(if self.endings == PNG {
+                            PlanError::NoPng(file)
+                        } else {
+                            let endings = self.endings.iter().map(|ending| format!(".{ending}")).collect::<Vec<_>>();
+                            PlanError::Ending { file, endings: endings.join(" or ") }
+                        });
                     }
                     if stills.iter().take(number).any(|before| before.out == still.out) {
                         return Err(PlanError::SameFile(still.out.clone()));
@@ -111,18 +147,28 @@ impl RenderPlan {
                 if let Some(rate) = fps.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
                     return Err(PlanError::BadRate(rate));
                 }
-                numbers(&options.selection, *frames)?;
+                numbers(self.selection, *frames)?;
                 if *frames == 0 { Err(PlanError::Nothing) } else { Ok(()) }
             }
         }
     }
 
-    /// At least one file of each folder that `output` writes to.
-    pub(super) fn first_files(output: &Output) -> Vec<PathBuf> {
-        match output {
+    /// At least one file of each folder that is written to.
+    pub fn first_files(&self) -> Vec<PathBuf> {
+        match self.output {
             Output::Stills(stills) => stills.iter().map(|still| still.out.clone()).collect(),
-            Output::Sequence { out, frames, .. } => vec![numbered(out, 0, *frames)],
+            Output::Sequence { out, frames, .. } => vec![numbered(out, 0, *frames, self.endings)],
         }
+    }
+}
+
+impl RenderPlan {
+    /// Checks `options` against `scene`, without planning the frames.
+    ///
+    /// # Errors
+    /// Those of [`RenderPlan::new`].
+    pub fn check(options: &RenderOptions, scene: &Scene) -> Result<(), PlanError> {
+        PlanRequest::from(options).check(scene)
     }
 
     /// Plans `options` for `scene`. `ground` gives the terrain's height in metres at local `(x, z)`; heights in poses
@@ -136,13 +182,25 @@ impl RenderPlan {
     /// [`PlanError`]: a path that the scene lacks, a time off the path, no frames or too many, a rate that is not
     /// positive, or a file name that does not end in `.png`.
     pub fn new(options: &RenderOptions, scene: &Scene, ground: &dyn Fn(f64, f64) -> f64) -> Result<Self, PlanError> {
-        Self::check(options, scene)?;
+        Self::of(&options.into(), scene, ground)
+    }
+
+    /// The plan of `request`.
+    ///
+    /// # Errors
+    /// [`PlanError`].
+    pub(super) fn of(
+        options: &PlanRequest,
+        scene: &Scene,
+        ground: &dyn Fn(f64, f64) -> f64,
+    ) -> Result<Self, PlanError> {
+        options.check(scene)?;
         let camera = Flight::new(options.view, scene)?;
         let viewpoint = |pose: Pose| {
             let (x, _, z) = pose.position;
             pose.viewpoint(ground(x, z), scene.camera.field_of_view)
         };
-        let frames = match &options.output {
+        let frames = match options.output {
             Output::Stills(stills) => {
                 let view = viewpoint(camera.still());
                 let instant = |at: Option<LocalTime>| at.unwrap_or(scene.place.time).utc();
@@ -154,11 +212,11 @@ impl RenderPlan {
                     Clock::Standing(_) => Some(1.0 / fps.unwrap_or(DEFAULT_FPS)),
                 };
                 let frame = |number: u32| Frame {
-                    file: numbered(out, number, *frames),
+                    file: numbered(out, number, *frames, options.endings),
                     view: viewpoint(step.map_or(camera.still(), |step| camera.moving(f64::from(number) * step))),
                     instant: instant(*clock, scene.place.time, number, *frames),
                 };
-                numbers(&options.selection, *frames)?.into_iter().map(frame).collect::<Vec<_>>()
+                numbers(options.selection, *frames)?.into_iter().map(frame).collect::<Vec<_>>()
             }
         };
         Ok(Self { frames })
@@ -180,8 +238,7 @@ fn numbers(selection: &Selection, frames: u32) -> Result<Vec<u32>, PlanError> {
             if *number == 0 || number > of {
                 return Err(PlanError::NoChunk { number: *number, of: *of });
             }
-            let start = |piece: u32| (u64::from(frames) * u64::from(piece) / u64::from(*of)) as u32;
-            Ok((start(number - 1)..start(*number)).collect())
+            Ok(Part { number: *number, of: *of }.range(frames).collect())
         }
     }
 }
@@ -238,19 +295,22 @@ fn instant(clock: Clock, scene: LocalTime, number: u32, frames: u32) -> DateTime
     }
 }
 
-fn is_png(path: &FilePath) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) && path.file_stem().is_some()
+fn ends_in(path: &FilePath, endings: &[&str]) -> bool {
+    let ends = |extension: &OsStr| endings.iter().any(|ending| extension.eq_ignore_ascii_case(ending));
+    path.extension().is_some_and(ends) && path.file_stem().is_some()
 }
 
 /// The name of frame `number` of `frames`: four digits, or as many as the last one needs.
-fn numbered(out: &FilePath, number: u32, frames: u32) -> PathBuf {
+fn numbered(out: &FilePath, number: u32, frames: u32, endings: &[&str]) -> PathBuf {
     let digits = frames.saturating_sub(1).to_string().len().max(4);
-    if is_png(out) {
-        let mut name = out.file_stem().unwrap_or(OsStr::new("")).to_owned();
-        name.push(format!("-{number:0digits$}.png"));
-        out.with_file_name(name)
-    } else {
-        out.join(format!("{number:0digits$}.png"))
+    match out.extension().filter(|_| ends_in(out, endings)) {
+        Some(ending) => {
+            let mut name = out.file_stem().unwrap_or(OsStr::new("")).to_owned();
+            name.push(format!("-{number:0digits$}."));
+            name.push(ending);
+            out.with_file_name(name)
+        }
+        None => out.join(format!("{number:0digits$}.{}", endings.first().unwrap_or(&"png"))),
     }
 }
 
@@ -367,9 +427,11 @@ mod tests {
 
     #[test]
     fn numbers_are_padded_to_the_longest() {
-        assert_eq!(numbered("out/a.png".as_ref(), 7, 20), PathBuf::from("out/a-0007.png"));
-        assert_eq!(numbered("out/a".as_ref(), 7, 10_001), PathBuf::from("out/a/00007.png"));
-        assert_eq!(numbered("out/v1.2".as_ref(), 7, 10_000), PathBuf::from("out/v1.2/0007.png"));
+        assert_eq!(numbered("out/a.png".as_ref(), 7, 20, PNG), PathBuf::from("out/a-0007.png"));
+        assert_eq!(numbered("out/a".as_ref(), 7, 10_001, PNG), PathBuf::from("out/a/00007.png"));
+        assert_eq!(numbered("out/v1.2".as_ref(), 7, 10_000, PNG), PathBuf::from("out/v1.2/0007.png"));
+        assert_eq!(numbered("out/a.exr".as_ref(), 7, 20, &["png", "exr"]), PathBuf::from("out/a-0007.exr"));
+        assert_eq!(numbered("out/a".as_ref(), 7, 20, &["film", "exr"]), PathBuf::from("out/a/0007.film"));
     }
 
     #[test]

@@ -1,15 +1,22 @@
 //! The ground truth of a scene: what `canopy reference` does.
 
-use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::{
+    ops::{ControlFlow, Range},
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use glam::DVec3;
 
 use super::{
-    Frame, LightGroup, Output, PlanError, ReferenceOptions, RenderOptions, RenderPlan, Selection, Still, camera::NEAR,
-    error::AppError, interrupt, notes::notes, rendered_image::RenderedImage, tone::tone_table,
+    Frame, LeafModel, LightGroup, ReferenceOptions, RenderPlan,
+    camera::NEAR,
+    error::AppError,
+    film_notes::FilmNotes,
+    interrupt,
+    notes::notes,
+    plan::{PlanError, PlanRequest},
 };
 use crate::{
     assets::Stage,
@@ -17,102 +24,231 @@ use crate::{
     light::{Atmosphere, AtmosphereParams, LightState, exposure_from_ev100},
     progress::Progress,
     reference::{
-        Camera, DisplayTransform, Film, Fog, Ground, GroundColor, GroundShape, Instance, Light, PathTracer,
+        Camera, Film, Fog, Ground, GroundColor, GroundShape, Instance, Light, PathTracer, ReferenceError,
         ReferenceScene, Shot, Soil, TraceSettings,
     },
     render::exposure::{CameraExposure, StandTotals},
+    scene::Scene,
 };
 
 /// Interval at which the film is saved during the trace.
 const KEEP_EVERY: Duration = Duration::from_secs(30);
+/// What a reference can be written as. Files in a folder are the first.
+const IMAGES: &[&str] = &["png", "exr", "film"];
+/// What a part of the samples can be written as.
+const FILMS: &[&str] = &["film"];
 
-/// Traces the image of `options`, as OpenEXR or PNG by the ending of its name; returns the file.
+/// Traces the images of `options`; returns the files.
 ///
 /// The film is saved every 30 s and when the work is interrupted, in a file next to the image that ends in
-/// `.checkpoint`. With `resume` a film of the
-/// same scene, light and camera continues from there, and the file stays when the image is done, so that more samples
-/// can be added. Without it the trace starts from the beginning, and the file is deleted at the end.
+/// `.checkpoint`. With `resume` a film of the same scene, light and camera continues from there, and the file stays when the
+/// image is done, so that more samples can be added. Without it the trace starts from the beginning, and the file is deleted at
+/// the end.
 ///
 /// # Errors
-/// [`AppError`]; an existing image stays as it is. [`AppError::Interrupted`] soon after a signal, and after the current
-/// sample when `progress` [is cancelled](Progress::is_cancelled).
-pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Result<PathBuf, AppError> {
+/// [`AppError`]; existing images stay as they are. [`AppError::SomeFailed`] where some of several images failed.
+/// [`AppError::Interrupted`] soon after a signal, and after the current sample when `progress`
+/// [is cancelled](Progress::is_cancelled).
+pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Result<Vec<PathBuf>, AppError> {
     let written = options.overrides.applied(options.scene.read()?);
-    RenderPlan::check(&as_still(options), &written)?;
-    files::check_writable(&options.out).map_err(|source| AppError::Write { path: options.out.clone(), source })?;
-    let stage = Stage::build(&written, progress).map_err(interrupt::building)?;
-    let frame = frame(options, &stage)?;
-    let sun = stage.sun(frame.instant);
-    let atmosphere = Atmosphere::new(AtmosphereParams::with_visibility_km(sun.visibility_km))?;
-    let light = Arc::new(sun.light(&atmosphere)?);
-
-    progress.begin("Building ray tracing structures", 0);
-    let scene = scene(&stage)?.with_leaves(options.leaf);
-    progress.end();
-    let settings = TraceSettings { bounces: options.bounces.unwrap_or(u32::MAX), ..TraceSettings::default() };
-    let all = Light::of(&light, None);
-    let chosen = match options.light {
-        LightGroup::All => all,
-        LightGroup::Sun => all.without_environment(),
-        LightGroup::Sky => all.without_key(),
+    let request = PlanRequest {
+        output: &options.output,
+        view: options.view,
+        selection: &options.selection,
+        endings: if options.part.is_some() { FILMS } else { IMAGES },
     };
-    let tracer = PathTracer::new(&scene, &chosen, settings)?;
-    let shot = Shot {
-        camera: Camera { view: frame.view, size: options.size, near: NEAR.into() },
-        fog: options.fog.then(|| Fog::new(&light, frame.view.position.y)),
-    };
-    let kept = options.out.with_extension("checkpoint");
-    let fingerprint = tracer.fingerprint(&shot);
-    let mut film = match options.resume.then(|| Film::load_checkpoint(&kept, &fingerprint)).transpose()?.flatten() {
-        Some(film) => film,
-        None => Film::new(&shot)?,
-    };
-
-    progress.begin("Samples", options.samples.into());
-    progress.advance(film.samples().min(options.samples).into());
-    let (started, earlier) = (Instant::now(), film.samples());
-    let (mut last, mut failure) = (started, None);
-    let stop = || interrupt::received().is_some();
-    tracer.render_unless(&shot, &mut film, options.samples, &stop, &mut |film: &Film| {
-        progress.advance(1);
-        if film.samples() == earlier + 1 {
-            progress.note(&format!("first sample per pixel: {:.2} s", started.elapsed().as_secs_f64()));
+    request.check(&written)?;
+    if let Some(part) = options.part.filter(|part| part.number == 0 || part.number > part.of) {
+        return Err(PlanError::NoChunk { number: part.number, of: part.of }.into());
+    }
+    for file in request.first_files() {
+        files::check_writable(&file).map_err(|source| AppError::Write { path: file, source })?;
+    }
+    let truth = Truth::build(&written, Model::of(options), progress)?;
+    let plan = RenderPlan::of(&request, &truth.stage.scene, &|x, z| truth.stage.terrain.height(x, z))?;
+    let samples = options.part.map_or(0..options.samples, |part| part.range(options.samples));
+    let (count, mut files, mut failures) = (plan.frames.len(), Vec::new(), Vec::new());
+    for (number, frame) in plan.frames.iter().enumerate() {
+        if count > 1 {
+            progress.note(&format!("image {} of {count}: {}", number + 1, frame.file.display()));
         }
-        if last.elapsed() >= KEEP_EVERY {
-            last = Instant::now();
-            if let Err(error) = film.save_checkpoint(&kept, &fingerprint) {
-                failure = Some(error);
-                return ControlFlow::Break(());
+        let shot = Exposure {
+            frame,
+            size: options.size,
+            samples: samples.clone(),
+            total: options.samples,
+            resume: options.resume,
+        };
+        match truth.trace(&shot, progress) {
+            Ok(()) => files.push(frame.file.clone()),
+            Err(AppError::Interrupted(what)) if count > 1 => {
+                return Err(AppError::Interrupted(format!("{} of {count} images are finished; {what}", files.len())));
+            }
+            Err(error) if count == 1 || matches!(error, AppError::Interrupted(_)) => return Err(error),
+            // The other images do not depend on this one.
+            Err(error) => {
+                progress.warn(&format!("{}: {error}", frame.file.display()));
+                failures.push((frame.file.clone(), error));
             }
         }
-        if progress.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    })?;
-    progress.end();
-    if let Some(error) = failure {
-        return Err(error.into());
     }
-    if film.samples() < options.samples {
-        if film.samples() > 0 {
-            film.save_checkpoint(&kept, &fingerprint)?;
-        }
-        return Err(interrupted(film.samples(), options, &kept));
+    let failed = failures.len();
+    match failures.into_iter().next() {
+        None => Ok(files),
+        Some((_, error)) if files.is_empty() => Err(error),
+        Some((file, error)) => Err(AppError::SomeFailed { failed, total: count, file, source: Box::new(error) }),
     }
-    if options.resume {
-        film.save_checkpoint(&kept, &fingerprint)?;
-    }
-    save(&film, options, &stage, &frame, &light)?;
-    if !options.resume && kept.exists() {
-        std::fs::remove_file(&kept).map_err(|source| AppError::Write { path: kept, source })?;
-    }
-    if let Some(error) = film.relative_error() {
-        progress.note(&format!("{} samples, standard error of the luminance {:.2} %", film.samples(), 100.0 * error));
-    }
-    Ok(options.out.clone())
 }
 
-/// The error of a trace that the user interrupted after `samples` samples, which are kept in `checkpoint`.
-fn interrupted(samples: u32, options: &ReferenceOptions, checkpoint: &Path) -> AppError {
-    let total = options.samples;
+/// What of the light is traced.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Model {
+    /// Maximum number of bounces; `None` is unlimited.
+    pub bounces: Option<u32>,
+    /// The light sources.
+    pub light: LightGroup,
+    /// How leaves scatter.
+    pub leaf: LeafModel,
+    /// Whether there is the renderer's fog.
+    pub fog: bool,
+}
+
+impl Model {
+    /// All light, as the renderer has it.
+    pub fn whole() -> Self {
+        Self { bounces: None, light: LightGroup::All, leaf: LeafModel::default(), fog: true }
+    }
+
+    fn of(options: &ReferenceOptions) -> Self {
+        Self { bounces: options.bounces, light: options.light, leaf: options.leaf, fog: options.fog }
+    }
+}
+
+/// One image to trace.
+#[derive(Clone, Debug)]
+pub(super) struct Exposure<'a> {
+    /// File, camera and instant.
+    pub frame: &'a Frame,
+    /// Width and height in pixels.
+    pub size: (u32, u32),
+    /// Numbers of the samples per pixel.
+    pub samples: Range<u32>,
+    /// Samples per pixel of all parts together.
+    pub total: u32,
+    /// Whether to go on from a checkpoint, and to leave one.
+    pub resume: bool,
+}
+
+/// A scene that is ready to be traced, from any place and at any time.
+pub(super) struct Truth {
+    stage: Stage,
+    scene: ReferenceScene,
+    totals: StandTotals,
+    model: Model,
+}
+
+impl Truth {
+    /// Builds `written` for `model`.
+    ///
+    /// # Errors
+    /// [`AppError::Stage`], [`AppError::Reference`], [`AppError::Interrupted`].
+    pub fn build(written: &Scene, model: Model, progress: &mut dyn Progress) -> Result<Self, AppError> {
+        let stage = Stage::build(written, progress).map_err(interrupt::building)?;
+        progress.begin("Building ray tracing structures", 0);
+        let scene = scene(&stage)?.with_leaves(model.leaf);
+        progress.end();
+        Ok(Self { totals: StandTotals::of(&stage.stand, &stage.plants), stage, scene, model })
+    }
+
+    /// Traces one image and writes it.
+    ///
+    /// # Errors
+    /// Those of [`reference`].
+    pub fn trace(&self, exposure: &Exposure, progress: &mut dyn Progress) -> Result<(), AppError> {
+        let Exposure { frame, size, samples, resume, .. } = exposure;
+        let sun = self.stage.sun(frame.instant);
+        let atmosphere = Atmosphere::new(AtmosphereParams::with_visibility_km(sun.visibility_km))?;
+        let light = Arc::new(sun.light(&atmosphere)?);
+        let all = Light::of(&light, None);
+        let chosen = match self.model.light {
+            LightGroup::All => all,
+            LightGroup::Sun => all.without_environment(),
+            LightGroup::Sky => all.without_key(),
+        };
+        let settings = TraceSettings { bounces: self.model.bounces.unwrap_or(u32::MAX), ..TraceSettings::default() };
+        let tracer = PathTracer::new(&self.scene, &chosen, settings)?;
+        let shot = Shot {
+            camera: Camera { view: frame.view, size: *size, near: NEAR.into() },
+            fog: self.model.fog.then(|| Fog::new(&light, frame.view.position.y)),
+        };
+        let kept = frame.file.with_extension("checkpoint");
+        let fingerprint = tracer.fingerprint(&shot);
+        let known = resume.then(|| Film::load_checkpoint(&kept, &fingerprint)).transpose()?.flatten();
+        let mut film = match known {
+            Some(film) if film.first() == samples.start => film,
+            Some(_) => return Err(ReferenceError::Stale { path: kept }.into()),
+            None => Film::beginning_at(&shot, samples.start)?,
+        };
+        let wanted = samples.end - samples.start;
+        progress.begin("Samples", wanted.into());
+        progress.advance(film.samples().min(wanted).into());
+        let (started, earlier) = (Instant::now(), film.samples());
+        let (mut last, mut failure) = (started, None);
+        let stop = || interrupt::received().is_some();
+        tracer.render_unless(&shot, &mut film, wanted, &stop, &mut |film: &Film| {
+            progress.advance(1);
+            if film.samples() == earlier + 1 {
+                progress.note(&format!("first sample per pixel: {:.2} s", started.elapsed().as_secs_f64()));
+            }
+            if last.elapsed() >= KEEP_EVERY {
+                last = Instant::now();
+                if let Err(error) = film.save_checkpoint(&kept, &fingerprint) {
+                    failure = Some(error);
+                    return ControlFlow::Break(());
+                }
+            }
+            if progress.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })?;
+        progress.end();
+        if let Some(error) = failure {
+            return Err(error.into());
+        }
+        if film.samples() < wanted {
+            if film.samples() > 0 {
+                film.save_checkpoint(&kept, &fingerprint)?;
+            }
+            return Err(interrupted(film.samples(), wanted, &kept));
+        }
+        if *resume {
+            film.save_checkpoint(&kept, &fingerprint)?;
+        }
+        save(&film, &frame.file, &fingerprint, &self.notes(exposure, &light))?;
+        if !resume && kept.exists() {
+            std::fs::remove_file(&kept).map_err(|source| AppError::Write { path: kept, source })?;
+        }
+        if let Some(error) = film.relative_error() {
+            let samples = film.samples();
+            progress.note(&format!("{samples} samples, standard error of the luminance {:.2} %", 100.0 * error));
+        }
+        Ok(())
+    }
+
+    /// What the film needs to become an image: the renderer's exposure at the camera, and the text of the file.
+    fn notes(&self, exposure: &Exposure, light: &Arc<LightState>) -> FilmNotes {
+        let Exposure { frame, total, .. } = exposure;
+        let there = CameraExposure::new(light.clone(), self.totals).at(&self.stage.ground(), frame.view.position);
+        let text = notes(&self.stage, &frame.view, frame.instant);
+        FilmNotes {
+            total: *total,
+            exposure: exposure_from_ev100(there.ev100),
+            night: (light.scotopic.tint.to_array(), light.scotopic.amount, light.scotopic.strength),
+            text: text.into_iter().map(|(keyword, value)| (keyword.to_owned(), value)).collect(),
+        }
+    }
+}
+
+/// The error of a trace that the user interrupted after `samples` of `total` samples, which are kept in `checkpoint`.
+fn interrupted(samples: u32, total: u32, checkpoint: &Path) -> AppError {
     AppError::Interrupted(match samples {
         0 => format!("none of {total} samples is finished; run the command again"),
         _ => format!(
@@ -120,27 +256,6 @@ fn interrupted(samples: u32, options: &ReferenceOptions, checkpoint: &Path) -> A
             checkpoint.display()
         ),
     })
-}
-
-/// Camera and instant, the same as `canopy render` has for a still.
-fn frame(options: &ReferenceOptions, stage: &Stage) -> Result<Frame, AppError> {
-    let plan = RenderPlan::new(&as_still(options), &stage.scene, &|x, z| stage.terrain.height(x, z))?;
-    plan.frames.into_iter().next().ok_or(AppError::Plan(PlanError::Nothing))
-}
-
-fn as_still(options: &ReferenceOptions) -> RenderOptions {
-    RenderOptions {
-        scene: options.scene.clone(),
-        output: Output::Stills(vec![Still { out: options.out.with_extension("png"), at: options.at }]),
-        view: options.view,
-        size: options.size,
-        selection: Selection::All,
-        resume: false,
-        overrides: options.overrides.clone(),
-        adapter: None,
-        quiet: options.quiet,
-        explain: false,
-    }
 }
 
 fn scene(stage: &Stage) -> Result<ReferenceScene, AppError> {
@@ -153,29 +268,17 @@ fn scene(stage: &Stage) -> Result<ReferenceScene, AppError> {
     Ok(ReferenceScene::new(&plants, &Instance::of_stand(&stage.stand, DVec3::ZERO), Some(ground))?)
 }
 
-fn save(
-    film: &Film,
-    options: &ReferenceOptions,
-    stage: &Stage,
-    frame: &Frame,
-    light: &Arc<LightState>,
-) -> Result<(), AppError> {
-    if is_exr(&options.out) {
-        return Ok(film.save_exr(&options.out)?);
+/// Writes `film` to `file`, as what its name ends in.
+///
+/// # Errors
+/// [`AppError::Reference`], [`AppError::Write`].
+pub(super) fn save(film: &Film, file: &Path, fingerprint: &[u8; 32], notes: &FilmNotes) -> Result<(), AppError> {
+    let ends_in = |ending| file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(ending));
+    if ends_in("exr") {
+        return Ok(film.save_exr(file)?);
     }
-    let table = tone_table()?;
-    let (width, height) = film.size();
-    // The renderer's exposure at the camera.
-    let totals = StandTotals::of(&stage.stand, &stage.plants);
-    let exposure = CameraExposure::new(light.clone(), totals).at(&stage.ground(), frame.view.position);
-    let transform =
-        DisplayTransform { exposure: exposure_from_ev100(exposure.ev100), ..DisplayTransform::of(light, Some(&table)) };
-    let pixels = film.display(&transform);
-    let mut notes = notes(stage, &frame.view, frame.instant);
-    notes.push(("Samples", film.samples().to_string()));
-    RenderedImage { width, height, pixels }.save(&options.out, &notes)
-}
-
-fn is_exr(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"))
+    if ends_in("film") {
+        return Ok(film.keep(file, fingerprint, &notes.to_bytes())?);
+    }
+    notes.image(film)?.save(file, &notes.text_of(film))
 }

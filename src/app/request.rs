@@ -74,16 +74,19 @@ pub enum LightGroup {
 pub struct ReferenceOptions {
     /// The scene.
     pub scene: SceneSource,
-    /// The `.exr` (radiance in nits) or `.png` (as the renderer shows it) to write.
-    pub out: PathBuf,
-    /// Date and time; `None` takes the scene's.
-    pub at: Option<LocalTime>,
+    /// The images, and where they are written: `.exr` (radiance in nits), `.png` (as the renderer shows it), or `.film` (sums of
+    /// samples for [`merge`](super::merge)). In a folder they are `.png`, or `.film` with a `part`.
+    pub output: Output,
+    /// Which frames of a sequence to trace.
+    pub selection: Selection,
     /// Where the camera is.
     pub view: View,
     /// Size of the image in pixels, each at least 1.
     pub size: (u32, u32),
     /// Samples per pixel, at least 1.
     pub samples: u32,
+    /// Trace this part of the samples alone, so that several machines share an image. All outputs are films then.
+    pub part: Option<Part>,
     /// Maximum number of bounces between surfaces; `None` is unlimited.
     pub bounces: Option<u32>,
     /// The light sources to include.
@@ -127,8 +130,8 @@ pub enum Output {
     Stills(Vec<Still>),
     /// Numbered frames.
     Sequence {
-        /// A `.png` file name, to which the numbers are added (`flight.png` becomes `flight-0000.png`, ...), or a
-        /// folder (no `.png` ending), in which the files are called `0000.png`, ...
+        /// A file name, to which the numbers are added (`flight.png` becomes `flight-0000.png`, ...), or a
+        /// folder (no such ending), in which the files are called `0000.png`, ...
         out: PathBuf,
         /// How many, at least 1.
         frames: u32,
@@ -158,10 +161,27 @@ pub enum Selection {
     },
 }
 
+/// One of several parts of nearly the same size.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// Its number, from 1 to `of`.
+    pub number: u32,
+    /// Number of parts.
+    pub of: u32,
+}
+
+impl Part {
+    /// The first and the end of its share of `total`.
+    pub fn range(self, total: u32) -> std::ops::Range<u32> {
+        let start = |part: u32| (u64::from(total) * u64::from(part) / u64::from(self.of.max(1))) as u32;
+        start(self.number.saturating_sub(1))..start(self.number.min(self.of))
+    }
+}
+
 /// One image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Still {
-    /// The PNG to write.
+    /// The file to write.
     pub out: PathBuf,
     /// Date and time; `None` takes the scene's.
     pub at: Option<LocalTime>,

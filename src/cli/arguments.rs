@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use canopy::{
     app::{
-        LeafKind, Selection, Sweep, parse_chunk, parse_exposure, parse_flip, parse_frames, parse_leaf_kind,
-        parse_lighting, parse_milliseconds, parse_palette, parse_paper, parse_pixels_per_degree, parse_pose,
-        parse_positive, parse_samples, parse_seconds, parse_size, parse_style,
+        LeafKind, Part, Selection, Sweep, parse_chunk, parse_exposure, parse_flip, parse_frames, parse_leaf_kind,
+        parse_lighting, parse_milliseconds, parse_palette, parse_paper, parse_part, parse_pixels_per_degree,
+        parse_pose, parse_positive, parse_samples, parse_seconds, parse_size, parse_style,
     },
     scene::{Lighting, LocalTime, Pose},
     style::Style,
@@ -92,6 +92,8 @@ pub enum Command {
     Render(Render),
     /// Path-trace the ground truth of a scene on the CPU: slow, but accurate.
     Reference(Reference),
+    /// Make one image of parts of its samples that were traced separately.
+    Merge(Merge),
     /// Make the levels of detail of a plant, and show them on a contact sheet; or bake all plants of a scene.
     Bake(Bake),
     /// Complete the textures of a leaf, and show it in front light, grazing light and against the light.
@@ -240,12 +242,17 @@ pub struct Render {
 #[command(after_help = "Examples:
   canopy reference demo.ron --out truth.exr --spp 256 --size 640x360
   canopy reference demo.ron --out truth.png --at 2026-06-21T19:30-04:00 --camera 0,2,0,270,5 --spp 64 --resume
+  Twenty images along the scene's path, the first of four pieces:
+    canopy reference demo.ron --out truth --frames 20 --fps 1 --chunk 1/4
+  A quarter of the samples of one image, to be merged with the others:
+    canopy reference demo.ron --out part-1.film --spp 1024 --part 1/4
 A trace can be interrupted: its state is saved every 30 s and at Ctrl-C next to the image, and --resume continues from
 there.")]
 pub struct Reference {
     /// Scene file.
     pub scene: PathBuf,
-    /// Image to write: .exr for radiance in nits, .png as the renderer shows it.
+    /// Image to write: .exr for radiance in nits, .png as the renderer shows it; for a sequence, such a name to which numbers are
+    /// added, or a folder.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// Samples per pixel.
@@ -255,11 +262,33 @@ pub struct Reference {
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = DEFAULT_SIZE)]
     pub size: (u32, u32),
     /// Date and time with the offset from UTC, such as 2026-06-21T15:30+02:00 [default: the scene's].
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", conflicts_with_all = ["from", "to"])]
     pub at: Option<LocalTime>,
-    /// Where the camera is [default: the scene's start].
+    /// Where the camera is [default: the scene's start, or its path for a sequence].
     #[command(flatten)]
     pub view: CameraArguments,
+    /// Number of images in a sequence.
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..))]
+    pub frames: Option<u32>,
+    /// Frames per second of flight along the path [default: 25; in a time-lapse the camera does not move].
+    #[arg(long, value_name = "RATE", value_parser = parse_positive, requires = "frames")]
+    pub fps: Option<f64>,
+    /// First instant of a time-lapse.
+    #[arg(long, value_name = "TIME", requires = "frames", requires = "to")]
+    pub from: Option<LocalTime>,
+    /// Last instant of a time-lapse.
+    #[arg(long, value_name = "TIME", requires = "from")]
+    pub to: Option<LocalTime>,
+    /// Trace only these frames of the sequence: numbers and ranges.
+    #[arg(long, value_name = "10-19,30", value_parser = parse_frames, requires = "frames")]
+    pub frames_only: Option<Selection>,
+    /// Trace only the i-th of n pieces of the sequence, 1/n to n/n, so that several machines share it.
+    #[arg(long, value_name = "i/n", value_parser = parse_chunk, requires = "frames", conflicts_with = "frames_only")]
+    pub chunk: Option<Selection>,
+    /// Trace only the i-th of n parts of the samples, so that several machines share an image. The result is a film (.film), and
+    /// `canopy merge` makes an image of all of them.
+    #[arg(long, value_name = "i/n", value_parser = parse_part)]
+    pub part: Option<Part>,
     /// Maximum number of bounces between surfaces; 0: only direct light from sun and sky [default: unlimited].
     #[arg(long, value_name = "NUMBER")]
     pub bounces: Option<u32>,
@@ -272,9 +301,30 @@ pub struct Reference {
     /// Leave out the renderer's fog.
     #[arg(long)]
     pub clear_air: bool,
-    /// Continue an earlier trace of the same scene, light and camera.
-    #[arg(long)]
+    /// Continue an earlier trace of the same scene, light and camera; images of a sequence that are finished are kept.
+    #[arg(long, visible_alias = "skip-existing")]
     pub resume: bool,
+}
+
+/// Arguments of `canopy merge`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  canopy merge part-1.film part-2.film part-3.film part-4.film --out truth.exr
+  canopy merge machine-1 machine-2 --out truth            folders with films of a sequence; those of one name are one image
+The parts are those of `canopy reference --part`. The image is that of one trace with all samples.")]
+pub struct Merge {
+    /// Films, or folders of films.
+    #[arg(required = true)]
+    pub parts: Vec<PathBuf>,
+    /// Image to write: .exr for radiance in nits, .png as the renderer shows it, .film to merge it further; for folders a folder.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Write the images of folders as OpenEXR instead of PNG.
+    #[arg(long)]
+    pub exr: bool,
+    /// Accept that samples are missing at the end.
+    #[arg(long)]
+    pub incomplete: bool,
 }
 
 /// Light sources of a ground truth render.
@@ -414,6 +464,7 @@ pub struct Compare {
   canopy profile demo.ron --sweep quality.shadow_map_size=512,2048 --sweep lighting=expressive,transfer
   canopy profile demo.ron --sweep 'quality.levels=[(draw: \"model\", until: 40), (draw: \"cloud\")]' --reference traced
   canopy profile demo.ron --camera 0,2,0,90,0 --at 2026-06-21T13:30-04:00 --at 2026-06-21T20:00-04:00
+  canopy profile demo.ron --sweep style=photograph,watercolour --against stock
   canopy profile demo.ron --out new --baseline old/report.json --limit 1.05
 The report is a page (report.html), two tables (points.csv, frames.csv) and all figures (report.json) in the folder --out.
 Ctrl-C keeps what was measured; the same command with --resume goes on.")]
@@ -432,6 +483,15 @@ pub struct Profile {
     /// Print the names of all settings with their values and exit.
     #[arg(long)]
     pub list_settings: bool,
+    /// Measure the scene as written a second time: its ratio to the first says what a difference is worth.
+    #[arg(long)]
+    pub control: bool,
+    /// Draw the same trees and ground with another renderer too. stock: Bevy without Canopy, as its users would build it.
+    #[arg(long, value_enum, value_name = "RENDERER")]
+    pub against: Option<PeerChoice>,
+    /// The most trees that the renderer of --against draws, those nearest to the views.
+    #[arg(long, value_name = "NUMBER", default_value_t = 100_000, requires = "against")]
+    pub peer_trees: usize,
     /// What is measured, and how.
     #[command(flatten)]
     pub measured: Measured,
@@ -447,6 +507,13 @@ pub struct Profile {
     /// Go on with an earlier, interrupted profile of the same scene and settings.
     #[arg(long)]
     pub resume: bool,
+}
+
+/// Renderers to compare with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum PeerChoice {
+    /// Bevy without Canopy.
+    Stock,
 }
 
 /// What is measured of a scene, and how.

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use canopy::{
     app::{
         BakeOptions, Clock, Combination, CompareOptions, FlyOptions, Goal, LeafImages, LeafModel, LeafOptions,
-        LightGroup, Output, PIXELS_PER_DEGREE, ProfileOptions, ReferenceKind, ReferenceOptions, RenderOptions, Still,
-        TuneOptions, View, Views,
+        LightGroup, MergeOptions, Output, PIXELS_PER_DEGREE, Peer, ProfileOptions, ReferenceKind, ReferenceOptions,
+        RenderOptions, Still, TuneOptions, View, Views,
     },
     scene::{LocalTime, Overrides, SceneSource},
 };
@@ -14,8 +14,8 @@ use clap::CommandFactory;
 use clap::error::ErrorKind;
 
 use super::arguments::{
-    Arguments, Bake, CameraArguments, Common, Compare, Fly, Leaf, LeafChoice, LightChoice, Measured, Profile,
-    Reference, Render, StyleArguments, Tune,
+    Arguments, Bake, CameraArguments, Common, Compare, Fly, Leaf, LeafChoice, LightChoice, Measured, Merge, PeerChoice,
+    Profile, Reference, Render, StyleArguments, Tune,
 };
 
 /// The scene of `canopy fly` without an argument.
@@ -61,6 +61,10 @@ pub fn fly_options(fly: Fly, common: &Common) -> FlyOptions {
 /// # Errors
 /// A usage error if arguments that are each valid do not fit together.
 pub fn render_options(render: Render, common: &Common) -> Result<RenderOptions, clap::Error> {
+    let is_single = render.frames.is_none() && render.out.len() == render.at.len().max(1);
+    if let Some(wrong) = render.out.iter().find(|file| is_single && !ends_in(file, "png")) {
+        return Err(usage(format!("--out {}: images are PNG files; the name must end in .png", wrong.display())));
+    }
     Ok(RenderOptions {
         view: view(&render.view),
         size: render.size,
@@ -78,21 +82,32 @@ pub fn render_options(render: Render, common: &Common) -> Result<RenderOptions, 
 /// The options of a ground truth render.
 ///
 /// # Errors
-/// A usage error for a file that ends neither in `.exr` nor in `.png`.
+/// A usage error for a file of another kind.
 pub fn reference_options(reference: Reference, common: &Common) -> Result<ReferenceOptions, clap::Error> {
-    if !ends_in(&reference.out, "exr") && !ends_in(&reference.out, "png") {
+    let endings: &[&str] = if reference.part.is_some() { &["film"] } else { &["exr", "png", "film"] };
+    let has = |endings: &[&str]| endings.iter().any(|ending| ends_in(&reference.out, ending));
+    let is_folder = reference.frames.is_some() && !has(&["exr", "png", "film"]);
+    if !has(endings) && !is_folder {
         let file = reference.out.display();
-        return Err(usage(format!(
-            "--out {file}: a reference is an OpenEXR or PNG file; the name must end in .exr or .png"
-        )));
+        return Err(usage(match reference.part {
+            Some(_) => format!("--out {file}: a part of the samples is a film; the name must end in .film"),
+            None => format!("--out {file}: a reference is an OpenEXR or PNG file; the name must end in .exr or .png"),
+        }));
     }
     Ok(ReferenceOptions {
         view: view(&reference.view),
         scene: reference.scene.into(),
-        out: reference.out,
-        at: reference.at,
+        output: output(
+            vec![reference.out],
+            reference.at.as_slice(),
+            reference.frames,
+            reference.fps,
+            reference.from.zip(reference.to),
+        )?,
+        selection: reference.frames_only.or(reference.chunk).unwrap_or_default(),
         size: reference.size,
         samples: reference.spp,
+        part: reference.part,
         bounces: reference.bounces,
         light: match reference.light {
             LightChoice::All => LightGroup::All,
@@ -110,6 +125,11 @@ pub fn reference_options(reference: Reference, common: &Common) -> Result<Refere
         overrides: overrides(common),
         quiet: common.quiet,
     })
+}
+
+/// The options of a merge.
+pub fn merge_options(merge: Merge) -> MergeOptions {
+    MergeOptions { parts: merge.parts, out: merge.out, exr: merge.exr, incomplete: merge.incomplete }
 }
 
 /// The scene whose plants are to be baked, with what replaces its values; `None` for the contact sheet of a plant.
@@ -192,6 +212,8 @@ pub fn profile_options(profile: &Profile, common: &Common) -> Result<ProfileOpti
     Ok(ProfileOptions {
         sweeps: profile.sweep.clone(),
         combination: if profile.each { Combination::Each } else { Combination::All },
+        control: profile.control,
+        against: profile.against.map(|PeerChoice::Stock| Peer { most_trees: profile.peer_trees }),
         shown: profile.pictures,
         resume: profile.resume,
         ..measured(&profile.scene, &profile.out, &profile.measured, common)?
@@ -238,6 +260,8 @@ fn measured(scene: &Path, out: &Path, measured: &Measured, common: &Common) -> R
         out: out.to_owned(),
         sweeps: Vec::new(),
         combination: Combination::All,
+        control: false,
+        against: None,
         views,
         size: measured.size,
         rounds: measured.rounds,
@@ -274,9 +298,6 @@ fn output(
                 out.len(),
                 at.len()
             )));
-        }
-        if let Some(wrong) = out.iter().find(|file| !ends_in(file, "png")) {
-            return Err(usage(format!("--out {}: images are PNG files; the name must end in .png", wrong.display())));
         }
         let times = at.iter().copied().map(Some).chain(std::iter::repeat(None));
         return Ok(Output::Stills(out.into_iter().zip(times).map(|(out, at)| Still { out, at }).collect()));

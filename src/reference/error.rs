@@ -55,6 +55,14 @@ pub enum ReferenceError {
         /// The most pixels.
         limit: u64,
     },
+    /// Samples that do not follow those of a film.
+    #[error("samples from number {found} on do not follow those before number {expected}")]
+    NotNext {
+        /// The number that follows.
+        expected: u32,
+        /// The one given.
+        found: u32,
+    },
     /// A camera or a light with a value that is not a number, or outside its range.
     #[error("{what} is {value}; give {range}")]
     Value {

@@ -21,6 +21,8 @@ const MODEL: u32 = 2;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
     size: (u32, u32),
+    /// Number of the first sample: not 0 where the rest is traced elsewhere.
+    first: u32,
     samples: u32,
     /// Row by row from the top: nits per channel, summed over the samples.
     pub(super) sums: Vec<DVec3>,
@@ -43,14 +45,53 @@ impl Film {
     /// # Errors
     /// As [`Camera::check`].
     pub fn new(shot: &Shot) -> Result<Self, ReferenceError> {
+        Self::beginning_at(shot, 0)
+    }
+
+    /// An empty film whose first sample is that of number `first`: a part of a longer trace, for [`append`](Self::append).
+    ///
+    /// # Errors
+    /// As [`Camera::check`].
+    pub fn beginning_at(shot: &Shot, first: u32) -> Result<Self, ReferenceError> {
         shot.camera.check()?;
         let size = shot.camera.size;
         let pixels = size.0 as usize * size.1 as usize;
-        Ok(Self { size, samples: 0, sums: vec![DVec3::ZERO; pixels], squares: vec![0.0; pixels] })
+        Ok(Self { size, first, samples: 0, sums: vec![DVec3::ZERO; pixels], squares: vec![0.0; pixels] })
     }
 
-    pub(super) fn from_parts(size: (u32, u32), samples: u32, sums: Vec<DVec3>, squares: Vec<f64>) -> Self {
-        Self { size, samples, sums, squares }
+    pub(super) fn from_parts(size: (u32, u32), first: u32, samples: u32, sums: Vec<DVec3>, squares: Vec<f64>) -> Self {
+        Self { size, first, samples, sums, squares }
+    }
+
+    /// Adds the samples of `next`, which follow those of this film. The sums are those of one trace but for the rounding of f64.
+    ///
+    /// # Errors
+    /// [`ReferenceError::Size`] for another size, [`ReferenceError::NotNext`] for other samples.
+    pub fn append(&mut self, next: &Self) -> Result<(), ReferenceError> {
+        if next.size != self.size {
+            return Err(ReferenceError::Size {
+                width: next.size.0,
+                height: next.size.1,
+                limit: self.sums.len() as u64,
+            });
+        }
+        let expected = self.first.saturating_add(self.samples);
+        if next.first != expected || next.samples.checked_add(self.samples).is_none() {
+            return Err(ReferenceError::NotNext { expected, found: next.first });
+        }
+        self.samples += next.samples;
+        for (sum, other) in self.sums.iter_mut().zip(&next.sums) {
+            *sum += *other;
+        }
+        for (sum, other) in self.squares.iter_mut().zip(&next.squares) {
+            *sum += *other;
+        }
+        Ok(())
+    }
+
+    /// Number of the first sample.
+    pub fn first(&self) -> u32 {
+        self.first
     }
 
     /// Width and height in pixels.
@@ -143,7 +184,7 @@ impl PathTracer<'_> {
             rows.flat_map(move |row| (left..(left + TILE).min(width)).map(move |column| (column, row)))
         };
         while film.samples < until {
-            let sample = film.samples;
+            let sample = film.first.wrapping_add(film.samples);
             let trace = |tile| pixels(tile).map(|(column, row)| self.sample(shot, column, row, sample)).collect();
             let pass: Option<Vec<Vec<Vec3>>> =
                 (0..tiles).into_par_iter().map(|tile| (!stop()).then(|| trace(tile))).collect();

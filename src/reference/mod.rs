@@ -45,6 +45,7 @@ mod sky;
 mod soil;
 
 pub use camera::{Camera, WorldRay};
+pub use checkpoint::KeptFilm;
 pub use display::{DisplayTransform, ToneTable};
 pub use error::ReferenceError;
 pub use film::{Film, Shot};

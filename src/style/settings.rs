@@ -182,6 +182,16 @@ impl Style {
         }
     }
 
+    /// Its name, one of [`NAMES`](Self::NAMES).
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Photograph => "photograph",
+            Self::Watercolour(_) => "watercolour",
+            Self::Lines(_) => "lines",
+            Self::Toon(_) => "toon",
+        }
+    }
+
     /// Whether it is drawn by passes of its own.
     pub fn is_drawn(&self) -> bool {
         *self != Self::Photograph

@@ -1,6 +1,9 @@
 //! What measures: adapter, driver, processor.
 
-use bevy::render::renderer::{RenderAdapterInfo, RenderDevice};
+use bevy::{
+    ecs::world::World,
+    render::renderer::{RenderAdapterInfo, RenderDevice},
+};
 use wgpu::{DeviceType, Features};
 
 use super::record::{Machine, Memory};
@@ -32,9 +35,9 @@ fn processor() -> Option<String> {
     Some(line.split_once(':')?.1.trim().to_owned())
 }
 
-/// Memory in use.
-pub fn memory(renderer: &Renderer) -> Memory {
-    let device = renderer.world().get_resource::<RenderDevice>();
+/// Memory in use by the renderer of `world`.
+pub fn memory(world: &World) -> Memory {
+    let device = world.get_resource::<RenderDevice>();
     let report = device.and_then(|device| device.wgpu_device().generate_allocator_report());
     Memory { device: report.map(|report| report.total_allocated_bytes), program: resident() }
 }

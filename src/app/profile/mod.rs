@@ -6,6 +6,7 @@
 //! can be resumed.
 
 mod baseline;
+mod contestant;
 mod csv;
 mod error;
 mod machine;
@@ -23,6 +24,7 @@ mod views;
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
+    sync::Arc,
     time::{Instant, SystemTime},
 };
 
@@ -30,6 +32,7 @@ use chrono::{DateTime, Utc};
 
 pub use self::{
     baseline::{BaselineRow, against},
+    contestant::Peer,
     error::ProfileError,
     record::{
         FrameTime, LevelCount, Machine, Memory, Method, PROFILE_VERSION, PictureRecord, PointRecord, PointSummary,
@@ -42,6 +45,7 @@ pub use self::{
 };
 
 use self::{
+    contestant::{Canopy, Contestant, Stock},
     reference::{Asked, Reference},
     stages::Stages,
     sweep::{Point, points},
@@ -49,14 +53,12 @@ use self::{
 };
 use super::{AppError, Renderer, adapter, compare::read_image, compare::save_map, fingerprint::fingerprint};
 use crate::{
-    assets::Stage,
     files,
     measure::{ComparisonSettings, PIXELS_PER_DEGREE, Picture, change, compare},
     progress::Progress,
-    render::{forest::ForestStatistics, terrain::TerrainStatistics},
     scene::{Overrides, Scene, SceneSource},
 };
-use bevy::render::{RenderApp, renderer::RenderDevice};
+use bevy::render::renderer::RenderDevice;
 
 /// What to profile, and how.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,6 +71,10 @@ pub struct ProfileOptions {
     pub sweeps: Vec<Sweep>,
     /// How several sweeps go together.
     pub combination: Combination,
+    /// Whether the scene as written is measured a second time, as a check of what differences are worth.
+    pub control: bool,
+    /// Another renderer to compare with.
+    pub against: Option<Peer>,
     /// Where to look from, and when.
     pub views: Views,
     /// Width and height of a frame in pixels.
@@ -164,7 +170,11 @@ pub(super) fn profile_of(
     options: &ProfileOptions,
     progress: &mut dyn Progress,
 ) -> Result<(ProfileReport, ReportFiles), AppError> {
-    let points = points(&scene, &options.sweeps, options.combination)?;
+    let mut points = points(&scene, &options.sweeps, options.combination)?;
+    if options.control {
+        points.insert(1, Point::again(&scene));
+    }
+    points.extend(options.against.map(|peer| Point::of_peer(&scene, peer)));
     // Views off the path and references that are missing are found before the long work; heights do not matter for that.
     let early = options.views.of(&scene, &|_, _| 0.0)?;
     if let ReferenceKind::Folder(given) = &options.reference {
@@ -183,12 +193,22 @@ pub(super) fn profile_of(
     let views = options.views.of(&scene, &|x, z| written.terrain.height(x, z))?;
 
     progress.begin("Renderer", 0);
-    let mut renderer = Renderer::with_settings(settings, options.size, scene.quality.msaa, timing::prepare)?;
+    let renderer = Renderer::with_settings(settings.clone(), options.size, scene.quality.msaa, timing::prepare)?;
     written.check_device(renderer.world().resource::<RenderDevice>())?;
     progress.end();
+    let stock = match options.against {
+        None => None,
+        Some(peer) => {
+            progress.begin("Stock Bevy", 0);
+            let stock = Stock::new(peer, Arc::new(written), &views, options.size, settings)?;
+            progress.end();
+            Some(stock)
+        }
+    };
+    let mut contestants = Contestants { renderer, stages, stock };
 
-    let mut work = Work::new(options, &scene, &points, &views, &renderer)?;
-    let outcome = work.run(&mut renderer, &mut stages, &scene, progress);
+    let mut work = Work::new(options, &scene, &points, &views, &contestants)?;
+    let outcome = work.run(&mut contestants, &scene, progress);
     work.report.complete = outcome.is_ok();
     summary::summarize(&mut work.report);
     // What was measured is kept, whatever went wrong. A report that cannot be written says why, unless something else did.
@@ -196,6 +216,31 @@ pub(super) fn profile_of(
     outcome?;
     saved?;
     Ok((work.report, report_files))
+}
+
+/// Those that take part.
+struct Contestants {
+    renderer: Renderer,
+    stages: Stages,
+    stock: Option<Stock>,
+}
+
+impl Contestants {
+    /// Lets `work` have the one that draws `point`.
+    fn with<R>(
+        &mut self,
+        point: &Point,
+        progress: &mut dyn Progress,
+        work: impl FnOnce(&mut dyn Contestant, &mut dyn Progress) -> Result<R, AppError>,
+    ) -> Result<R, AppError> {
+        match (&mut self.stock, point.peer) {
+            (Some(stock), Some(_)) => work(stock, progress),
+            _ => {
+                let stage = self.stages.stage(&point.scene, progress)?;
+                work(&mut Canopy::new(&mut self.renderer, &stage), progress)
+            }
+        }
+    }
 }
 
 /// A profile under way.
@@ -214,17 +259,18 @@ impl<'a> Work<'a> {
         scene: &Scene,
         points: &'a [Point],
         views: &'a [ProfileView],
-        renderer: &Renderer,
+        contestants: &Contestants,
     ) -> Result<Self, AppError> {
-        let machine = machine::machine(renderer);
+        let machine = machine::machine(&contestants.renderer);
         let mut hasher = blake3::Hasher::new();
         for point in points {
             hasher.update(fingerprint(&point.scene).as_bytes());
+            hasher.update(format!("{:?} {:?}", point.settings, point.peer).as_bytes());
         }
         let method = (options.size, options.warm_up, &options.reference, &machine.adapter, &machine.driver);
         hasher.update(format!("{method:?} {views:?}").as_bytes());
         let whole = hasher.finalize().to_hex()[..32].to_owned();
-        let fresh = ProfileReport {
+        let mut fresh = ProfileReport {
             schema: "canopy-profile".to_owned(),
             version: PROFILE_VERSION,
             scene: scene.name.clone(),
@@ -248,6 +294,9 @@ impl<'a> Work<'a> {
             front: Vec::new(),
             knee: None,
         };
+        for (record, _) in fresh.points.iter_mut().zip(points).filter(|(_, point)| point.peer.is_some()) {
+            record.label = contestants.stock.as_ref().map_or(record.label.clone(), Stock::label);
+        }
         let json = ReportFiles::in_folder(&options.out).json;
         let report = if options.resume && json.exists() {
             let mut earlier = read_report(&json)?;
@@ -266,8 +315,7 @@ impl<'a> Work<'a> {
 
     fn run(
         &mut self,
-        renderer: &mut Renderer,
-        stages: &mut Stages,
+        contestants: &mut Contestants,
         scene: &Scene,
         progress: &mut dyn Progress,
     ) -> Result<(), AppError> {
@@ -278,31 +326,30 @@ impl<'a> Work<'a> {
             adapter: self.options.adapter.as_deref(),
             fingerprint: &self.fingerprint,
         };
-        self.references = reference::make(&self.options.reference, scene, stages, self.views, &asked, progress)?;
+        self.references =
+            reference::make(&self.options.reference, scene, &mut contestants.stages, self.views, &asked, progress)?;
         for (view, reference) in self.report.views.iter_mut().zip(&self.references) {
             view.reference = reference.as_ref().map(|reference| relative(&reference.file, &self.options.out));
         }
-        self.draw_all(renderer, stages, progress)?;
-        self.time_all(renderer, stages, progress)
+        self.draw_all(contestants, progress)?;
+        self.time_all(contestants, progress)
     }
 
     /// Draws every view with every combination of settings, and compares it.
-    fn draw_all(
-        &mut self,
-        renderer: &mut Renderer,
-        stages: &mut Stages,
-        progress: &mut dyn Progress,
-    ) -> Result<(), AppError> {
+    fn draw_all(&mut self, contestants: &mut Contestants, progress: &mut dyn Progress) -> Result<(), AppError> {
         let open: Vec<usize> = (0..self.points.len())
             .filter(|index| self.report.points[*index].pictures.len() < self.views.len())
             .collect();
-        let mut built = Vec::new();
+        // Builds have progress of their own.
         for index in &open {
-            built.push(stages.stage(&self.points[*index].scene, progress)?);
+            contestants.stages.stage(&self.points[*index].scene, progress)?;
         }
         progress.begin("Images", (open.len() * self.views.len()) as u64);
-        for (index, stage) in open.into_iter().zip(built) {
-            let (pictures, memory) = self.draw_point(index, renderer, &stage, progress)?;
+        for index in open {
+            let draw = |contestant: &mut dyn Contestant, progress: &mut dyn Progress| {
+                self.draw_point(index, contestant, progress)
+            };
+            let (pictures, memory) = contestants.with(&self.points[index], progress, draw)?;
             self.report.points[index].pictures = pictures;
             self.report.points[index].memory = memory;
             self.save_data()?;
@@ -314,12 +361,10 @@ impl<'a> Work<'a> {
     fn draw_point(
         &self,
         index: usize,
-        renderer: &mut Renderer,
-        stage: &Stage,
+        contestant: &mut dyn Contestant,
         progress: &mut dyn Progress,
     ) -> Result<(Vec<PictureRecord>, Memory), AppError> {
         let folder = self.options.out.join("images").join(format!("{index:03}"));
-        renderer.replace(stage);
         let mut records: Vec<PictureRecord> = Vec::with_capacity(self.views.len());
         let mut before: Option<(Picture, Picture)> = None;
         let mut reader = timing::DeviceReader::default();
@@ -328,12 +373,15 @@ impl<'a> Work<'a> {
             if progress.is_cancelled() {
                 return Err(self.interrupted());
             }
-            let image = renderer.draw(stage, &view.view, view.instant)?;
+            contestant.set_view(view)?;
+            contestant.update()?;
+            let image = contestant.read()?;
             let file = folder.join(format!("{}.png", view.name));
             image.save(&file, &[("Settings", self.points[index].label())])?;
-            let mut record = counts(renderer);
+            let mut record = contestant.counts();
             record.file = relative(&file, &self.options.out);
-            if let Some(Reference { file: reference, half }) = &self.references[number] {
+            let comparable = self.is_comparable(index);
+            if let Some(Reference { file: reference, half }) = self.references[number].as_ref().filter(|_| comparable) {
                 let test = Picture::from_srgb8(image.width as usize, image.height as usize, &image.pixels);
                 let failed =
                     |source| super::CompareError::Measure { test: file.clone(), reference: reference.clone(), source };
@@ -355,22 +403,29 @@ impl<'a> Work<'a> {
                 before = Some((test, truth));
             }
             // The device's figures of this frame come two updates later; the view stays, so they are its own.
-            renderer.update()?;
-            renderer.update()?;
-            record.fragments_per_pixel = timing::fragments(&reader.read(renderer)).map(|count| count / pixels);
+            contestant.update()?;
+            contestant.update()?;
+            let figures = reader.read(contestant.world());
+            let fragments = timing::fragments(&figures, contestant.pass_prefix());
+            record.fragments_per_pixel = fragments.map(|count| count / pixels);
             records.push(record);
             progress.advance(1);
         }
-        Ok((records, machine::memory(renderer)))
+        Ok((records, contestant.memory()))
+    }
+
+    /// Whether the images of a point show the same as the reference: a watercolour is no photograph with errors.
+    fn is_comparable(&self, index: usize) -> bool {
+        let style = &self.points[index].scene.style;
+        match self.options.reference {
+            ReferenceKind::Full { .. } => *style == self.points[0].scene.style,
+            ReferenceKind::Traced { .. } => !style.is_drawn(),
+            ReferenceKind::None | ReferenceKind::Folder(_) => true,
+        }
     }
 
     /// Times all rounds.
-    fn time_all(
-        &mut self,
-        renderer: &mut Renderer,
-        stages: &mut Stages,
-        progress: &mut dyn Progress,
-    ) -> Result<(), AppError> {
+    fn time_all(&mut self, contestants: &mut Contestants, progress: &mut dyn Progress) -> Result<(), AppError> {
         let since = Instant::now();
         let rounds = self.options.rounds as usize;
         let missing: usize = self.report.points.iter().map(|point| rounds.saturating_sub(point.rounds.len())).sum();
@@ -385,10 +440,11 @@ impl<'a> Work<'a> {
                 if self.report.points[index].rounds.len() > round {
                     continue;
                 }
-                let stage = stages.stage(&self.points[index].scene, progress)?;
-                renderer.replace(&stage);
-                let stop = || progress.is_cancelled();
-                let frames = timing::time_round(renderer, &stage, self.views, self.options.warm_up, since, &stop)?;
+                let time = |contestant: &mut dyn Contestant, progress: &mut dyn Progress| {
+                    let stop = || progress.is_cancelled();
+                    timing::time_round(contestant, self.views, self.options.warm_up, since, &stop)
+                };
+                let frames = contestants.with(&self.points[index], progress, time)?;
                 let Some(frames) = frames else { return Err(self.interrupted()) };
                 self.report.points[index].rounds.push(Round { forward, frames });
                 progress.advance(1);
@@ -470,23 +526,4 @@ fn point_record(point: &Point) -> PointRecord {
         settings: point.settings.iter().cloned().collect::<BTreeMap<_, _>>(),
         ..PointRecord::default()
     }
-}
-
-/// What the last frame drew.
-fn counts(renderer: &mut Renderer) -> PictureRecord {
-    let world = renderer.app().sub_app(RenderApp).world();
-    let mut record = PictureRecord::default();
-    if let Some(forest) = world.get_resource::<ForestStatistics>() {
-        let level = |level: &crate::render::forest::LevelStatistics| LevelCount {
-            name: level.representation.name().to_owned(),
-            trees: level.trees as f64,
-            triangles: level.triangles as f64,
-        };
-        record.levels = forest.levels.iter().map(level).collect();
-    }
-    if let Some(terrain) = world.get_resource::<TerrainStatistics>() {
-        record.tiles = terrain.tiles;
-        record.ground_triangles = terrain.triangles;
-    }
-    record
 }

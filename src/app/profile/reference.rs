@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use super::{error::ProfileError, stages::Stages, views::ProfileView};
 use crate::{
     app::{
-        AppError, LeafModel, LightGroup, ReferenceOptions, RenderedImage, Renderer, View, adapter, reference as trace,
+        AppError, Frame, RenderedImage, Renderer, adapter,
+        reference::{Exposure, Model, Truth},
     },
     measure::Picture,
     progress::Progress,
-    scene::{LocalTime, Overrides, QualityLevel, Scene},
+    scene::{QualityLevel, Scene},
 };
 
 /// What errors are counted from.
@@ -195,35 +196,22 @@ fn trace_all(
     asked: &Asked,
     progress: &mut dyn Progress,
 ) -> Result<Vec<Option<Reference>>, AppError> {
+    let truth = Truth::build(scene, Model::whole(), progress)?;
     let mut files = Vec::with_capacity(views.len());
     for (number, view) in views.iter().enumerate() {
         progress.note(&format!("reference {} of {}: tracing {samples} samples a pixel", number + 1, views.len()));
-        let options = |name: String, samples: u32| ReferenceOptions {
-            scene: scene.clone().into(),
-            out: asked.folder.join(name),
-            at: Some(LocalTime::new(view.instant.fixed_offset())),
-            view: View::Pose(view.pose),
-            size: asked.size,
-            samples,
-            bounces: None,
-            light: LightGroup::All,
-            leaf: LeafModel::default(),
-            fog: true,
-            // An earlier trace of the same scene, light and camera is its cache.
-            resume: true,
-            overrides: Overrides::default(),
-            quiet: true,
+        // An earlier trace of the same scene, light and camera is its cache.
+        let mut trace = |name: String, samples: u32| {
+            let frame = Frame { file: asked.folder.join(name), view: view.view, instant: view.instant };
+            let whole = Exposure { frame: &frame, size: asked.size, samples: 0..samples, total: samples, resume: true };
+            truth.trace(&whole, progress).map(|()| frame.file)
         };
-        let half = if samples > 1 {
-            Some(trace(&options(format!("{}-half.png", view.name), samples / 2), progress)?)
-        } else {
-            None
-        };
-        let whole = options(format!("{}.png", view.name), samples);
+        let half = if samples > 1 { Some(trace(format!("{}-half.png", view.name), samples / 2)?) } else { None };
+        let whole = format!("{}.png", view.name);
         if let Some(half) = &half {
-            go_on_from(half, &whole.out)?;
+            go_on_from(half, &asked.folder.join(&whole))?;
         }
-        let file = trace(&whole, progress)?;
+        let file = trace(whole, samples)?;
         // Of an odd number of samples the first half is smaller, and tells nothing.
         files.push(Some(Reference { file, half: half.filter(|_| samples.is_multiple_of(2)) }));
     }

@@ -12,9 +12,10 @@ use serde::de::DeserializeOwned;
 use crate::{
     app::{
         fly::settings::fields::{Content, Edit, Edited, Field},
-        parse_lighting,
+        parse_lighting, parse_style,
     },
     scene::{Lighting, Overrides, QualityLevel, Scene, SceneError, Transfer, nearest},
+    style::Style,
 };
 
 /// Why a setting cannot be set.
@@ -68,6 +69,8 @@ pub struct SettingInfo {
 /// Which of a scene's values a name means.
 enum Target {
     Levels,
+    /// The style of the images.
+    Style,
     /// A field of the quality.
     Quality(String),
     /// The lighting of these species as a whole, or a field of it.
@@ -171,6 +174,11 @@ pub fn list(scene: &Scene) -> Vec<SettingInfo> {
         value: format!("{} levels", scene.quality.lod_levels().len()),
         expected: "levels as in a scene file: [(draw: \"model\", until: 60), (draw: \"cross\")]".to_owned(),
     });
+    found.push(SettingInfo {
+        name: "style".to_owned(),
+        value: scene.style.name().to_owned(),
+        expected: Style::NAMES.join(", "),
+    });
     found.sort_by(|a, b| a.name.cmp(&b.name));
     found.dedup_by(|a, b| a.name == b.name);
     found
@@ -185,6 +193,10 @@ pub fn set(scene: &mut Scene, name: &str, value: &str) -> Result<(), SettingErro
     let wrong = |expected: String| SettingError::Value { name: name.to_owned(), value: value.to_owned(), expected };
     match target(scene, name)? {
         Target::Levels => scene.quality.levels = from_ron::<Vec<QualityLevel>>(value).map_err(wrong)?,
+        Target::Style => {
+            let style = parse_style(value).map_err(|_| wrong(Style::NAMES.join(", ")))?;
+            Overrides { style: Some(style), ..Overrides::default() }.apply(scene);
+        }
         Target::Quality(field) => {
             let known = edit(&mut scene.quality, &field, value).map_err(wrong)?;
             if !known {
@@ -242,6 +254,9 @@ fn target(scene: &Scene, name: &str) -> Result<Target, SettingError> {
     let all = || (0..scene.species.len()).collect::<Vec<_>>();
     if name == "quality.levels" {
         return Ok(Target::Levels);
+    }
+    if name == "style" {
+        return Ok(Target::Style);
     }
     if let Some(field) = name.strip_prefix("quality.") {
         return Ok(Target::Quality(field.to_owned()));

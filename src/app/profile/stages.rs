@@ -4,10 +4,12 @@ use std::sync::Arc;
 
 use crate::{
     app::{AppError, interrupt},
-    assets::Stage,
+    assets::{Stage, StageError},
     lod::Representation,
     progress::Progress,
+    render::components::CanopyStyle,
     scene::{Quality, QualityLevel, Scene},
+    style::Style,
 };
 
 /// The scenes that were built.
@@ -52,7 +54,7 @@ impl Stages {
             view_distance: scene.quality.view_distance,
             ..default
         };
-        Scene { quality, ..scene.clone() }
+        Scene { quality, style: Style::Photograph, ..scene.clone() }
     }
 
     /// The stage of `scene`. It shares terrain, trees and plants with those that were built before where it can.
@@ -81,7 +83,7 @@ impl Stages {
             surroundings: stage.surroundings,
             observer: stage.observer,
             scene: scene.clone(),
-            style: stage.style.clone(),
+            style: CanopyStyle::new(scene.style.clone()).map_err(StageError::from)?,
         })
     }
 }

@@ -1,7 +1,10 @@
 //! The points of a profile: the scene as written, and what the sweeps make of it.
 
-use super::{error::ProfileError, settings};
-use crate::scene::{QualityLevel, Scene};
+use super::{contestant::Peer, error::ProfileError, settings};
+use crate::{
+    scene::{QualityLevel, Scene},
+    style::Style,
+};
 
 /// The most points of a profile; more are a typing error.
 const MOST_POINTS: usize = 1_000;
@@ -68,11 +71,30 @@ pub struct Point {
     pub settings: Vec<(String, String)>,
     /// The scene with these settings.
     pub scene: Scene,
+    /// Who draws it, if it is not Canopy.
+    pub peer: Option<Peer>,
 }
 
 impl Point {
+    /// The scene as written a second time: how far its time is from the first's tells what a difference of settings is worth.
+    pub fn again(scene: &Scene) -> Self {
+        let settings = vec![("control".to_owned(), "as written".to_owned())];
+        Self { settings, scene: scene.clone(), peer: None }
+    }
+
+    /// The scene as `peer` draws it.
+    pub fn of_peer(scene: &Scene, peer: Peer) -> Self {
+        let scene = Scene { style: Style::Photograph, ..scene.clone() };
+        Self { settings: vec![("renderer".to_owned(), "stock Bevy".to_owned())], scene, peer: Some(peer) }
+    }
+
     /// Its settings for people.
     pub fn label(&self) -> String {
+        match self.settings.as_slice() {
+            [(name, _)] if name == "control" => return "as written, again".to_owned(),
+            [(name, value)] if name == "renderer" => return value.clone(),
+            _ => {}
+        }
         if self.settings.is_empty() {
             return "as written".to_owned();
         }
@@ -126,14 +148,14 @@ pub fn points(scene: &Scene, sweeps: &[Sweep], combination: Combination) -> Resu
             }
         }
     }
-    let mut points = vec![Point { settings: Vec::new(), scene: scene.clone() }];
+    let mut points = vec![Point { settings: Vec::new(), scene: scene.clone(), peer: None }];
     for settings in combined.into_iter().filter(|settings| !settings.is_empty()) {
         let mut changed = scene.clone();
         for (name, value) in &settings {
             settings::set(&mut changed, name, value)?;
         }
         if points.iter().all(|point| point.scene != changed) {
-            points.push(Point { settings, scene: changed });
+            points.push(Point { settings, scene: changed, peer: None });
         }
     }
     if points.len() > MOST_POINTS {

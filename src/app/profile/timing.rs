@@ -5,15 +5,11 @@ use std::{collections::BTreeMap, time::Instant};
 use bevy::{
     app::{App, Last},
     diagnostic::{DiagnosticPath, DiagnosticsStore},
-    ecs::{resource::Resource, system::ResMut},
+    ecs::{resource::Resource, system::ResMut, world::World},
 };
 
-use super::{record::FrameTime, views::ProfileView};
-use crate::{
-    app::{AppError, Renderer},
-    assets::Stage,
-    render::diagnostics::CanopyDiagnosticsPlugin,
-};
+use super::{contestant::Contestant, record::FrameTime, views::ProfileView};
+use crate::{app::AppError, render::diagnostics::CanopyDiagnosticsPlugin};
 
 /// When the main world was done with the frame.
 #[derive(Resource, Default)]
@@ -47,8 +43,8 @@ pub struct DeviceReader {
 impl DeviceReader {
     /// What is new since the last call; several measurements of one frame under one name, as those of the cascades, are
     /// added.
-    pub fn read(&mut self, renderer: &Renderer) -> DeviceFigures {
-        let Some(store) = renderer.world().get_resource::<DiagnosticsStore>() else { return DeviceFigures::new() };
+    pub fn read(&mut self, world: &World) -> DeviceFigures {
+        let Some(store) = world.get_resource::<DiagnosticsStore>() else { return DeviceFigures::new() };
         let mut figures = DeviceFigures::new();
         for diagnostic in store.iter() {
             let path: &DiagnosticPath = diagnostic.path();
@@ -76,10 +72,11 @@ fn passes(figures: &DeviceFigures) -> BTreeMap<String, f64> {
     figures.iter().filter_map(pass).collect()
 }
 
-/// Calls of fragment shaders of the passes of the view, not of the shadow maps; `None` where the device does not count.
-pub fn fragments(figures: &DeviceFigures) -> Option<f64> {
+/// Calls of fragment shaders of the passes of the view, not of the shadow maps, whose names begin with `prefix`; `None` where the device does
+/// not count.
+pub fn fragments(figures: &DeviceFigures, prefix: &str) -> Option<f64> {
     let of_view = |path: &String| {
-        path.ends_with("/fragment_shader_invocations") && path.contains("canopy_") && !path.contains("shadow")
+        path.ends_with("/fragment_shader_invocations") && path.contains(prefix) && !path.contains("shadow")
     };
     let found: Vec<f64> = figures.iter().filter(|(path, _)| of_view(path)).map(|(_, value)| *value).collect();
     (!found.is_empty()).then(|| found.iter().sum())
@@ -89,12 +86,11 @@ pub fn fragments(figures: &DeviceFigures) -> Option<f64> {
 ///
 /// # Errors
 /// [`AppError::Render`].
-pub fn settle(renderer: &mut Renderer, stage: &Stage, first: &ProfileView, warm_up: u32) -> Result<(), AppError> {
-    renderer.set_instant(stage, first.instant);
-    renderer.set_view(&first.view);
+pub fn settle(contestant: &mut dyn Contestant, first: &ProfileView, warm_up: u32) -> Result<(), AppError> {
+    contestant.set_view(first)?;
     let (mut steady, mut tried) = (0, 0);
     while steady <= warm_up && tried < PATIENCE + warm_up {
-        steady = if renderer.update_timed()?.updates == 1 { steady + 1 } else { 0 };
+        steady = if contestant.update()?.updates == 1 { steady + 1 } else { 0 };
         tried += 1;
     }
     Ok(())
@@ -105,17 +101,16 @@ pub fn settle(renderer: &mut Renderer, stage: &Stage, first: &ProfileView, warm_
 /// # Errors
 /// [`AppError::Render`].
 pub fn time_round(
-    renderer: &mut Renderer,
-    stage: &Stage,
+    contestant: &mut dyn Contestant,
     views: &[ProfileView],
     warm_up: u32,
     since: Instant,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Vec<FrameTime>>, AppError> {
     let Some(first) = views.first() else { return Ok(Some(Vec::new())) };
-    settle(renderer, stage, first, warm_up)?;
+    settle(contestant, first, warm_up)?;
     let mut reader = DeviceReader::default();
-    reader.read(renderer);
+    reader.read(contestant.world());
     let mut frames: Vec<FrameTime> = Vec::with_capacity(views.len());
     let mut figures: Vec<DeviceFigures> = Vec::new();
     let mut in_step = true;
@@ -124,16 +119,15 @@ pub fn time_round(
         if stop() {
             return Ok(None);
         }
-        renderer.set_instant(stage, view.instant);
-        renderer.set_view(&view.view);
-        let mut time = renderer.update_timed()?;
+        contestant.set_view(view)?;
+        let mut time = contestant.update()?;
         if time.updates > 1 {
             // It waited for a pipeline, which is there now. The device's figures no longer fall on the frames they are of.
-            time = renderer.update_timed()?;
+            time = contestant.update()?;
             in_step = false;
         }
-        let main = renderer.world().get_resource::<MainWorldDone>().and_then(|done| done.0);
-        figures.push(reader.read(renderer));
+        let main = contestant.world().get_resource::<MainWorldDone>().and_then(|done| done.0);
+        figures.push(reader.read(contestant.world()));
         frames.push(FrameTime {
             start: milliseconds(since, time.began),
             frame: milliseconds(time.began, time.finished),
@@ -144,8 +138,8 @@ pub fn time_round(
         });
     }
     for _ in 0..LATENCY {
-        renderer.update_timed()?;
-        figures.push(reader.read(renderer));
+        contestant.update()?;
+        figures.push(reader.read(contestant.world()));
     }
     for (frame, figures) in frames.iter_mut().zip(figures.iter().skip(LATENCY)).filter(|_| in_step) {
         frame.passes = passes(figures);

@@ -1,0 +1,55 @@
+//! What a film on disk needs besides its samples to become an image.
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use super::{AppError, RenderedImage, tone::tone_table};
+use crate::{
+    light::ScotopicTint,
+    reference::{DisplayTransform, Film},
+};
+
+/// How a film is shown, and what it is of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FilmNotes {
+    /// Samples per pixel of the whole image.
+    pub total: u32,
+    /// From nits to display values.
+    pub exposure: f32,
+    /// Colour, amount and strength of night vision.
+    pub night: ([f32; 3], f32, f32),
+    /// The text of a PNG: keyword and value.
+    pub text: Vec<(String, String)>,
+}
+
+impl FilmNotes {
+    /// The bytes to keep.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        // Numbers, strings and lists of them can always be written.
+        serde_json::to_vec(self).unwrap_or_default()
+    }
+
+    /// Reads them back; `None` for bytes that are none.
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        serde_json::from_slice(bytes).ok()
+    }
+
+    /// `film` as a screen shows it.
+    ///
+    /// # Errors
+    /// [`AppError::Reference`].
+    pub fn image(&self, film: &Film) -> Result<RenderedImage, AppError> {
+        let table = tone_table()?;
+        let (tint, amount, strength) = self.night;
+        let night = ScotopicTint { tint: Vec3::from_array(tint), amount, strength };
+        let transform = DisplayTransform { exposure: self.exposure, night, tone: Some(&table), dither: true };
+        let (width, height) = film.size();
+        Ok(RenderedImage { width, height, pixels: film.display(&transform) })
+    }
+
+    /// The text of a PNG of `film`.
+    pub fn text_of(&self, film: &Film) -> Vec<(&str, String)> {
+        let own = self.text.iter().map(|(keyword, value)| (keyword.as_str(), value.clone()));
+        own.chain([("Samples", film.samples().to_string())]).collect()
+    }
+}
