@@ -489,7 +489,7 @@ pub struct Profile {
     /// Draw the same trees and ground with another renderer too. stock: Bevy without Canopy, as its users would build it.
     #[arg(long, value_enum, value_name = "RENDERER")]
     pub against: Option<PeerChoice>,
-    /// The most trees that the renderer of --against draws, those nearest to the views.
+    /// The most trees that the renderer of --against draws: those nearest in the views.
     #[arg(long, value_name = "NUMBER", default_value_t = 100_000, requires = "against")]
     pub peer_trees: usize,
     /// What is measured, and how.

@@ -30,7 +30,7 @@ use crate::{
 /// A renderer of another kind, to compare with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Peer {
-    /// The most trees that it draws: those nearest to the views.
+    /// The most trees that it draws: those that are nearest in the views.
     pub most_trees: usize,
 }
 
@@ -232,20 +232,45 @@ impl Contestant for Stock {
     }
 }
 
-/// The `most` trees of `stage` that are nearest to any of `views`.
+/// `most` trees of `stage`: of each of `views` in turn the nearest one in its picture that is not there yet, and then those nearest to
+/// the first view.
 fn nearest(stage: &Stage, views: &[ProfileView], most: usize) -> Vec<PackedTree> {
     let (trees, grid) = (&stage.stand.trees, &stage.stand.grid);
     if trees.len() <= most {
         return trees.clone();
     }
-    let distance = |tree: &PackedTree| {
-        let position = tree.position(grid);
-        views.iter().map(|view| view.view.position.distance_squared(position)).fold(f64::INFINITY, f64::min)
+    let by_distance = |view: &ProfileView, seen: bool| {
+        let (camera, forward) = (view.view.position, view.view.forward());
+        // The corners of an image as wide as two screens.
+        let least = (2.0 * (0.5 * view.view.field_of_view).tan()).atan().cos();
+        let found = trees.iter().zip(0..).filter_map(|(tree, index): (&PackedTree, usize)| {
+            let to = tree.position(grid) - camera;
+            (!seen || to.dot(forward) >= least * to.length()).then(|| (to.length_squared(), index))
+        });
+        let mut found: Vec<(f64, usize)> = found.collect();
+        found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        found.truncate(most);
+        found.into_iter().map(|(_, index)| index)
     };
-    let mut by_distance: Vec<(f64, usize)> = trees.iter().map(distance).zip(0..).collect();
-    by_distance.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    by_distance.truncate(most);
-    by_distance.into_iter().map(|(_, index)| trees[index]).collect()
+    let mut in_view: Vec<_> = views.iter().map(|view| by_distance(view, true)).collect();
+    let mut taken = vec![false; trees.len()];
+    let mut chosen = Vec::with_capacity(most);
+    while chosen.len() < most {
+        let before = chosen.len();
+        for view in &mut in_view {
+            if let Some(index) = view.find(|index| !taken[*index]).filter(|_| chosen.len() < most) {
+                taken[index] = true;
+                chosen.push(index);
+            }
+        }
+        if chosen.len() == before {
+            break;
+        }
+    }
+    let rest = views.first().into_iter().flat_map(|view| by_distance(view, false));
+    let missing = most - chosen.len();
+    chosen.extend(rest.filter(|index| !taken[*index]).take(missing));
+    chosen.into_iter().map(|index| trees[index]).collect()
 }
 
 /// The distances at which each plant's full model gives way to crosses: those of a tree of its mean height. Canopy has them for

@@ -523,6 +523,7 @@ fn view_record(view: &ProfileView) -> ViewRecord {
 fn point_record(point: &Point) -> PointRecord {
     PointRecord {
         label: point.label(),
+        peer: point.peer.is_some(),
         settings: point.settings.iter().cloned().collect::<BTreeMap<_, _>>(),
         ..PointRecord::default()
     }

@@ -106,6 +106,9 @@ pub struct PointRecord {
     pub label: String,
     /// Settings by name; none for the scene as written.
     pub settings: BTreeMap<String, String>,
+    /// Whether another renderer drew it. It is not compared with the others for the front.
+    #[serde(default)]
+    pub peer: bool,
     /// Why it could not be measured, if it could not.
     pub fault: Option<String>,
     /// One entry for each round that was timed.

@@ -8,10 +8,19 @@ use crate::{
         AppError, Frame, RenderedImage, Renderer, adapter,
         reference::{Exposure, Model, Truth},
     },
+    assets::Stage,
+    bake::BakedPlant,
+    lod::level_distance::{NOMINAL_FIELD_OF_VIEW, NOMINAL_HEIGHT},
     measure::Picture,
     progress::Progress,
     scene::{QualityLevel, Scene},
 };
+
+/// The most triangles of a whole forest that the reference `full` draws in each frame, whatever their size.
+const MOST_TRIANGLES: usize = 100_000_000;
+/// Height in pixels of the smallest trees that it draws as full models in larger forests. Crosses of that size are as near to a
+/// supersampled full model as full models with the usual samples are (docs/measurements/levels-of-detail.md).
+const LEAST_PIXELS: f32 = 20.0;
 
 /// What errors are counted from.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -56,8 +65,10 @@ impl ReferenceKind {
         match self {
             Self::None => String::new(),
             Self::Full { supersampling } => format!(
-                "full models at any distance, terrain error 0.25 pixels, {supersampling}x{supersampling} times 4 samples a \
-                 pixel; the rest as the scene says"
+                "full models at any distance (in a forest of more than {} million triangles: to where a tree of {NOMINAL_HEIGHT} m \
+                 is {LEAST_PIXELS} pixels high), terrain error 0.25 pixels, {supersampling}x{supersampling} times 4 samples a \
+                 pixel; the rest as the scene says",
+                MOST_TRIANGLES / 1_000_000
             ),
             Self::Traced { samples } => format!("path tracer, {samples} samples a pixel"),
             Self::Folder(_) => "given images".to_owned(),
@@ -87,6 +98,21 @@ pub fn full_scene(scene: &Scene) -> Scene {
     full.quality.msaa = 4;
     full.quality.terrain_error = 0.25;
     full
+}
+
+/// Triangles of all trees of `stage` as full models.
+fn triangles(stage: &Stage) -> usize {
+    let of_plant = |baked: &BakedPlant| baked.plant.parts.iter().map(|part| part.mesh.triangles.len()).sum();
+    let plants: Vec<usize> = stage.plants.iter().map(of_plant).collect();
+    stage.stand.trees.iter().filter_map(|tree| plants.get(usize::from(tree.variant()))).sum()
+}
+
+/// Full models of trees of at least [`LEAST_PIXELS`] in an image of `rows` rows, and crosses beyond.
+fn largest_full(rows: u32) -> Vec<QualityLevel> {
+    let focal_pixels = 0.5 * rows as f32 / (0.5 * NOMINAL_FIELD_OF_VIEW).tan();
+    let until = NOMINAL_HEIGHT * focal_pixels / LEAST_PIXELS;
+    let level = |draw: &str, until: f32| QualityLevel { draw: draw.to_owned(), until: until.into(), fade: 20.0 };
+    vec![level("model", until), level("cross", 0.0)]
 }
 
 /// Makes the references of `views` in `folder`, or finds them there; returns the file of each view, none without a
@@ -161,7 +187,12 @@ fn draw_full(
     let missing: Vec<&ProfileView> =
         views.iter().filter(|view| !RenderedImage::is_stored(&file(view), asked.size, &notes(view))).collect();
     if !missing.is_empty() {
-        let stage = stages.stage(&full_scene(scene), progress)?;
+        let mut full = full_scene(scene);
+        let mut stage = stages.stage(&full, progress)?;
+        if triangles(&stage) > MOST_TRIANGLES {
+            full.quality.levels = largest_full(asked.size.1);
+            stage = stages.stage(&full, progress)?;
+        }
         progress.begin("Reference: full models", missing.len() as u64);
         let mut renderer = Renderer::new(size, asked.adapter, 4)?;
         renderer.replace(&stage);

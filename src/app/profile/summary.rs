@@ -12,7 +12,8 @@ pub fn summarize(report: &mut ProfileReport) {
         point.summary = summary(point);
         point.summary.ratio = if index == 0 { None } else { ratio(&point.rounds, &baseline) };
     }
-    let known = |point: &PointRecord| Some((point.summary.frame?.p50, point.summary.error?));
+    // Another renderer may draw fewer trees, and has other settings.
+    let known = |point: &PointRecord| Some((point.summary.frame?.p50, point.summary.error?)).filter(|_| !point.peer);
     let coordinates: Vec<(f64, f64)> =
         report.points.iter().map(|point| known(point).unwrap_or((f64::NAN, f64::NAN))).collect();
     let on_front = pareto_front(&coordinates);
