@@ -483,6 +483,9 @@ pub struct Profile {
     /// Print the names of all settings with their values and exit.
     #[arg(long)]
     pub list_settings: bool,
+    /// Measure only the i-th of n pieces of the settings, and the scene as written, so that several machines share a sweep.
+    #[arg(long, value_name = "i/n", value_parser = parse_part)]
+    pub chunk: Option<Part>,
     /// Measure the scene as written a second time: its ratio to the first says what a difference is worth.
     #[arg(long)]
     pub control: bool,

@@ -212,6 +212,7 @@ pub fn profile_options(profile: &Profile, common: &Common) -> Result<ProfileOpti
     Ok(ProfileOptions {
         sweeps: profile.sweep.clone(),
         combination: if profile.each { Combination::Each } else { Combination::All },
+        part: profile.chunk,
         control: profile.control,
         against: profile.against.map(|PeerChoice::Stock| Peer { most_trees: profile.peer_trees }),
         shown: profile.pictures,
@@ -260,6 +261,7 @@ fn measured(scene: &Path, out: &Path, measured: &Measured, common: &Common) -> R
         out: out.to_owned(),
         sweeps: Vec::new(),
         combination: Combination::All,
+        part: None,
         control: false,
         against: None,
         views,

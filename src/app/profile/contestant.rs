@@ -4,6 +4,8 @@ use std::{ops::Range, sync::Arc};
 
 use bevy::{ecs::world::World, render::settings::WgpuSettings};
 
+use chrono::{DateTime, Utc};
+
 use super::{
     machine,
     record::{LevelCount, Memory, PictureRecord},
@@ -17,14 +19,16 @@ use crate::{
     },
     assets::Stage,
     bake::BakedPlant,
-    light::{Atmosphere, AtmosphereParams},
+    light::{Atmosphere, AtmosphereParams, LightState},
     lod::level_distance::{NOMINAL_FIELD_OF_VIEW, NOMINAL_HEIGHT},
     render::{
         exposure::{CameraExposure, StandTotals},
         forest::{ForestStatistics, LevelStatistics},
+        frame_work::FrameWork,
         terrain::TerrainStatistics,
     },
     scatter::PackedTree,
+    scene::Viewpoint,
 };
 
 /// A renderer of another kind, to compare with.
@@ -43,7 +47,7 @@ pub trait Contestant {
     ///
     /// # Errors
     /// [`AppError::Light`].
-    fn set_view(&mut self, view: &ProfileView) -> Result<(), AppError>;
+    fn set_view(&mut self, view: &Viewpoint, instant: DateTime<Utc>) -> Result<(), AppError>;
 
     /// Draws a frame and waits until the device has finished it.
     ///
@@ -63,7 +67,7 @@ pub trait Contestant {
     /// What the names of its passes have in common.
     fn pass_prefix(&self) -> &'static str;
 
-    /// What the last frame drew.
+    /// What the last frame drew, and the processor's work since the last call.
     fn counts(&self) -> PictureRecord {
         PictureRecord::default()
     }
@@ -89,9 +93,9 @@ impl<'a> Canopy<'a> {
 }
 
 impl Contestant for Canopy<'_> {
-    fn set_view(&mut self, view: &ProfileView) -> Result<(), AppError> {
-        self.renderer.set_instant(self.stage, view.instant);
-        self.renderer.set_view(&view.view);
+    fn set_view(&mut self, view: &Viewpoint, instant: DateTime<Utc>) -> Result<(), AppError> {
+        self.renderer.set_instant(self.stage, instant);
+        self.renderer.set_view(view);
         Ok(())
     }
 
@@ -126,6 +130,10 @@ impl Contestant for Canopy<'_> {
             record.tiles = terrain.tiles;
             record.ground_triangles = terrain.triangles;
         }
+        if let Some(work) = world.get_resource::<FrameWork>() {
+            let [bytes, calls, _, _] = work.take();
+            (record.uploaded_bytes, record.forest_calls) = (Some(bytes), Some(calls));
+        }
         record
     }
 }
@@ -137,6 +145,8 @@ pub struct Stock {
     totals: StandTotals,
     atmosphere: Atmosphere,
     trees: usize,
+    /// The light that was computed last: stock Bevy has no sky to compute it from, and no frame pays for it.
+    light: Option<(DateTime<Utc>, Arc<LightState>)>,
 }
 
 impl Stock {
@@ -180,11 +190,12 @@ impl Stock {
             totals: StandTotals::of(&stage.stand, &stage.plants),
             atmosphere: Atmosphere::new(AtmosphereParams::with_visibility_km(sun.visibility_km))?,
             trees: trees.len(),
+            light: None,
             stage,
         };
         // Meshes, textures and shaders reach the device.
         if let Some(first) = views.first() {
-            stock.set_view(first)?;
+            stock.set_view(&first.view, first.instant)?;
             for _ in 0..FIRST_UPDATES {
                 stock.update()?;
             }
@@ -200,13 +211,17 @@ impl Stock {
 }
 
 impl Contestant for Stock {
-    fn set_view(&mut self, view: &ProfileView) -> Result<(), AppError> {
-        let light = Arc::new(self.stage.sun(view.instant).light(&self.atmosphere)?);
+    fn set_view(&mut self, view: &Viewpoint, instant: DateTime<Utc>) -> Result<(), AppError> {
+        let light = match &self.light {
+            Some((of, light)) if *of == instant => light.clone(),
+            _ => Arc::new(self.stage.sun(instant).light(&self.atmosphere)?),
+        };
+        self.light = Some((instant, light.clone()));
         // As bright as Canopy shows it.
         let exposure = CameraExposure::new(light.clone(), self.totals);
-        let exposure = exposure.at(&self.stage.ground(), view.view.position);
+        let exposure = exposure.at(&self.stage.ground(), view.position);
         self.renderer.set_light(&light, exposure.ev100);
-        self.renderer.set_view(&view.view);
+        self.renderer.set_view(view);
         Ok(())
     }
 

@@ -116,6 +116,7 @@ pub fn points(report: &ProfileReport) -> Vec<u8> {
         "Popping",
         "Triangles",
         "Draws",
+        "UploadedBytes",
         "FragmentsPerPixel",
         "DeviceBytes",
         "ProgramBytes",
@@ -156,8 +157,8 @@ pub fn points(report: &ProfileReport) -> Vec<u8> {
             number(found.excess_change, 6),
             number(found.popping, 6),
             number(found.triangles, 0),
-            // Nothing counts draw calls.
-            MISSING.to_owned(),
+            number(found.forest_calls, 1),
+            number(found.uploaded_bytes, 0),
             number(found.fragments_per_pixel, 3),
             bytes(point.memory.device),
             bytes(point.memory.program),

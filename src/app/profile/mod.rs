@@ -51,7 +51,7 @@ use self::{
     sweep::{Point, points},
     views::ProfileView,
 };
-use super::{AppError, Renderer, adapter, compare::read_image, compare::save_map, fingerprint::fingerprint};
+use super::{AppError, Part, Renderer, adapter, compare::read_image, compare::save_map, fingerprint::fingerprint};
 use crate::{
     files,
     measure::{ComparisonSettings, PIXELS_PER_DEGREE, Picture, change, compare},
@@ -71,6 +71,8 @@ pub struct ProfileOptions {
     pub sweeps: Vec<Sweep>,
     /// How several sweeps go together.
     pub combination: Combination,
+    /// Measure this part of the settings alone, and the scene as written.
+    pub part: Option<Part>,
     /// Whether the scene as written is measured a second time, as a check of what differences are worth.
     pub control: bool,
     /// Another renderer to compare with.
@@ -171,6 +173,12 @@ pub(super) fn profile_of(
     progress: &mut dyn Progress,
 ) -> Result<(ProfileReport, ReportFiles), AppError> {
     let mut points = points(&scene, &options.sweeps, options.combination)?;
+    if let Some(part) = options.part {
+        // Each part has the scene as written, which the others are compared with.
+        let share = part.range(points.len() as u32 - 1);
+        let wanted = |index: usize| index == 0 || share.contains(&(index as u32 - 1));
+        points = points.into_iter().enumerate().filter(|(index, _)| wanted(*index)).map(|(_, point)| point).collect();
+    }
     if options.control {
         points.insert(1, Point::again(&scene));
     }
@@ -373,12 +381,17 @@ impl<'a> Work<'a> {
             if progress.is_cancelled() {
                 return Err(self.interrupted());
             }
-            contestant.set_view(view)?;
-            contestant.update()?;
+            contestant.counts();
+            contestant.set_view(&view.view, view.instant)?;
+            let updates = contestant.update()?.updates;
             let image = contestant.read()?;
             let file = folder.join(format!("{}.png", view.name));
             image.save(&file, &[("Settings", self.points[index].label())])?;
             let mut record = contestant.counts();
+            if updates > 1 {
+                // It waited for a pipeline, and was drawn several times.
+                (record.forest_calls, record.uploaded_bytes) = (None, None);
+            }
             record.file = relative(&file, &self.options.out);
             let comparable = self.is_comparable(index);
             if let Some(Reference { file: reference, half }) = self.references[number].as_ref().filter(|_| comparable) {
@@ -523,7 +536,7 @@ fn view_record(view: &ProfileView) -> ViewRecord {
 fn point_record(point: &Point) -> PointRecord {
     PointRecord {
         label: point.label(),
-        peer: point.peer.is_some(),
+        beside: point.is_beside(),
         settings: point.settings.iter().cloned().collect::<BTreeMap<_, _>>(),
         ..PointRecord::default()
     }

@@ -106,9 +106,9 @@ pub struct PointRecord {
     pub label: String,
     /// Settings by name; none for the scene as written.
     pub settings: BTreeMap<String, String>,
-    /// Whether another renderer drew it. It is not compared with the others for the front.
+    /// Whether it takes no part in the front: another renderer, or the control.
     #[serde(default)]
-    pub peer: bool,
+    pub beside: bool,
     /// Why it could not be measured, if it could not.
     pub fault: Option<String>,
     /// One entry for each round that was timed.
@@ -163,6 +163,12 @@ pub struct PictureRecord {
     pub ground_triangles: usize,
     /// Calls of fragment shaders of the passes of the view, per pixel.
     pub fragments_per_pixel: Option<f64>,
+    /// Draw calls and dispatches that were recorded for forests, in the view and in the shadow maps.
+    #[serde(default)]
+    pub forest_calls: Option<u64>,
+    /// Bytes that were written to the device for forests.
+    #[serde(default)]
+    pub uploaded_bytes: Option<u64>,
     /// Against the reference.
     pub error: Option<Comparison>,
     /// Since the view before, beside the reference.
@@ -215,6 +221,12 @@ pub struct PointSummary {
     pub triangles: Option<f64>,
     /// Mean calls of fragment shaders per pixel.
     pub fragments_per_pixel: Option<f64>,
+    /// Mean draw calls and dispatches of forests.
+    #[serde(default)]
+    pub forest_calls: Option<f64>,
+    /// Mean bytes written to the device for forests.
+    #[serde(default)]
+    pub uploaded_bytes: Option<f64>,
     /// Mean FLIP over the views.
     pub error: Option<f64>,
     /// Mean FLIP of the worst view.

@@ -258,3 +258,19 @@ fn go_on_from(half: &Path, whole: &Path) -> Result<(), AppError> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn full_models_of_a_large_forest_end_where_trees_have_few_pixels() {
+        let levels = largest_full(720);
+        // A tree of 20 m, 20 pixels high: as many metres away as the focal length has pixels.
+        assert!(
+            (levels[0].until - 772.0).abs() < 1.0 && levels[0].draw == "model" && levels[1].draw == "cross",
+            "{levels:?}"
+        );
+        assert!((2.0 * levels[0].until - largest_full(1440)[0].until).abs() < 1e-2);
+    }
+}

@@ -12,8 +12,8 @@ pub fn summarize(report: &mut ProfileReport) {
         point.summary = summary(point);
         point.summary.ratio = if index == 0 { None } else { ratio(&point.rounds, &baseline) };
     }
-    // Another renderer may draw fewer trees, and has other settings.
-    let known = |point: &PointRecord| Some((point.summary.frame?.p50, point.summary.error?)).filter(|_| !point.peer);
+    // The scene twice has one place on the front, and another renderer, which may draw fewer trees, none.
+    let known = |point: &PointRecord| Some((point.summary.frame?.p50, point.summary.error?)).filter(|_| !point.beside);
     let coordinates: Vec<(f64, f64)> =
         report.points.iter().map(|point| known(point).unwrap_or((f64::NAN, f64::NAN))).collect();
     let on_front = pareto_front(&coordinates);
@@ -74,6 +74,8 @@ fn summary(point: &PointRecord) -> PointSummary {
         levels: mean_levels(point),
         triangles: over(pictures.iter().map(|picture| count(&picture.levels, picture.ground_triangles)).collect()),
         fragments_per_pixel: over(pictures.iter().filter_map(|picture| picture.fragments_per_pixel).collect()),
+        forest_calls: over(pictures.iter().filter_map(|picture| Some(picture.forest_calls? as f64)).collect()),
+        uploaded_bytes: over(pictures.iter().filter_map(|picture| Some(picture.uploaded_bytes? as f64)).collect()),
         error: error(|error| Some(error.flip.mean)),
         worst_error: errors.iter().map(|error| error.flip.mean).max_by(f64::total_cmp),
         filtered_error: [

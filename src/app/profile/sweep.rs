@@ -9,6 +9,10 @@ use crate::{
 /// The most points of a profile; more are a typing error.
 const MOST_POINTS: usize = 1_000;
 
+/// Names of what is compared with the settings.
+const CONTROL: &str = "control";
+const RENDERER: &str = "renderer";
+
 /// Values of one setting: `quality.near_distance=20,60,120`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Sweep {
@@ -78,21 +82,26 @@ pub struct Point {
 impl Point {
     /// The scene as written a second time: how far its time is from the first's tells what a difference of settings is worth.
     pub fn again(scene: &Scene) -> Self {
-        let settings = vec![("control".to_owned(), "as written".to_owned())];
+        let settings = vec![(CONTROL.to_owned(), "as written".to_owned())];
         Self { settings, scene: scene.clone(), peer: None }
     }
 
     /// The scene as `peer` draws it.
     pub fn of_peer(scene: &Scene, peer: Peer) -> Self {
         let scene = Scene { style: Style::Photograph, ..scene.clone() };
-        Self { settings: vec![("renderer".to_owned(), "stock Bevy".to_owned())], scene, peer: Some(peer) }
+        Self { settings: vec![(RENDERER.to_owned(), "stock Bevy".to_owned())], scene, peer: Some(peer) }
+    }
+
+    /// Whether it is no setting of this renderer, but the control or a peer.
+    pub fn is_beside(&self) -> bool {
+        self.peer.is_some() || self.settings.iter().any(|(name, _)| name == CONTROL)
     }
 
     /// Its settings for people.
     pub fn label(&self) -> String {
         match self.settings.as_slice() {
-            [(name, _)] if name == "control" => return "as written, again".to_owned(),
-            [(name, value)] if name == "renderer" => return value.clone(),
+            [(name, _)] if name == CONTROL => return "as written, again".to_owned(),
+            [(name, value)] if name == RENDERER => return value.clone(),
             _ => {}
         }
         if self.settings.is_empty() {

@@ -87,7 +87,7 @@ pub fn fragments(figures: &DeviceFigures, prefix: &str) -> Option<f64> {
 /// # Errors
 /// [`AppError::Render`].
 pub fn settle(contestant: &mut dyn Contestant, first: &ProfileView, warm_up: u32) -> Result<(), AppError> {
-    contestant.set_view(first)?;
+    contestant.set_view(&first.view, first.instant)?;
     let (mut steady, mut tried) = (0, 0);
     while steady <= warm_up && tried < PATIENCE + warm_up {
         steady = if contestant.update()?.updates == 1 { steady + 1 } else { 0 };
@@ -96,7 +96,7 @@ pub fn settle(contestant: &mut dyn Contestant, first: &ProfileView, warm_up: u32
     Ok(())
 }
 
-/// Draws all views once, and returns their times. `stop` is asked before each frame; a round that it ends is `None`.
+/// Draws all views once, each after the frames on the way to it, and returns their times. `stop` is asked before each frame; a round that it ends is `None`.
 ///
 /// # Errors
 /// [`AppError::Render`].
@@ -112,14 +112,20 @@ pub fn time_round(
     let mut reader = DeviceReader::default();
     reader.read(contestant.world());
     let mut frames: Vec<FrameTime> = Vec::with_capacity(views.len());
-    let mut figures: Vec<DeviceFigures> = Vec::new();
+    // Of all updates, and which of them are the views'.
+    let (mut figures, mut updates): (Vec<DeviceFigures>, Vec<usize>) = (Vec::new(), Vec::new());
     let mut in_step = true;
     let milliseconds = |from: Instant, to: Instant| to.saturating_duration_since(from).as_secs_f64() * 1e3;
     for view in views {
         if stop() {
             return Ok(None);
         }
-        contestant.set_view(view)?;
+        for before in &view.lead {
+            contestant.set_view(before, view.instant)?;
+            in_step &= contestant.update()?.updates == 1;
+            figures.push(reader.read(contestant.world()));
+        }
+        contestant.set_view(&view.view, view.instant)?;
         let mut time = contestant.update()?;
         if time.updates > 1 {
             // It waited for a pipeline, which is there now. The device's figures no longer fall on the frames they are of.
@@ -127,6 +133,7 @@ pub fn time_round(
             in_step = false;
         }
         let main = contestant.world().get_resource::<MainWorldDone>().and_then(|done| done.0);
+        updates.push(figures.len());
         figures.push(reader.read(contestant.world()));
         frames.push(FrameTime {
             start: milliseconds(since, time.began),
@@ -141,7 +148,8 @@ pub fn time_round(
         contestant.update()?;
         figures.push(reader.read(contestant.world()));
     }
-    for (frame, figures) in frames.iter_mut().zip(figures.iter().skip(LATENCY)).filter(|_| in_step) {
+    for (frame, update) in frames.iter_mut().zip(updates).filter(|_| in_step) {
+        let Some(figures) = figures.get(update + LATENCY) else { continue };
         frame.passes = passes(figures);
         frame.gpu = (!frame.passes.is_empty()).then(|| frame.passes.values().sum());
     }

@@ -7,6 +7,10 @@ use crate::{
     scene::{LocalTime, Path, Pose, Scene, Viewpoint},
 };
 
+/// Frames that are drawn on the way to each view of a flight, and the seconds between them.
+const LEAD: u32 = 2;
+const LEAD_STEP: f64 = 1.0 / 60.0;
+
 /// Which views a profile has.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Views {
@@ -41,6 +45,9 @@ pub struct ProfileView {
     pub pose: Pose,
     /// The camera over the ground.
     pub view: Viewpoint,
+    /// The cameras of the frames before it, so that what is kept from frame to frame is kept as in a flight: shadow maps would
+    /// all be stale after a jump along the path.
+    pub lead: Vec<Viewpoint>,
     /// Date and time.
     pub instant: DateTime<Utc>,
 }
@@ -56,7 +63,7 @@ impl Views {
             Self::Flight { frames: 0, .. } => return Err(PlanError::Nothing),
             Self::Flight { frames, fps, from, at } => {
                 let at = at.unwrap_or(scene.place.time);
-                match path {
+                match &path {
                     None if from.is_some() => return Err(PlanError::NoPath(scene.name.clone())),
                     None => vec![(None, scene.camera.start, at); *frames as usize],
                     Some(path) => {
@@ -85,12 +92,20 @@ impl Views {
             return Err(PlanError::Nothing);
         }
         let view = |(number, (seconds, pose, at)): (usize, (Option<f64>, Pose, LocalTime))| {
-            let (x, _, z) = pose.position;
+            let over_ground = |pose: Pose| {
+                let (x, _, z) = pose.position;
+                pose.viewpoint(ground(x, z), scene.camera.field_of_view)
+            };
+            let before = |(path, seconds): (&Path, f64)| {
+                let earlier = |number: u32| (seconds - f64::from(number) * LEAD_STEP).max(path.start());
+                (1..=LEAD).rev().map(|number| over_ground(path.at(earlier(number)))).collect()
+            };
             ProfileView {
                 name: format!("{number:04}"),
                 seconds,
                 pose,
-                view: pose.viewpoint(ground(x, z), scene.camera.field_of_view),
+                view: over_ground(pose),
+                lead: path.as_ref().zip(seconds).map(before).unwrap_or_default(),
                 instant: at.utc(),
             }
         };
@@ -100,5 +115,29 @@ impl Views {
     /// Whether neighbouring views follow each other in time, so that their change says something.
     pub fn is_flight(&self) -> bool {
         matches!(self, Self::Flight { .. })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn views_of_a_flight_are_reached_in_flight_and_stills_at_once() -> Result<(), Box<dyn std::error::Error>> {
+        let text = "(terrain: Flat(), place: (latitude: 47, longitude: 9, time: \"2026-06-21T12:00+02:00\"), camera: (path: [(seconds: \
+                    0, position: (0, 10, 0), yaw: 0, pitch: 0), (seconds: 10, position: (600, 10, 0), yaw: 0, pitch: 0)]))";
+        let scene = Scene::parse(text, "test.ron".as_ref())?;
+        let flight = Views::Flight { frames: 3, fps: None, from: None, at: None };
+        let views = flight.of(&scene, &|_, _| 0.0)?;
+        let east = |view: &Viewpoint| view.position.x;
+        let places: Vec<f64> = views.iter().map(|view| east(&view.view)).collect();
+        assert!(places.iter().zip([0.0, 300.0, 600.0]).all(|(place, expected)| (place - expected).abs() < 1e-6));
+        // The camera has its speed of the middle of the path when it passes there.
+        let lead: Vec<f64> = views[1].lead.iter().map(|view| places[1] - east(view)).collect();
+        assert!(lead.len() == 2 && lead[0] > lead[1] && lead[1] > 0.5 && lead[0] < 4.0, "{lead:?}");
+        assert!(views[0].lead.iter().all(|view| east(view) == 0.0), "nothing is before the path");
+        let still = Views::Stills { cameras: vec![scene.camera.start], times: Vec::new() };
+        assert!(still.of(&scene, &|_, _| 0.0)?.iter().all(|view| view.lead.is_empty()));
+        Ok(())
     }
 }
