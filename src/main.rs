@@ -31,6 +31,10 @@ fn run(arguments: Arguments) -> Outcome {
             Ok(options) => trace_reference(&options).into(),
             Err(error) => Outcome::Usage(error),
         },
+        Some(Command::Export(export)) => match cli::export_options(export, &common) {
+            Ok(options) => export_forest(&options, common.quiet).into(),
+            Err(error) => Outcome::Usage(error),
+        },
         Some(Command::Merge(merge)) => merge_films(&cli::merge_options(merge), common.quiet).into(),
         Some(Command::Bake(bake)) => match cli::baked_scene(&bake, &common) {
             Some((scene, overrides)) => bake_plants(&scene, &overrides, common.quiet).into(),
@@ -87,6 +91,24 @@ fn trace_reference(options: &canopy::app::ReferenceOptions) -> anyhow::Result<()
         return Ok(());
     }
     cli::print_lines(files.iter().map(|file| file.display()))
+}
+
+fn export_forest(options: &canopy::app::ExportOptions, quiet: bool) -> anyhow::Result<()> {
+    canopy::app::listen_to_interrupts()?;
+    let mut bars = Bars::new(quiet);
+    let report = canopy::app::export(options, &mut bars)?;
+    drop(bars);
+    if quiet {
+        return Ok(());
+    }
+    cli::print_lines([format!(
+        "{}: {} trees of {} plants, {} triangles of ground, {:.1} MB",
+        options.out.display(),
+        report.trees,
+        report.plants,
+        report.ground_triangles,
+        report.bytes as f64 / 1e6
+    )])
 }
 
 fn merge_films(options: &canopy::app::MergeOptions, quiet: bool) -> anyhow::Result<()> {

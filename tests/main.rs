@@ -6,6 +6,7 @@ mod app;
 mod bake;
 mod cli;
 mod compare;
+mod export;
 mod front_door;
 mod fuzz;
 mod grow;

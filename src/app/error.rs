@@ -34,6 +34,9 @@ pub enum AppError {
     /// A comparison of images.
     #[error(transparent)]
     Compare(#[from] super::CompareError),
+    /// A scene that cannot be exported.
+    #[error("{0}")]
+    Export(String),
     /// Films that do not fit together.
     #[error(transparent)]
     Merge(#[from] super::MergeError),

@@ -12,9 +12,11 @@ mod bake;
 mod camera;
 mod compare;
 mod error;
+mod export;
 mod film_notes;
 mod fingerprint;
 mod fly;
+mod ground_grid;
 mod headless;
 mod info;
 mod interrupt;
@@ -39,6 +41,7 @@ pub use compare::{
     COMPARE_VERSION, CompareError, CompareOptions, CompareReport, FrameComparison, compare, read_image, save_map,
 };
 pub use error::AppError;
+pub use export::{ExportOptions, ExportReport, export};
 pub use fly::fly;
 pub use headless::{Renderer, UpdateTime, render};
 pub use info::info;

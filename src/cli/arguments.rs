@@ -30,6 +30,7 @@ const DEFAULT_SIZE: &str = "1280x720";
   canopy bake oak.glb --out oak-levels.png
   canopy compare noon.png truth.png
   canopy profile my-valley.ron --sweep quality.near_distance=20,60,120
+  canopy export my-valley.ron --out valley.glb
   canopy info stand.csv
 
 `canopy help render` shows how to render images, sequences and time-lapses."
@@ -92,6 +93,8 @@ pub enum Command {
     Render(Render),
     /// Path-trace the ground truth of a scene on the CPU: slow, but accurate.
     Reference(Reference),
+    /// Write the trees and the ground of a scene as binary glTF, for Blender and other programs.
+    Export(Export),
     /// Make one image of parts of its samples that were traced separately.
     Merge(Merge),
     /// Make the levels of detail of a plant, and show them on a contact sheet; or bake all plants of a scene.
@@ -304,6 +307,30 @@ pub struct Reference {
     /// Continue an earlier trace of the same scene, light and camera; images of a sequence that are finished are kept.
     #[arg(long, visible_alias = "skip-existing")]
     pub resume: bool,
+}
+
+/// Arguments of `canopy export`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  canopy export my-valley.ron --out valley.glb
+  canopy export my-valley.ron --out middle.glb --within 250 --nodes
+Each plant is one mesh. Its trees are instances (EXT_mesh_gpu_instancing), which Blender 3.6 and newer, three.js and others read, or with
+--nodes a node each. +X is east, -Z north; heights are metres above the datum of the terrain.")]
+pub struct Export {
+    /// Scene file.
+    pub scene: PathBuf,
+    /// Binary glTF file to write (.glb).
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Write a node for each tree, for programs that do not know instances; at most 200000 trees.
+    #[arg(long)]
+    pub nodes: bool,
+    /// Leave out the ground.
+    #[arg(long)]
+    pub no_ground: bool,
+    /// Only what is at most so many metres from the middle of the scene, to the east, north, west and south.
+    #[arg(long, value_name = "M", value_parser = parse_positive)]
+    pub within: Option<f64>,
 }
 
 /// Arguments of `canopy merge`.

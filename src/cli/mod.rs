@@ -9,6 +9,6 @@ pub use arguments::{Arguments, Command, Compare, Profile};
 pub use exit::{Outcome, finish, print_lines};
 pub use progress::Bars;
 pub use request::{
-    bake_options, baked_scene, compare_options, fly_options, leaf_options, merge_options, no_command, profile_options,
-    reference_options, render_options, tune_options,
+    bake_options, baked_scene, compare_options, export_options, fly_options, leaf_options, merge_options, no_command,
+    profile_options, reference_options, render_options, tune_options,
 };

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use canopy::{
     app::{
-        BakeOptions, Clock, Combination, CompareOptions, FlyOptions, Goal, LeafImages, LeafModel, LeafOptions,
-        LightGroup, MergeOptions, Output, PIXELS_PER_DEGREE, Peer, ProfileOptions, ReferenceKind, ReferenceOptions,
-        RenderOptions, Still, TuneOptions, View, Views,
+        BakeOptions, Clock, Combination, CompareOptions, ExportOptions, FlyOptions, Goal, LeafImages, LeafModel,
+        LeafOptions, LightGroup, MergeOptions, Output, PIXELS_PER_DEGREE, Peer, ProfileOptions, ReferenceKind,
+        ReferenceOptions, RenderOptions, Still, TuneOptions, View, Views,
     },
     scene::{LocalTime, Overrides, SceneSource},
 };
@@ -14,8 +14,8 @@ use clap::CommandFactory;
 use clap::error::ErrorKind;
 
 use super::arguments::{
-    Arguments, Bake, CameraArguments, Common, Compare, Fly, Leaf, LeafChoice, LightChoice, Measured, Merge, PeerChoice,
-    Profile, Reference, Render, StyleArguments, Tune,
+    Arguments, Bake, CameraArguments, Common, Compare, Export, Fly, Leaf, LeafChoice, LightChoice, Measured, Merge,
+    PeerChoice, Profile, Reference, Render, StyleArguments, Tune,
 };
 
 /// The scene of `canopy fly` without an argument.
@@ -124,6 +124,25 @@ pub fn reference_options(reference: Reference, common: &Common) -> Result<Refere
         resume: reference.resume,
         overrides: overrides(common),
         quiet: common.quiet,
+    })
+}
+
+/// The options of an export.
+///
+/// # Errors
+/// A usage error for a file that does not end in `.glb`.
+pub fn export_options(export: Export, common: &Common) -> Result<ExportOptions, clap::Error> {
+    if !ends_in(&export.out, "glb") {
+        let file = export.out.display();
+        return Err(usage(format!("--out {file}: a forest is exported as binary glTF; the name must end in .glb")));
+    }
+    Ok(ExportOptions {
+        scene: export.scene.into(),
+        out: export.out,
+        nodes: export.nodes,
+        without_ground: export.no_ground,
+        within: export.within,
+        overrides: overrides(common),
     })
 }
 
