@@ -1,6 +1,9 @@
 //! The plants of a scene's species: their individuals, and how each is built.
 
-use std::{ops::Range, path::PathBuf};
+use std::{
+    ops::Range,
+    path::{Path, PathBuf},
+};
 
 use super::StageError;
 use crate::{
@@ -12,7 +15,7 @@ use crate::{
     lod::Representation,
     plant::{
         Gloss, LeafTissue, Plant,
-        gltf::{GltfOptions, load_plant},
+        gltf::{GltfOptions, load_plant, trees_of},
         grow::{GrowParameters, LeafPainting, Rules},
     },
     scatter::packed::MAX_VARIANTS,
@@ -41,6 +44,8 @@ pub enum IndividualSource {
         path: PathBuf,
         /// How to read it.
         options: GltfOptions,
+        /// What the user is told of the choice.
+        note: Option<String>,
     },
 }
 
@@ -57,10 +62,10 @@ impl IndividualSource {
                     .map_err(|source| StageError::Grow { path: from.clone(), source })?;
                 Ok((plant, Vec::new()))
             }
-            Self::Gltf { path, options } => {
+            Self::Gltf { path, options, note } => {
                 let (plant, warnings) = load_plant(path, options)?;
-                let warnings = warnings.iter().map(|warning| format!("{}: {warning}", path.display())).collect();
-                Ok((plant, warnings))
+                let told = note.iter().cloned().chain(warnings.iter().map(ToString::to_string));
+                Ok((plant, told.map(|what| format!("{}: {what}", path.display())).collect()))
             }
         }
     }
@@ -165,13 +170,28 @@ fn sources(species: &Species, gloss: Gloss) -> Result<Vec<IndividualSource>, Sta
                 gloss: Some(gloss),
                 ..GltfOptions::default()
             };
-            files
-                .files
-                .iter()
-                .map(|path| IndividualSource::Gltf { path: path.clone(), options: options.clone() })
-                .collect()
+            let individuals =
+                files.files.iter().map(|path| individuals(path, &options)).collect::<Result<Vec<_>, _>>()?;
+            individuals.into_iter().flatten().collect()
         }
     })
+}
+
+/// The individuals of a file: one, or each of several trees that stand side by side in it.
+fn individuals(path: &Path, options: &GltfOptions) -> Result<Vec<IndividualSource>, StageError> {
+    let trees = if options.node.is_empty() { trees_of(path, options)? } else { Vec::new() };
+    if trees.is_empty() {
+        return Ok(vec![IndividualSource::Gltf { path: path.to_owned(), options: options.clone(), note: None }]);
+    }
+    let note = format!("its {} trees side by side are individuals of their own: {}", trees.len(), trees.join(", "));
+    let mut note = Some(note);
+    let individual = |name: String| IndividualSource::Gltf {
+        path: path.to_owned(),
+        options: GltfOptions { node: vec![name.clone()], name: Some(name), ..options.clone() },
+        // Told once.
+        note: note.take(),
+    };
+    Ok(trees.into_iter().map(individual).collect())
 }
 
 /// Bake settings for a scene's quality and a species' lighting. What is drawn by default is always baked; other

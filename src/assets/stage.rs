@@ -18,7 +18,7 @@ use crate::{
         components::{CanopyStyle, Forest, Ground, SunShadowSettings},
         forest::most_trees,
     },
-    scatter::{CoverMap, PackedStand, PlantSize, ScatterError, bounded_cover_map, packed::DEFAULT_CELL_SIZE},
+    scatter::{CoverMap, PackedStand, PlantSize, ScatterError, Surveys, bounded_cover_map, packed::DEFAULT_CELL_SIZE},
     scene::{self, Lighting, Quality, Scene},
     terrain::Terrain,
 };
@@ -54,6 +54,8 @@ pub struct Stage {
     pub scene: Scene,
     /// The style of its pictures, for the camera that takes them.
     pub style: CanopyStyle,
+    /// The years and variants of its inventory, and which of them is shown.
+    pub surveys: Surveys,
 }
 
 impl Stage {
@@ -131,7 +133,8 @@ impl Stage {
         };
         let suns = scene.species.iter().zip(&species.variants).flat_map(sun).collect();
         let (stand, plants, variants) = (Arc::new(packed), Arc::new(plants), species.variants);
-        Ok(Self { terrain, stand, plants, variants, suns, cover, surroundings, observer, scene: scene.clone(), style })
+        let (scene, surveys) = (scene.clone(), planned.surveys());
+        Ok(Self { terrain, stand, plants, variants, suns, cover, surroundings, observer, scene, style, surveys })
     }
 
     /// Whether `device` can hold the trees, all of which lie in one storage buffer.

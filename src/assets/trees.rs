@@ -17,7 +17,7 @@ use crate::{
     progress::Progress,
     scatter::{
         Allometry, Area, Ground, Inventory, InventorySpecies, PlacementRules, PlantSize, SizeRule, SpeciesRule, Stand,
-        place_surroundings, place_trees, rules::MAX_TREES, stand_from_inventory,
+        Surveys, place_surroundings, place_trees, rules::MAX_TREES, stand_from_inventory,
     },
     scene::{InventoryTrees, ScatteredTrees, Scene, Species, Trees},
     terrain::Terrain,
@@ -101,6 +101,14 @@ impl<'a> StandPlan<'a> {
         match &self.source {
             Source::Inventory(_, inventory, _) => Some(inventory),
             Source::None | Source::Rules(_) => None,
+        }
+    }
+
+    /// The years and variants of the inventory; none without one.
+    pub fn surveys(&self) -> Surveys {
+        match &self.source {
+            Source::Inventory(_, inventory, _) => inventory.surveys.clone(),
+            Source::None | Source::Rules(_) => Surveys::default(),
         }
     }
 

@@ -145,6 +145,7 @@ pub struct StyleArguments {
   F             fly the scene's path
   L             open or close the settings: leaves, view, sun, shadows
   R             load the changed scene file
+  Y V           next year, variant of the inventory; with Shift the one before
   H             show all keys
 
 Keys of the settings, which the mouse changes too:

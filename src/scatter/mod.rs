@@ -33,7 +33,8 @@ pub use allometry::Allometry;
 pub use cover::{CoverMap, bounded_cover_map, cover_map};
 pub use error::{BadValue, ScatterError};
 pub use inventory::{
-    Column, Coordinates, Inventory, InventoryOptions, InventoryTree, LengthUnit, parse_inventory, read_inventory,
+    Column, Coordinates, Inventory, InventoryOptions, InventoryTree, LengthUnit, Surveys, parse_inventory,
+    read_inventory,
 };
 pub use inventory_stand::{InventorySpecies, InventoryStand, InventoryWarnings, stand_from_inventory};
 pub use packed::{Cell, CellGrid, PackedStand, PackedTree, PlantSize};

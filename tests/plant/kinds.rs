@@ -163,7 +163,7 @@ fn hulls_and_ground_are_told_apart_by_name() {
 }
 
 #[test]
-fn trees_side_by_side_are_mentioned() {
+fn trees_side_by_side_are_individuals_of_a_scene_and_mentioned_elsewhere() {
     let bytes = edited(|json| {
         json["nodes"] =
             json!([{"mesh": 0, "name": "Oak A"}, {"mesh": 0, "name": "Oak B", "translation": [9.0, 0.0, 0.0]}]);
@@ -174,6 +174,35 @@ fn trees_side_by_side_are_mentioned() {
     says(&warnings, &["2 trees side by side (Oak A, Oak B)", "node: [\"Oak A\"]"]);
     let one = load_with(&bytes, &GltfOptions { node: vec!["Oak A".to_owned()], ..GltfOptions::default() });
     assert!(triangles(&one.0) == WHOLE && one.1.is_empty(), "{:?}", one.1);
+    // A scene makes an individual of each.
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("oaks.glb");
+    std::fs::write(&file, &bytes).expect("a file");
+    let trees = canopy::plant::gltf::trees_of(&file, &GltfOptions::default()).expect("a plant");
+    assert_eq!(trees, ["Oak A", "Oak B"]);
+    let text = "(terrain: Flat(size: 100), place: (latitude: 48, longitude: 9, time: \"2026-06-21T12:30+01:00\"), species: [(name: \"oak\", \
+                plant: Gltf(files: [\"oaks.glb\"]), height: (9, 12), lighting: Local)], trees: Scattered(stems_per_hectare: 40, \
+                surroundings: 0))";
+    let scene = canopy::scene::Scene::parse(text, &folder.path().join("oaks.ron")).expect("a scene");
+    let stage = canopy::assets::Stage::build(&scene, &mut canopy::progress::Silent).expect("a stage");
+    assert_eq!(stage.variants.first(), Some(&(0..2)));
+    let names: Vec<&str> = stage.plants.iter().map(|baked| baked.plant.name.as_str()).collect();
+    assert_eq!(names, ["Oak A", "Oak B"]);
+    for baked in stage.plants.iter() {
+        let bounds = baked.plant.bounds().expect("triangles");
+        assert!(
+            triangles(&baked.plant) == WHOLE && bounds.min.x.abs() < 6.0 && (bounds.max.y - 10.5).abs() < 0.1,
+            "{bounds:?}"
+        );
+    }
+    // Trees without names of their own stay one plant, and the message says what to do.
+    let nameless = edited(|json| {
+        json["nodes"] = json!([{"mesh": 0, "name": "Oak"}, {"mesh": 0, "name": "Oak", "translation": [9.0, 0.0, 0.0]}]);
+        json["scenes"] = json!([{"nodes": [0, 1]}]);
+    });
+    std::fs::write(&file, &nameless).expect("a file");
+    assert!(canopy::plant::gltf::trees_of(&file, &GltfOptions::default()).expect("a plant").is_empty());
+    says(&load(&nameless).1, &["2 trees side by side", "give each a node with a name of its own"]);
     // The parts of one tree are not.
     let parts = edited(|json| {
         json["nodes"] = json!([{"mesh": 0, "name": "A"}, {"mesh": 0, "name": "B", "translation": [0.5, 0.0, 0.0]}]);

@@ -35,6 +35,10 @@ pub enum Command {
     Home,
     /// Read the scene file again.
     Reload,
+    /// Show the next year of the inventory, or the one before.
+    Year(bool),
+    /// Show the next variant of the inventory, or the one before.
+    Variant(bool),
     /// Move the clock by this many minutes.
     Minutes(i64),
     /// Move the calendar by this many days.
@@ -77,7 +81,7 @@ pub enum PanelInput {
 }
 
 /// All keys and what they do, as the help shows them.
-pub const HELP: [(&str, &str); 21] = [
+pub const HELP: [(&str, &str); 22] = [
     ("W A S D", "fly forward, left, back, right"),
     ("E  Q", "up, down"),
     ("Shift", "five times faster"),
@@ -92,6 +96,7 @@ pub const HELP: [(&str, &str); 21] = [
     ("+  -", "clock speed: stopped, 1x, 60x, 600x, 3600x"),
     ("Home", "return to the start, position and time"),
     ("R", "load the changed scene file; camera and clock stay"),
+    ("Y  V", "next year, variant of the inventory; with Shift the one before"),
     ("U", "allow flight below the ground, or not"),
     ("T", "tint trees by level of detail"),
     ("L", "settings: lighting of the leaves, view, sun and shadows"),
@@ -144,6 +149,8 @@ pub fn command(code: KeyCode, key: &Key, shift: bool, repeat: bool) -> Option<Co
             "o" => Command::Overlay,
             "l" => Command::Settings,
             "r" => Command::Reload,
+            "y" => Command::Year(!shift),
+            "v" => Command::Variant(!shift),
             "," => Command::Minutes(-60),
             "." => Command::Minutes(60),
             "[" => Command::Minutes(-10),

@@ -21,7 +21,7 @@ use bevy::{
     window::{PrimaryWindow, Window},
 };
 
-use super::{session::Session, settings::SettingsPanel};
+use super::{controls::Command, session::Session, settings::SettingsPanel};
 use crate::{
     app::{AppError, FlyOptions, camera},
     assets::StageError,
@@ -140,6 +140,32 @@ pub fn fail(
     }
 }
 
+/// Chooses another year or variant of the inventory; whether there is another.
+pub fn choose(request: &mut Request, session: &mut Session, command: Command) -> bool {
+    let surveys = &session.stage.surveys;
+    let overrides = &mut request.options.overrides;
+    let message = match command {
+        Command::Year(forward) => match surveys.next_year(forward) {
+            Some(year) => {
+                overrides.year = Some(year);
+                Ok(format!("the year {year}"))
+            }
+            None => Err("the trees of this scene are not of several years".to_owned()),
+        },
+        Command::Variant(forward) => match surveys.next_variant(forward) {
+            Some(variant) => {
+                overrides.variant = Some(variant.to_owned());
+                Ok(format!("the variant {variant}"))
+            }
+            None => Err("the trees of this scene have no variants".to_owned()),
+        },
+        _ => return false,
+    };
+    let is_other = message.is_ok();
+    session.show_message(message.unwrap_or_else(|why| why));
+    is_other
+}
+
 /// Reads the scene again; it replaces the current one when it is built. Camera and clock stay.
 pub fn reload(request: &Request, session: &mut Session, terminal: &mut Terminal, scene: &mut Mut<CanopyScene>) {
     match Request::read(&request.options) {
@@ -248,12 +274,19 @@ mod tests {
 
     /// Presses the key R, and waits for the build that it begins, if it does.
     fn load_again(app: &mut App) -> String {
+        press(app, Command::Reload)
+    }
+
+    /// The same with a key that chooses.
+    fn press(app: &mut App, command: Command) -> String {
         let mut scenes = app.world_mut().query::<&mut CanopyScene>();
         app.world_mut().resource_scope(|world, mut session: Mut<Session>| {
             world.resource_scope(|world, mut terminal: Mut<Terminal>| {
-                world.resource_scope(|world, request: Mut<Request>| {
+                world.resource_scope(|world, mut request: Mut<Request>| {
                     let mut scene = scenes.single_mut(world).unwrap();
-                    reload(&request, &mut session, &mut terminal, &mut scene);
+                    if command == Command::Reload || choose(&mut request, &mut session, command) {
+                        reload(&request, &mut session, &mut terminal, &mut scene);
+                    }
                 });
             });
         });
@@ -286,6 +319,28 @@ mod tests {
             assert!(message.contains("not loaded again") && seed(&app) == 2, "{wrong}: {message}");
         }
         assert!(app.should_exit().is_none());
+        Ok(())
+    }
+
+    #[test]
+    fn keys_choose_years_and_variants_of_an_inventory() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let file = folder.path().join("plot.ron");
+        let rows = "1,1,2000,kept\n5,5,2000,kept\n1,1,2010,kept\n5,5,2010,kept\n9,9,2010,kept\n1,1,2010,felled\n";
+        std::fs::write(folder.path().join("plot.csv"), format!("x,y,survey_year,variant\n{rows}"))?;
+        let text = "(terrain: Flat(size: 100), place: (latitude: 47, longitude: 9), species: [(name: \"oak\", plant: Grown(form: Broadleaf, \
+                    individuals: 1, triangles: 5000), lighting: Local)], trees: Inventory(path: \"plot.csv\", anchor: SouthWest))";
+        std::fs::write(&file, text)?;
+        let (mut app, _) = flight(&file)?;
+        let trees = |app: &App| app.world().resource::<Session>().stage.stand.trees.len();
+        assert_eq!(trees(&app), 3, "the last year, the first variant");
+        press(&mut app, Command::Year(true));
+        assert_eq!(trees(&app), 2, "after the last year comes the first");
+        press(&mut app, Command::Year(false));
+        press(&mut app, Command::Variant(true));
+        assert_eq!(trees(&app), 1);
+        press(&mut app, Command::Variant(true));
+        assert_eq!(trees(&app), 3);
         Ok(())
     }
 

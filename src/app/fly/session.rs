@@ -154,7 +154,12 @@ impl Session {
     /// Carries out a command as far as it concerns the flight; the window does the rest.
     pub fn carry_out(&mut self, command: Command) {
         match command {
-            Command::Leave | Command::Settings | Command::Reload | Command::Tint => {}
+            Command::Leave
+            | Command::Settings
+            | Command::Reload
+            | Command::Tint
+            | Command::Year(_)
+            | Command::Variant(_) => {}
             Command::SaveImage => self.capturing = true,
             Command::Tour if self.tour.is_none() => {
                 self.show_message("this scene has no camera path; add `camera: (path: [...])` to its file".to_owned());

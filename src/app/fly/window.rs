@@ -81,7 +81,7 @@ pub fn handle_keys(
     held: Res<ButtonInput<KeyCode>>,
     mut session: Option<ResMut<Session>>,
     mut panel: Option<ResMut<SettingsPanel>>,
-    request: Res<Request>,
+    mut request: ResMut<Request>,
     mut terminal: ResMut<Terminal>,
     mut scene: Single<&mut CanopyScene>,
     mut view: Single<&mut ViewOptions, With<CanopyCamera>>,
@@ -128,6 +128,11 @@ pub fn handle_keys(
                 exit.write(AppExit::Success);
             }
             Command::Reload => loading::reload(&request, session, &mut terminal, &mut scene),
+            Command::Year(_) | Command::Variant(_) => {
+                if loading::choose(&mut request, session, command) {
+                    loading::reload(&request, session, &mut terminal, &mut scene);
+                }
+            }
             _ => session.carry_out(command),
         }
     }

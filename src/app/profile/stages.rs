@@ -83,6 +83,7 @@ impl Stages {
             surroundings: stage.surroundings,
             observer: stage.observer,
             scene: scene.clone(),
+            surveys: stage.surveys.clone(),
             style: CanopyStyle::new(scene.style.clone()).map_err(StageError::from)?,
         })
     }

@@ -6,8 +6,8 @@
 //! stand at rest; KHR_texture_transform, KHR_materials_pbrSpecularGlossiness (its diffuse part),
 //! KHR_materials_diffuse_transmission, the tissue of leaves in extras (`leaf_extras.rs`), KHR_mesh_quantization,
 //! EXT_meshopt_compression, EXT_mesh_gpu_instancing, EXT_texture_webp and MSFT_lod (its finest level). Coarser levels, collision
-//! hulls and ground planes are told by their names and left out; a tree whose z axis points up is turned upright. A
-//! [`Warning`] names everything else.
+//! hulls and ground planes are told by their names and left out; a tree whose z axis points up is turned upright; trees side by
+//! side are told apart ([`trees_of`]). A [`Warning`] names everything else.
 //!
 //! Files come from anywhere, so nothing in them is trusted. Every index, length and count is checked before it is used.
 //! No file makes this module panic, or allocate more than its own size and fixed limits allow. Damaged geometry is a
@@ -44,6 +44,7 @@ use error::{EXPORT_AGAIN, Fault, Warnings};
 use material::{Images, Surface};
 use primitive::Piece;
 use skin::Deformation;
+use upright::Several;
 
 /// A plant that stands farther from the origin than this fraction of its height is moved there.
 const FAR_OFF: f32 = 0.1;
@@ -106,6 +107,23 @@ pub fn load_plant(path: &Path, options: &GltfOptions) -> Result<(Plant, Vec<Warn
     read_plant(&bytes, path, Beside::Folder(folder), options)
 }
 
+/// Names of the trees that the file holds side by side, each of which [`GltfOptions::node`] can choose; none for a file of one
+/// tree, or of trees that no name tells apart.
+///
+/// # Errors
+/// Those of [`load_plant`].
+pub fn trees_of(path: &Path, options: &GltfOptions) -> Result<Vec<String>, PlantError> {
+    let bytes = std::fs::read(path).map_err(|source| PlantError::Io { path: path.to_path_buf(), source })?;
+    let mut warnings = Warnings::default();
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut document = container::open(&bytes, path, Beside::Folder(folder), &mut warnings)?;
+    if document.root.nodes.len() < 2 {
+        return Ok(Vec::new());
+    }
+    let (_, several) = gather(&mut document, options, &mut warnings).map_err(|fault| fault.into_error(path))?;
+    Ok(if several.can_be_chosen { several.names } else { Vec::new() })
+}
+
 /// External files of a .gltf file, by the relative paths that [`external_files`] lists: their bytes, or why they cannot
 /// be read.
 pub type ExternalFiles = BTreeMap<String, Result<Vec<u8>, String>>;
@@ -146,7 +164,8 @@ fn read_plant(
     let mut warnings = Warnings::default();
     let mut document = container::open(bytes, path, beside, &mut warnings)?;
     check_extensions(&document.root, path, &mut warnings)?;
-    let mut gathered = gather(&mut document, options, &mut warnings).map_err(|fault| fault.into_error(path))?;
+    let gathered = gather(&mut document, options, &mut warnings).map_err(|fault| fault.into_error(path))?;
+    let (mut gathered, _) = gathered;
     gathered.retain(|(_, mesh)| !mesh.triangles.is_empty());
     back_faces::join(&mut gathered, &mut warnings);
     if gathered.is_empty() {
@@ -233,7 +252,7 @@ fn gather(
     document: &mut container::Document,
     options: &GltfOptions,
     warnings: &mut Warnings,
-) -> Result<Vec<(Surface, PlantMesh)>, Fault> {
+) -> Result<(Vec<(Surface, PlantMesh)>, Several), Fault> {
     let (mut placements, globals) = nodes::placements(&document.root, warnings)?;
     if document.root.nodes.is_empty() && !document.root.meshes.is_empty() {
         // The file is a collection of meshes without a scene. Together they are the plant.
@@ -287,7 +306,8 @@ fn gather(
     if up_is_z {
         placed.iter_mut().for_each(|placed| upright::turn(&mut placed.piece.mesh));
     }
-    upright::mention_several(&document.root, &placements, &placed, warnings);
+    let several = upright::several(&document.root, &placements, &placed);
+    several.mention(warnings);
 
     let mut parts: BTreeMap<(Option<usize>, [u32; 3]), (Surface, PlantMesh)> = BTreeMap::new();
     for Placed { material, piece, .. } in placed {
@@ -319,7 +339,7 @@ fn gather(
             append(merged, part.mesh);
         }
     }
-    Ok(parts.into_values().collect())
+    Ok((parts.into_values().collect(), several))
 }
 
 /// What bones and morph targets do to a mesh at rest.

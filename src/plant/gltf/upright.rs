@@ -71,21 +71,39 @@ fn seems_to_lie(placed: &[Placed], surfaces: &BTreeMap<Option<usize>, Surface>) 
     spread < 0.3 * farthest && along.z > 3.0 * along.y.abs() && along.z > 3.0 * along.x.abs()
 }
 
-/// Warns of a file that seems to hold several trees side by side: branches of its nodes of about the same height that stand
-/// apart. They are drawn as one plant.
-pub(super) fn mention_several(
-    root: &gltf::json::Root,
-    placements: &[Placement],
-    placed: &[Placed],
-    warnings: &mut Warnings,
-) {
+/// The trees that a file holds side by side: branches of its nodes of about the same height that stand apart.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Several {
+    /// What each is called, at least two; none for a file of one tree.
+    pub names: Vec<String>,
+    /// Whether each can be chosen by its name.
+    pub can_be_chosen: bool,
+}
+
+impl Several {
+    /// Warns that they are one plant here.
+    pub fn mention(&self, warnings: &mut Warnings) {
+        let Some(first) = self.names.first() else { return };
+        let remedy = if self.can_be_chosen {
+            format!("a scene makes each an individual; here they are one plant: choose one with `node: [\"{first}\"]`")
+        } else {
+            "they are drawn as one plant: give each a node with a name of its own".to_owned()
+        };
+        let (count, names) = (self.names.len(), super::roles::shortened(&self.names));
+        let message = format!("the file seems to hold {count} trees side by side ({names}); {remedy}");
+        warnings.push(WarningKind::Missing, "/nodes", message);
+    }
+}
+
+/// The trees of a file, if there are several.
+pub(super) fn several(root: &gltf::json::Root, placements: &[Placement], placed: &[Placed]) -> Several {
     // The first level at which the nodes part.
     let depth = (0..4).find(|depth| {
         let mut nodes = placements.iter().map(|placement| placement.path.get(*depth));
         let first = nodes.next().flatten();
         first.is_some() && nodes.any(|node| node != first)
     });
-    let Some(depth) = depth else { return };
+    let Some(depth) = depth else { return Several::default() };
     let mut groups: BTreeMap<usize, (Vec3, Vec3)> = BTreeMap::new();
     for placed in placed {
         let node = placements.get(placed.placement).and_then(|placement| placement.path.get(depth));
@@ -107,21 +125,24 @@ pub(super) fn mention_several(
     };
     let all_apart = trees.iter().enumerate().all(|(at, (_, a))| trees.iter().skip(at + 1).all(|(_, b)| apart(a, b)));
     if trees.len() < 2 || !all_apart {
-        return;
+        return Several::default();
     }
-    let names: Vec<String> = trees
-        .iter()
-        .map(|(node, _)| {
-            root.nodes.get(*node).and_then(|node| node.name.clone()).unwrap_or_else(|| format!("node {node}"))
-        })
-        .collect();
-    let message = format!(
-        "the file seems to hold {} trees side by side ({}); they are drawn as one plant: choose one with `node: [\"{}\"]`",
-        names.len(),
-        super::roles::shortened(&names),
-        names.first().map_or("", String::as_str)
-    );
-    warnings.push(WarningKind::Missing, "/nodes", message);
+    let name = |node: usize| root.nodes.get(node).and_then(|node| node.name.as_deref()).filter(|name| !name.is_empty());
+    let is_unique = |name: &str| {
+        let named = |other: &Option<String>| other.as_deref() == Some(name);
+        root.nodes.iter().filter(|node| named(&node.name)).count() == 1
+            && !root.meshes.iter().enumerate().any(|(index, mesh)| {
+                // A mesh of this name that other trees have too.
+                named(&mesh.name) && placements.iter().filter(|placement| placement.mesh == index).count() > 1
+            })
+    };
+    Several {
+        can_be_chosen: trees.iter().all(|(node, _)| name(*node).is_some_and(is_unique)),
+        names: trees
+            .iter()
+            .map(|(node, _)| name(*node).map_or_else(|| format!("node {node}"), str::to_owned))
+            .collect(),
+    }
 }
 
 /// Turns a mesh with z up: what was up along z is up along y, to the east stays to the east.

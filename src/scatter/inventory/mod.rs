@@ -38,6 +38,7 @@ use cells::{is_missing, length};
 use names::NoTree;
 use place::PlaceColumns;
 use select::Selection;
+pub use select::Surveys;
 use sizes::{SizeColumns, Sizes};
 use species::SpeciesColumns;
 use text::{Row, Table};
@@ -154,6 +155,8 @@ pub struct Inventory {
     pub columns: Vec<Column>,
     /// What was assumed, not used or left out: a sentence each.
     pub notes: Vec<String>,
+    /// The years and variants that the file has.
+    pub surveys: Surveys,
 }
 
 /// A column of an inventory, for display.
@@ -316,6 +319,7 @@ impl<'a> Reading<'a> {
             wkt: None,
             columns,
             notes,
+            surveys: self.selection.surveys,
         })
     }
 

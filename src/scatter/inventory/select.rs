@@ -14,6 +14,38 @@ use super::{InventoryOptions, LISTED};
 /// Least share of rows that must stand where another year has a tree, for a column that is only called "year".
 const LEAST_SHARE: f64 = 0.2;
 
+/// The times and the alternatives of an inventory, and which of them is shown.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Surveys {
+    /// The years of a repeated survey, in order; none for a single one.
+    pub years: Vec<i32>,
+    /// The year that is shown.
+    pub year: Option<i32>,
+    /// The variants or scenarios as written, in the order of the file; none for a single one.
+    pub variants: Vec<String>,
+    /// The one that is shown.
+    pub variant: Option<String>,
+}
+
+impl Surveys {
+    /// The year after the one that is shown, or before it; after the last comes the first.
+    pub fn next_year(&self, forward: bool) -> Option<i32> {
+        next(&self.years, self.year.as_ref(), forward).copied()
+    }
+
+    /// The variant after the one that is shown, or before it.
+    pub fn next_variant(&self, forward: bool) -> Option<&str> {
+        next(&self.variants, self.variant.as_ref(), forward).map(String::as_str)
+    }
+}
+
+/// The neighbour of `shown` in a list that begins again after its end.
+fn next<'a, T: PartialEq>(list: &'a [T], shown: Option<&T>, forward: bool) -> Option<&'a T> {
+    let at = list.iter().position(|one| Some(one) == shown)?;
+    let count = list.len();
+    list.get((if forward { at + 1 } else { at + count - 1 }) % count)
+}
+
 /// Which rows of a table are shown.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Selection {
@@ -21,6 +53,8 @@ pub(super) struct Selection {
     variant: Option<(usize, String)>,
     /// What was decided, a sentence each.
     pub notes: Vec<String>,
+    /// What there is to choose from.
+    pub surveys: Surveys,
 }
 
 impl Selection {
@@ -56,6 +90,7 @@ impl Selection {
             if years.len() > 2 * LISTED { ", ..." } else { "" }
         ));
         self.year = Some((column, chosen));
+        (self.surveys.years, self.surveys.year) = (years.into_iter().collect(), Some(chosen));
     }
 
     fn choose_variant(&mut self, table: &Table, wanted: Option<&str>) {
@@ -88,6 +123,8 @@ impl Selection {
             variants.iter().take(2 * LISTED).copied().collect::<Vec<_>>().join(", ")
         ));
         self.variant = Some((column, (*chosen).to_owned()));
+        self.surveys.variant = Some((*chosen).to_owned());
+        self.surveys.variants = variants.into_iter().map(str::to_owned).collect();
     }
 
     /// Whether a row is shown: of this year and variant, or of none.
