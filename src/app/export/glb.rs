@@ -8,7 +8,10 @@ use crate::{app::AppError, files};
 
 /// Component types of accessors.
 pub const FLOAT: u32 = 5126;
-pub const UNSIGNED_INT: u32 = 5125;
+const UNSIGNED_INT: u32 = 5125;
+/// What views are for.
+const ARRAY_BUFFER: u32 = 34962;
+const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
 /// A GLB 2.0.
 #[derive(Default)]
@@ -47,9 +50,27 @@ impl Glb {
         self.accessors.len() - 1
     }
 
+    /// The same for vertices.
+    pub fn vertices<T: bytemuck::NoUninit>(&mut self, values: &[T], kind: &str) -> usize {
+        self.targeted(values, FLOAT, kind, ARRAY_BUFFER)
+    }
+
+    /// The same for indices of vertices.
+    pub fn indices(&mut self, values: &[u32]) -> usize {
+        self.targeted(values, UNSIGNED_INT, "SCALAR", ELEMENT_ARRAY_BUFFER)
+    }
+
+    fn targeted<T: bytemuck::NoUninit>(&mut self, values: &[T], component: u32, kind: &str, target: u32) -> usize {
+        let index = self.accessor(values, component, kind);
+        if let Some(view) = self.views.last_mut() {
+            view["target"] = target.into();
+        }
+        index
+    }
+
     /// Adds positions, whose bounds a document states.
     pub fn positions(&mut self, values: &[glam::Vec3]) -> usize {
-        let index = self.accessor(values, FLOAT, "VEC3");
+        let index = self.vertices(values, "VEC3");
         let bounds = |of: fn(glam::Vec3, glam::Vec3) -> glam::Vec3| {
             values.iter().copied().reduce(of).unwrap_or_default().to_array()
         };

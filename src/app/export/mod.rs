@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use glam::{DVec2, DVec3, Quat, Vec3};
 use serde_json::json;
 
-use self::glb::{FLOAT, Glb, UNSIGNED_INT};
+use self::glb::{FLOAT, Glb};
 use super::{error::AppError, ground_grid, interrupt};
 use crate::{
     assets::Stage,
@@ -169,9 +169,9 @@ fn ground(glb: &mut Glb, stage: &Stage, within: Option<f64>) -> usize {
         primitives.push(json!({
             "attributes": {
                 "POSITION": glb.positions(&piece.positions),
-                "NORMAL": glb.accessor(&piece.normals, FLOAT, "VEC3"),
+                "NORMAL": glb.vertices(&piece.normals, "VEC3"),
             },
-            "indices": glb.accessor(&piece.indices, UNSIGNED_INT, "SCALAR"),
+            "indices": glb.indices(&piece.indices),
             "material": material,
         }));
     }

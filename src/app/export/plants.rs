@@ -6,7 +6,7 @@ use glam::Vec3;
 use image::{ImageFormat, RgbaImage};
 use serde_json::{Value, json};
 
-use super::glb::{FLOAT, Glb, UNSIGNED_INT};
+use super::glb::Glb;
 use crate::{
     app::AppError,
     math::{color::srgb8, srgb_to_linear},
@@ -79,10 +79,10 @@ pub fn add(glb: &mut Glb, plant: &Plant, images: &mut Images) -> Result<Option<u
         let mesh = &part.mesh;
         let attributes = json!({
             "POSITION": glb.positions(&mesh.positions),
-            "NORMAL": glb.accessor(&mesh.normals, FLOAT, "VEC3"),
-            "TEXCOORD_0": glb.accessor(&mesh.uvs, FLOAT, "VEC2"),
+            "NORMAL": glb.vertices(&mesh.normals, "VEC3"),
+            "TEXCOORD_0": glb.vertices(&mesh.uvs, "VEC2"),
         });
-        let indices = glb.accessor(mesh.triangles.as_flattened(), UNSIGNED_INT, "SCALAR");
+        let indices = glb.indices(mesh.triangles.as_flattened());
         let material = material(glb, part.kind, &part.material, images)?;
         glb.materials.push(material);
         primitives.push(json!({
