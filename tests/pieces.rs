@@ -111,6 +111,13 @@ fn pieces_of_a_traced_sequence_and_parts_of_its_samples_have_the_bytes_of_the_wh
     assert!(whole["0000.png"] != whole["0002.png"], "the camera moves");
     assert_eq!(bytes(&folder.path().join("pieces"))?, whole);
 
+    // What is finished is kept, once more.
+    let kept = trace("whole", &[&sequence[..], &["--skip-existing"]].concat())?;
+    assert_eq!(said(&kept).matches("finished already").count(), 3, "{}", said(&kept));
+    assert_eq!(bytes(&folder.path().join("whole"))?, whole);
+    let few = trace("few.film", &["--part", "1/16"])?;
+    assert!(said(&few).contains("cannot be divided into 16 parts"), "{}", said(&few));
+
     // Unequal parts of the samples of all images; folders merge by name.
     for part in ["1", "2", "3", "4"] {
         good(trace(&format!("part-{part}"), &[&sequence[..], &["--part", &format!("{part}/4")]].concat())?);
@@ -140,7 +147,8 @@ fn pieces_of_a_traced_sequence_and_parts_of_its_samples_have_the_bytes_of_the_wh
         (vec![&*first, &*parts[0]], vec!["--out", &*exr], "is a folder and"),
         (vec![&*first, "nowhere.film"], vec!["--out", &*exr], "no such file or folder"),
         (vec![&*first, &*second], vec!["--out", "half.jpg"], "must end in .exr, .png or .film"),
-        (vec![&*merged], vec!["--out", &*exr], "there are no films (.film) in this folder"),
+        (vec![&*merged], vec!["--out", &*merged], "there are no films (.film) in this folder"),
+        (vec![&*parts[0]], vec!["--out", &*exr], "folders are merged into a folder"),
         (vec![&*name], vec!["--out", &*exr], "not a checkpoint of a reference render"),
     ] {
         let output = merge(&parts, &more)?;

@@ -26,6 +26,7 @@ impl Stock {
             fades: &[fade],
             ground: if look.ground { StockGround::Flat } else { StockGround::None },
             reach: GROUND_REACH,
+            far: 2.0 * GROUND_REACH,
             size: look.size,
             samples: 1,
             cascades: look.cascades,

@@ -47,9 +47,9 @@ impl FilmNotes {
         Ok(RenderedImage { width, height, pixels: film.display(&transform) })
     }
 
-    /// The text of a PNG of `film`.
-    pub fn text_of(&self, film: &Film) -> Vec<(&str, String)> {
+    /// The text of a PNG of `samples` samples a pixel.
+    pub fn text_of(&self, samples: u32) -> Vec<(&str, String)> {
         let own = self.text.iter().map(|(keyword, value)| (keyword.as_str(), value.clone()));
-        own.chain([("Samples", film.samples().to_string())]).collect()
+        own.chain([("Samples", samples.to_string())]).collect()
     }
 }

@@ -4,6 +4,8 @@ use glam::{DVec2, Vec3};
 
 use crate::terrain::Terrain;
 
+/// Linear colour of the ground where nothing else is known.
+pub const SOIL: Vec3 = Vec3::new(0.06, 0.05, 0.025);
 /// The most quads along a side of the whole ground: two million triangles.
 const MOST_QUADS: u32 = 1024;
 /// Quads along a side of a piece.

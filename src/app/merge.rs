@@ -72,8 +72,11 @@ pub enum MergeError {
         /// Whether others follow.
         between: bool,
     },
+    /// A file where a folder is needed.
+    #[error("`{}` is the name of an image; folders are merged into a folder, as PNG or with --exr", .0.display())]
+    Folder(PathBuf),
     /// A file of another kind.
-    #[error("`{}` is no name for this image; it must end in .exr, .png or .film", .0.display())]
+    #[error("`{}` is not a valid name for this image; it must end in .exr, .png or .film", .0.display())]
     Ending(PathBuf),
 }
 
@@ -101,27 +104,31 @@ pub fn merge(options: &MergeOptions, progress: &mut dyn Progress) -> Result<Vec<
 }
 
 /// The parts of each image.
-fn images(options: &MergeOptions) -> Result<BTreeMap<PathBuf, Vec<PathBuf>>, MergeError> {
-    let known = |path: &&PathBuf| !path.exists();
-    if let Some(missing) = options.parts.iter().find(known) {
-        return Err(MergeError::NotThere(missing.clone()));
+fn images(options: &MergeOptions) -> Result<BTreeMap<PathBuf, Vec<PathBuf>>, AppError> {
+    if let Some(missing) = options.parts.iter().find(|path| !path.exists()) {
+        return Err(MergeError::NotThere(missing.clone()).into());
     }
     let (folders, single): (Vec<&PathBuf>, Vec<&PathBuf>) = options.parts.iter().partition(|path| path.is_dir());
     if let (Some(folder), Some(file)) = (folders.first(), single.first()) {
-        return Err(MergeError::Mixed { folder: (*folder).clone(), file: (*file).clone() });
+        return Err(MergeError::Mixed { folder: (*folder).clone(), file: (*file).clone() }.into());
     }
+    let ends_in = |ending: &&str| options.out.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending));
+    let is_image = ["exr", "png", "film"].iter().any(ends_in);
     if folders.is_empty() {
-        let ends = |ending: &&str| options.out.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending));
-        return match ["exr", "png", "film"].iter().any(ends) {
+        return match is_image && (!options.exr || ends_in(&"exr")) {
             true => Ok(BTreeMap::from([(options.out.clone(), options.parts.clone())])),
-            false => Err(MergeError::Ending(options.out.clone())),
+            false => Err(MergeError::Ending(options.out.clone()).into()),
         };
+    }
+    if is_image {
+        return Err(MergeError::Folder(options.out.clone()).into());
     }
     let mut images: BTreeMap<PathBuf, Vec<PathBuf>> = BTreeMap::new();
     for folder in folders {
-        let mut films = films_in(folder);
+        let read = |source| ReferenceError::Read { path: folder.clone(), source };
+        let mut films = films_in(folder).map_err(read)?;
         if films.is_empty() {
-            return Err(MergeError::NoFilms(folder.clone()));
+            return Err(MergeError::NoFilms(folder.clone()).into());
         }
         films.sort();
         for film in films {
@@ -136,12 +143,13 @@ fn images(options: &MergeOptions) -> Result<BTreeMap<PathBuf, Vec<PathBuf>>, Mer
     Ok(images)
 }
 
-fn films_in(folder: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    entries
-        .map(|entry| entry.path())
-        .filter(|path| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("film")))
-        .collect()
+fn films_in(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let is_film = |path: &PathBuf| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("film"));
+    let mut films = Vec::new();
+    for entry in std::fs::read_dir(folder)? {
+        films.extend(Some(entry?.path()).filter(is_film));
+    }
+    Ok(films)
 }
 
 fn merge_one(parts: &[PathBuf], image: &Path, incomplete: bool) -> Result<(), AppError> {
@@ -151,7 +159,7 @@ fn merge_one(parts: &[PathBuf], image: &Path, incomplete: bool) -> Result<(), Ap
         let notes = FilmNotes::from_bytes(&kept.notes).ok_or_else(|| MergeError::NoNotes(part.clone()))?;
         films.push((part, kept, notes));
     }
-    films.sort_by_key(|(_, kept, _)| kept.film.first());
+    films.sort_by_key(|(_, kept, _)| (kept.film.first(), kept.film.samples()));
     let mut films = films.into_iter();
     let Some((first, KeptFilm { mut film, fingerprint, .. }, notes)) = films.next() else {
         return Err(MergeError::NoFilms(image.to_owned()).into());

@@ -70,6 +70,14 @@ pub enum PlanError {
         /// Number of pieces.
         of: u32,
     },
+    /// More parts than samples.
+    #[error("{samples} samples a pixel cannot be divided into {of} parts; trace at most {samples} parts")]
+    TooManyParts {
+        /// Number of parts.
+        of: u32,
+        /// Samples per pixel.
+        samples: u32,
+    },
     /// Some of a single image.
     #[error("only frames of a sequence can be chosen; add --frames, or leave out --frames-only and --chunk")]
     NoSequence,
@@ -80,7 +88,7 @@ pub enum PlanError {
     #[error("`{}` does not end in .png, the format of all images; call it {}", .0.display(), .0.with_extension("png").display())]
     NoPng(PathBuf),
     /// A file of another kind.
-    #[error("`{}` is no name for this image; it must end in {endings}", file.display())]
+    #[error("`{}` is not a valid name for this image; it must end in {endings}", file.display())]
     Ending {
         /// The file.
         file: PathBuf,
@@ -131,7 +139,7 @@ impl PlanRequest<'_> {
                             PlanError::NoPng(file)
                         } else {
                             let endings = self.endings.iter().map(|ending| format!(".{ending}")).collect::<Vec<_>>();
-                            PlanError::Ending { file, endings: endings.join(" or ") }
+                            PlanError::Ending { file, endings: endings.join(", ") }
                         });
                     }
                     if stills.iter().take(number).any(|before| before.out == still.out) {

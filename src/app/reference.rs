@@ -17,6 +17,7 @@ use super::{
     interrupt,
     notes::notes,
     plan::{PlanError, PlanRequest},
+    rendered_image::RenderedImage,
 };
 use crate::{
     assets::Stage,
@@ -24,7 +25,7 @@ use crate::{
     light::{Atmosphere, AtmosphereParams, LightState, exposure_from_ev100},
     progress::Progress,
     reference::{
-        Camera, Film, Fog, Ground, GroundColor, GroundShape, Instance, Light, PathTracer, ReferenceError,
+        Camera, Film, Fog, Ground, GroundColor, GroundShape, Instance, KeptFilm, Light, PathTracer, ReferenceError,
         ReferenceScene, Shot, Soil, TraceSettings,
     },
     render::exposure::{CameraExposure, StandTotals},
@@ -42,8 +43,8 @@ const FILMS: &[&str] = &["film"];
 ///
 /// The film is saved every 30 s and when the work is interrupted, in a file next to the image that ends in
 /// `.checkpoint`. With `resume` a film of the same scene, light and camera continues from there, and the file stays when the
-/// image is done, so that more samples can be added. Without it the trace starts from the beginning, and the file is deleted at
-/// the end.
+/// image is done, so that more samples can be added; a PNG or a film that is finished without one is kept. Without it the trace
+/// starts from the beginning, and the file is deleted at the end.
 ///
 /// # Errors
 /// [`AppError`]; existing images stay as they are. [`AppError::SomeFailed`] where some of several images failed.
@@ -60,6 +61,9 @@ pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Res
     request.check(&written)?;
     if let Some(part) = options.part.filter(|part| part.number == 0 || part.number > part.of) {
         return Err(PlanError::NoChunk { number: part.number, of: part.of }.into());
+    }
+    if let Some(part) = options.part.filter(|part| part.of > options.samples) {
+        return Err(PlanError::TooManyParts { of: part.of, samples: options.samples }.into());
     }
     for file in request.first_files() {
         files::check_writable(&file).map_err(|source| AppError::Write { path: file, source })?;
@@ -165,7 +169,7 @@ impl Truth {
     /// # Errors
     /// Those of [`reference`].
     pub fn trace(&self, exposure: &Exposure, progress: &mut dyn Progress) -> Result<(), AppError> {
-        let Exposure { frame, size, samples, resume, .. } = exposure;
+        let Exposure { frame, size, samples, total, resume } = exposure;
         let sun = self.stage.sun(frame.instant);
         let atmosphere = Atmosphere::new(AtmosphereParams::with_visibility_km(sun.visibility_km))?;
         let light = Arc::new(sun.light(&atmosphere)?);
@@ -181,15 +185,21 @@ impl Truth {
             camera: Camera { view: frame.view, size: *size, near: NEAR.into() },
             fog: self.model.fog.then(|| Fog::new(&light, frame.view.position.y)),
         };
-        let kept = frame.file.with_extension("checkpoint");
+        let kept = checkpoint_of(&frame.file);
         let fingerprint = tracer.fingerprint(&shot);
+        let notes = self.notes(exposure, &light, &fingerprint);
+        if *resume && !kept.exists() && is_finished(&frame.file, exposure, &fingerprint, &notes) {
+            progress.note(&format!("{}: finished already", frame.file.display()));
+            return Ok(());
+        }
         let known = resume.then(|| Film::load_checkpoint(&kept, &fingerprint)).transpose()?.flatten();
+        let wanted = samples.end - samples.start;
+        let is_part = wanted < *total;
         let mut film = match known {
-            Some(film) if film.first() == samples.start => film,
-            Some(_) => return Err(ReferenceError::Stale { path: kept }.into()),
+            Some(film) if film.first() == samples.start && !(is_part && film.samples() > wanted) => film,
+            Some(_) => return Err(ReferenceError::OtherSamples { path: kept }.into()),
             None => Film::beginning_at(&shot, samples.start)?,
         };
-        let wanted = samples.end - samples.start;
         progress.begin("Samples", wanted.into());
         progress.advance(film.samples().min(wanted).into());
         let (started, earlier) = (Instant::now(), film.samples());
@@ -222,7 +232,7 @@ impl Truth {
         if *resume {
             film.save_checkpoint(&kept, &fingerprint)?;
         }
-        save(&film, &frame.file, &fingerprint, &self.notes(exposure, &light))?;
+        save(&film, &frame.file, &fingerprint, &notes)?;
         if !resume && kept.exists() {
             std::fs::remove_file(&kept).map_err(|source| AppError::Write { path: kept, source })?;
         }
@@ -234,10 +244,11 @@ impl Truth {
     }
 
     /// What the film needs to become an image: the renderer's exposure at the camera, and the text of the file.
-    fn notes(&self, exposure: &Exposure, light: &Arc<LightState>) -> FilmNotes {
+    fn notes(&self, exposure: &Exposure, light: &Arc<LightState>, fingerprint: &[u8; 32]) -> FilmNotes {
         let Exposure { frame, total, .. } = exposure;
         let there = CameraExposure::new(light.clone(), self.totals).at(&self.stage.ground(), frame.view.position);
-        let text = notes(&self.stage, &frame.view, frame.instant);
+        let mut text = notes(&self.stage, &frame.view, frame.instant);
+        text.push(("Fingerprint", blake3::Hash::from_bytes(*fingerprint).to_hex().to_string()));
         FilmNotes {
             total: *total,
             exposure: exposure_from_ev100(there.ev100),
@@ -273,12 +284,32 @@ fn scene(stage: &Stage) -> Result<ReferenceScene, AppError> {
 /// # Errors
 /// [`AppError::Reference`], [`AppError::Write`].
 pub(super) fn save(film: &Film, file: &Path, fingerprint: &[u8; 32], notes: &FilmNotes) -> Result<(), AppError> {
-    let ends_in = |ending| file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(ending));
-    if ends_in("exr") {
+    if ends_in(file, "exr") {
         return Ok(film.save_exr(file)?);
     }
-    if ends_in("film") {
+    if ends_in(file, "film") {
         return Ok(film.keep(file, fingerprint, &notes.to_bytes())?);
     }
-    notes.image(film)?.save(file, &notes.text_of(film))
+    notes.image(film)?.save(file, &notes.text_of(film.samples()))
+}
+
+/// Whether `file` is the finished image of these samples. OpenEXR files do not say what they are of.
+fn is_finished(file: &Path, exposure: &Exposure, fingerprint: &[u8; 32], notes: &FilmNotes) -> bool {
+    let Range { start, end } = exposure.samples;
+    if ends_in(file, "png") {
+        return RenderedImage::is_stored(file, exposure.size, &notes.text_of(end - start));
+    }
+    let film = |kept: KeptFilm| {
+        kept.fingerprint == *fingerprint && (kept.film.first(), kept.film.samples()) == (start, end - start)
+    };
+    ends_in(file, "film") && KeptFilm::load(file).ok().flatten().is_some_and(film)
+}
+
+fn ends_in(file: &Path, ending: &str) -> bool {
+    file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(ending))
+}
+
+/// The file that has the state of a trace. That of a film is its own: another part has other samples.
+fn checkpoint_of(file: &Path) -> PathBuf {
+    if ends_in(file, "film") { file.with_added_extension("checkpoint") } else { file.with_extension("checkpoint") }
 }

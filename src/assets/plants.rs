@@ -170,18 +170,16 @@ fn sources(species: &Species, gloss: Gloss) -> Result<Vec<IndividualSource>, Sta
                 gloss: Some(gloss),
                 ..GltfOptions::default()
             };
-            let individuals =
-                files.files.iter().map(|path| individuals(path, &options)).collect::<Result<Vec<_>, _>>()?;
-            individuals.into_iter().flatten().collect()
+            files.files.iter().flat_map(|path| individuals(path, &options)).collect()
         }
     })
 }
 
 /// The individuals of a file: one, or each of several trees that stand side by side in it.
-fn individuals(path: &Path, options: &GltfOptions) -> Result<Vec<IndividualSource>, StageError> {
-    let trees = if options.node.is_empty() { trees_of(path, options)? } else { Vec::new() };
+fn individuals(path: &Path, options: &GltfOptions) -> Vec<IndividualSource> {
+    let trees = if options.node.is_empty() { trees_of(path, options) } else { Vec::new() };
     if trees.is_empty() {
-        return Ok(vec![IndividualSource::Gltf { path: path.to_owned(), options: options.clone(), note: None }]);
+        return vec![IndividualSource::Gltf { path: path.to_owned(), options: options.clone(), note: None }];
     }
     let note = format!("its {} trees side by side are individuals of their own: {}", trees.len(), trees.join(", "));
     let mut note = Some(note);
@@ -191,7 +189,7 @@ fn individuals(path: &Path, options: &GltfOptions) -> Result<Vec<IndividualSourc
         // Told once.
         note: note.take(),
     };
-    Ok(trees.into_iter().map(individual).collect())
+    trees.into_iter().map(individual).collect()
 }
 
 /// Bake settings for a scene's quality and a species' lighting. What is drawn by default is always baked; other

@@ -145,7 +145,7 @@ pub struct StyleArguments {
   F             fly the scene's path
   L             open or close the settings: leaves, view, sun, shadows
   R             load the changed scene file
-  Y V           next year, variant of the inventory; with Shift the one before
+  Y V           next year / next variant of the inventory; with Shift, the previous one
   H             show all keys
 
 Keys of the settings, which the mouse changes too:
@@ -305,7 +305,7 @@ pub struct Reference {
     /// Leave out the renderer's fog.
     #[arg(long)]
     pub clear_air: bool,
-    /// Continue an earlier trace of the same scene, light and camera; images of a sequence that are finished are kept.
+    /// Continue an earlier trace of the same scene, light and camera; PNG images and films of a sequence that are finished are kept.
     #[arg(long, visible_alias = "skip-existing")]
     pub resume: bool,
 }
@@ -329,7 +329,7 @@ pub struct Export {
     /// Leave out the ground.
     #[arg(long)]
     pub no_ground: bool,
-    /// Only what is at most so many metres from the middle of the scene, to the east, north, west and south.
+    /// Only what lies within this many metres of the centre, to the east, north, west and south.
     #[arg(long, value_name = "M", value_parser = parse_positive)]
     pub within: Option<f64>,
 }

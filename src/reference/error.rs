@@ -105,6 +105,14 @@ pub enum ReferenceError {
         /// What is wrong with it.
         what: &'static str,
     },
+    /// A checkpoint of other samples of the same image.
+    #[error(
+        "{}: this checkpoint has samples that are not of this part; delete it, or render without --resume", path.display()
+    )]
+    OtherSamples {
+        /// The file.
+        path: PathBuf,
+    },
     /// A checkpoint of another scene, camera, light or setting.
     #[error(
         "{}: this checkpoint belongs to another scene, camera, light or setting; delete it, or render without --resume",

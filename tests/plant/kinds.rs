@@ -178,7 +178,7 @@ fn trees_side_by_side_are_individuals_of_a_scene_and_mentioned_elsewhere() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("oaks.glb");
     std::fs::write(&file, &bytes).expect("a file");
-    let trees = canopy::plant::gltf::trees_of(&file, &GltfOptions::default()).expect("a plant");
+    let trees = canopy::plant::gltf::trees_of(&file, &GltfOptions::default());
     assert_eq!(trees, ["Oak A", "Oak B"]);
     let text = "(terrain: Flat(size: 100), place: (latitude: 48, longitude: 9, time: \"2026-06-21T12:30+01:00\"), species: [(name: \"oak\", \
                 plant: Gltf(files: [\"oaks.glb\"]), height: (9, 12), lighting: Local)], trees: Scattered(stems_per_hectare: 40, \
@@ -201,8 +201,20 @@ fn trees_side_by_side_are_individuals_of_a_scene_and_mentioned_elsewhere() {
         json["scenes"] = json!([{"nodes": [0, 1]}]);
     });
     std::fs::write(&file, &nameless).expect("a file");
-    assert!(canopy::plant::gltf::trees_of(&file, &GltfOptions::default()).expect("a plant").is_empty());
+    assert!(canopy::plant::gltf::trees_of(&file, &GltfOptions::default()).is_empty());
     says(&load(&nameless).1, &["2 trees side by side", "give each a node with a name of its own"]);
+    // Nor does a name choose one of two trees if it is that of the other's mesh.
+    let crossed = edited(|json| {
+        let mut other = json["meshes"][0].clone();
+        other["name"] = "Oak A".into();
+        json["meshes"][0]["name"] = "Oak B".into();
+        json["meshes"].as_array_mut().expect("meshes").push(other);
+        json["nodes"] =
+            json!([{"mesh": 0, "name": "Oak A"}, {"mesh": 1, "name": "Oak B", "translation": [9.0, 0.0, 0.0]}]);
+        json["scenes"] = json!([{"nodes": [0, 1]}]);
+    });
+    std::fs::write(&file, &crossed).expect("a file");
+    assert!(canopy::plant::gltf::trees_of(&file, &GltfOptions::default()).is_empty());
     // The parts of one tree are not.
     let parts = edited(|json| {
         json["nodes"] = json!([{"mesh": 0, "name": "A"}, {"mesh": 0, "name": "B", "translation": [0.5, 0.0, 0.0]}]);

@@ -16,6 +16,7 @@ use crate::{
     progress::Progress,
     scatter::PackedTree,
     scene::{Overrides, SceneSource},
+    terrain::CoordinateSystem,
 };
 
 /// The extension for many instances of a mesh.
@@ -71,7 +72,7 @@ pub fn export(options: &ExportOptions, progress: &mut dyn Progress) -> Result<Ex
         )));
     }
     let mut glb = Glb::default();
-    let mut report = ExportReport { trees: trees.len(), ..ExportReport::default() };
+    let mut report = ExportReport::default();
     progress.begin("Plants", stage.plants.len() as u64);
     let mut images = plants::Images::default();
     for (variant, baked) in stage.plants.iter().enumerate() {
@@ -85,6 +86,7 @@ pub fn export(options: &ExportOptions, progress: &mut dyn Progress) -> Result<Ex
                 Some(mesh) => {
                     place(&mut glb, &stage, &own, mesh, &baked.plant.name, options.nodes);
                     report.plants += 1;
+                    report.trees += own.len();
                 }
                 None => progress
                     .warn(&format!("{}: a plant without triangles; its trees are not exported", baked.plant.name)),
@@ -101,7 +103,8 @@ pub fn export(options: &ExportOptions, progress: &mut dyn Progress) -> Result<Ex
     }
     let extras = place_on_earth(&stage);
     glb.write(&options.out, &stage.scene.name, &extras)?;
-    report.bytes = std::fs::metadata(&options.out).map(|found| found.len()).unwrap_or_default();
+    let written = std::fs::metadata(&options.out);
+    report.bytes = written.map_err(|source| AppError::Write { path: options.out.clone(), source })?.len();
     Ok(report)
 }
 
@@ -155,11 +158,12 @@ fn place(glb: &mut Glb, stage: &Stage, trees: &[PackedTree], mesh: usize, name: 
 
 /// Adds the ground; returns its number of triangles.
 fn ground(glb: &mut Glb, stage: &Stage, within: Option<f64>) -> usize {
-    let half = 0.5 * stage.terrain.extent();
+    // The wood goes on beyond the data.
+    let half = 0.5 * stage.terrain.extent() + stage.surroundings;
     let half = within.map_or(half, |most| half.min(DVec2::splat(most)));
     glb.materials.push(json!({
         "name": "ground",
-        "pbrMetallicRoughness": { "baseColorFactor": [0.06, 0.05, 0.025, 1.0], "metallicFactor": 0.0, "roughnessFactor": 1.0 },
+        "pbrMetallicRoughness": { "baseColorFactor": ground_grid::SOIL.extend(1.0).to_array(), "metallicFactor": 0.0, "roughnessFactor": 1.0 },
     }));
     let material = glb.materials.len() - 1;
     let mut primitives = Vec::new();
@@ -189,7 +193,14 @@ fn place_on_earth(stage: &Stage) -> serde_json::Value {
         "longitude": stage.observer.longitude_deg,
     });
     if let Some(reference) = stage.terrain.reference() {
-        extras["coordinateSystem"] = format!("{:?}", reference.system()).into();
+        let epsg = match reference.system() {
+            CoordinateSystem::Utm { zone, south } => Some(if south { 32_700 } else { 32_600 } + u32::from(zone)),
+            CoordinateSystem::WebMercator => Some(3857),
+            CoordinateSystem::Projected { epsg, .. } => epsg,
+            CoordinateSystem::Geographic => Some(4326),
+            CoordinateSystem::Local => None,
+        };
+        extras["epsg"] = epsg.into();
         extras["origin"] = json!(reference.centre().to_array());
     }
     extras

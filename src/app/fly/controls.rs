@@ -96,7 +96,7 @@ pub const HELP: [(&str, &str); 22] = [
     ("+  -", "clock speed: stopped, 1x, 60x, 600x, 3600x"),
     ("Home", "return to the start, position and time"),
     ("R", "load the changed scene file; camera and clock stay"),
-    ("Y  V", "next year, variant of the inventory; with Shift the one before"),
+    ("Y  V", "next year / next variant of the inventory; with Shift, the previous one"),
     ("U", "allow flight below the ground, or not"),
     ("T", "tint trees by level of detail"),
     ("L", "settings: lighting of the leaves, view, sun and shadows"),

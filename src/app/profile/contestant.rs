@@ -41,7 +41,7 @@ pub struct Peer {
 /// Frames of stock Bevy until all that it needs is on the device.
 const FIRST_UPDATES: u32 = 3;
 
-/// One that draws views.
+/// A renderer under test.
 pub trait Contestant {
     /// Sets camera and light of the next frame.
     ///
@@ -162,11 +162,10 @@ impl Stock {
         settings: WgpuSettings,
     ) -> Result<Self, AppError> {
         let quality = &stage.scene.quality;
-        let trees = nearest(&stage, views, peer.most_trees);
+        let trees = nearest(&stage, views, size, peer.most_trees);
         let extent = stage.terrain.extent();
         // The ground goes on as far again as it has data, so that slopes have a background.
-        let reach =
-            extent.max_element().max(0.5 * extent.max_element() + stage.surroundings).min(quality.view_distance);
+        let reach = extent.max_element().max(0.5 * extent.max_element() + stage.surroundings);
         let renderer = StockRenderer::new(
             &StockScene {
                 trees: &trees,
@@ -175,6 +174,7 @@ impl Stock {
                 fades: &fades(&stage, views, size),
                 ground: StockGround::Terrain(&stage.terrain),
                 reach,
+                far: quality.view_distance,
                 size,
                 samples: quality.msaa,
                 cascades: quality.cascades as usize,
@@ -249,15 +249,16 @@ impl Contestant for Stock {
 
 /// `most` trees of `stage`: of each of `views` in turn the nearest one in its picture that is not there yet, and then those nearest to
 /// the first view.
-fn nearest(stage: &Stage, views: &[ProfileView], most: usize) -> Vec<PackedTree> {
+fn nearest(stage: &Stage, views: &[ProfileView], size: (u32, u32), most: usize) -> Vec<PackedTree> {
     let (trees, grid) = (&stage.stand.trees, &stage.stand.grid);
     if trees.len() <= most {
         return trees.clone();
     }
     let by_distance = |view: &ProfileView, seen: bool| {
         let (camera, forward) = (view.view.position, view.view.forward());
-        // The corners of an image as wide as two screens.
-        let least = (2.0 * (0.5 * view.view.field_of_view).tan()).atan().cos();
+        // A cone through the corners of the image.
+        let aspect = f64::from(size.0) / f64::from(size.1.max(1));
+        let least = ((0.5 * view.view.field_of_view).tan() * aspect.hypot(1.0)).atan().cos();
         let found = trees.iter().zip(0..).filter_map(|(tree, index): (&PackedTree, usize)| {
             let to = tree.position(grid) - camera;
             (!seen || to.dot(forward) >= least * to.length()).then(|| (to.length_squared(), index))

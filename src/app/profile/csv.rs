@@ -115,7 +115,7 @@ pub fn points(report: &ProfileReport) -> Vec<u8> {
         "ExcessChange",
         "Popping",
         "Triangles",
-        "Draws",
+        "ForestCalls",
         "UploadedBytes",
         "FragmentsPerPixel",
         "DeviceBytes",

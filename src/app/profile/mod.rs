@@ -381,6 +381,10 @@ impl<'a> Work<'a> {
             if progress.is_cancelled() {
                 return Err(self.interrupted());
             }
+            for before in &view.lead {
+                contestant.set_view(before, view.instant)?;
+                contestant.update()?;
+            }
             contestant.counts();
             contestant.set_view(&view.view, view.instant)?;
             let updates = contestant.update()?.updates;
@@ -536,7 +540,7 @@ fn view_record(view: &ProfileView) -> ViewRecord {
 fn point_record(point: &Point) -> PointRecord {
     PointRecord {
         label: point.label(),
-        beside: point.is_beside(),
+        unranked: point.is_unranked(),
         settings: point.settings.iter().cloned().collect::<BTreeMap<_, _>>(),
         ..PointRecord::default()
     }

@@ -108,7 +108,7 @@ pub struct PointRecord {
     pub settings: BTreeMap<String, String>,
     /// Whether it takes no part in the front: another renderer, or the control.
     #[serde(default)]
-    pub beside: bool,
+    pub unranked: bool,
     /// Why it could not be measured, if it could not.
     pub fault: Option<String>,
     /// One entry for each round that was timed.

@@ -13,7 +13,8 @@ pub fn summarize(report: &mut ProfileReport) {
         point.summary.ratio = if index == 0 { None } else { ratio(&point.rounds, &baseline) };
     }
     // The scene twice has one place on the front, and another renderer, which may draw fewer trees, none.
-    let known = |point: &PointRecord| Some((point.summary.frame?.p50, point.summary.error?)).filter(|_| !point.beside);
+    let known =
+        |point: &PointRecord| Some((point.summary.frame?.p50, point.summary.error?)).filter(|_| !point.unranked);
     let coordinates: Vec<(f64, f64)> =
         report.points.iter().map(|point| known(point).unwrap_or((f64::NAN, f64::NAN))).collect();
     let on_front = pareto_front(&coordinates);

@@ -93,7 +93,7 @@ impl Point {
     }
 
     /// Whether it is no setting of this renderer, but the control or a peer.
-    pub fn is_beside(&self) -> bool {
+    pub fn is_unranked(&self) -> bool {
         self.peer.is_some() || self.settings.iter().any(|(name, _)| name == CONTROL)
     }
 

@@ -72,7 +72,7 @@ fn passes(figures: &DeviceFigures) -> BTreeMap<String, f64> {
     figures.iter().filter_map(pass).collect()
 }
 
-/// Calls of fragment shaders of the passes of the view, not of the shadow maps, whose names begin with `prefix`; `None` where the device does
+/// Calls of fragment shaders of the passes of the view, not of the shadow maps, whose names contain `prefix`; `None` where the device does
 /// not count.
 pub fn fragments(figures: &DeviceFigures, prefix: &str) -> Option<f64> {
     let of_view = |path: &String| {

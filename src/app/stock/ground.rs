@@ -17,8 +17,7 @@ use crate::app::ground_grid::{self, GridPiece};
 
 /// Spawns the ground of `scene`.
 pub fn spawn(app: &mut App, scene: &StockScene) {
-    let color = Vec3::new(0.06, 0.05, 0.025);
-    let material = add_material(app, StandardMaterial { base_color: linear(color), ..matt() });
+    let material = add_material(app, StandardMaterial { base_color: linear(ground_grid::SOIL), ..matt() });
     let meshes = match scene.ground {
         StockGround::None => Vec::new(),
         StockGround::Flat => vec![Mesh::from(Plane3d::new(Vec3::Y, Vec2::splat(scene.reach as f32)).mesh())],

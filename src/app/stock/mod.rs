@@ -81,6 +81,8 @@ pub struct StockScene<'a> {
     pub ground: StockGround<'a>,
     /// Metres from the origin to the border of the ground.
     pub reach: f64,
+    /// Metres that the camera sees.
+    pub far: f64,
     /// Width and height of the image in pixels.
     pub size: (u32, u32),
     /// Samples per pixel, 1 or 4.
@@ -153,7 +155,7 @@ impl StockRenderer {
                 Tonemapping::TonyMcMapface,
             ))
             .id();
-        Self { app, camera, sun, target, size: scene.size, far: 2.0 * scene.reach as f32 }
+        Self { app, camera, sun, target, size: scene.size, far: scene.far as f32 }
     }
 
     /// The app's world.

@@ -44,7 +44,7 @@ use error::{EXPORT_AGAIN, Fault, Warnings};
 use material::{Images, Surface};
 use primitive::Piece;
 use skin::Deformation;
-use upright::Several;
+use upright::SideBySide;
 
 /// A plant that stands farther from the origin than this fraction of its height is moved there.
 const FAR_OFF: f32 = 0.1;
@@ -108,20 +108,21 @@ pub fn load_plant(path: &Path, options: &GltfOptions) -> Result<(Plant, Vec<Warn
 }
 
 /// Names of the trees that the file holds side by side, each of which [`GltfOptions::node`] can choose; none for a file of one
-/// tree, or of trees that no name tells apart.
-///
-/// # Errors
-/// Those of [`load_plant`].
-pub fn trees_of(path: &Path, options: &GltfOptions) -> Result<Vec<String>, PlantError> {
-    let bytes = std::fs::read(path).map_err(|source| PlantError::Io { path: path.to_path_buf(), source })?;
+/// tree, of trees that no name tells apart, and for one that cannot be read, of which [`load_plant`] says why.
+pub fn trees_of(path: &Path, options: &GltfOptions) -> Vec<String> {
+    let Ok(bytes) = std::fs::read(path) else { return Vec::new() };
     let mut warnings = Warnings::default();
     let folder = path.parent().unwrap_or(Path::new(""));
-    let mut document = container::open(&bytes, path, Beside::Folder(folder), &mut warnings)?;
+    let Ok(mut document) = container::open(&bytes, path, Beside::Folder(folder), &mut warnings) else {
+        return Vec::new();
+    };
     if document.root.nodes.len() < 2 {
-        return Ok(Vec::new());
+        return Vec::new();
     }
-    let (_, several) = gather(&mut document, options, &mut warnings).map_err(|fault| fault.into_error(path))?;
-    Ok(if several.can_be_chosen { several.names } else { Vec::new() })
+    match gather(&mut document, options, &mut warnings) {
+        Ok((_, trees)) if trees.can_be_chosen => trees.names,
+        _ => Vec::new(),
+    }
 }
 
 /// External files of a .gltf file, by the relative paths that [`external_files`] lists: their bytes, or why they cannot
@@ -252,7 +253,7 @@ fn gather(
     document: &mut container::Document,
     options: &GltfOptions,
     warnings: &mut Warnings,
-) -> Result<(Vec<(Surface, PlantMesh)>, Several), Fault> {
+) -> Result<(Vec<(Surface, PlantMesh)>, SideBySide), Fault> {
     let (mut placements, globals) = nodes::placements(&document.root, warnings)?;
     if document.root.nodes.is_empty() && !document.root.meshes.is_empty() {
         // The file is a collection of meshes without a scene. Together they are the plant.
@@ -306,8 +307,8 @@ fn gather(
     if up_is_z {
         placed.iter_mut().for_each(|placed| upright::turn(&mut placed.piece.mesh));
     }
-    let several = upright::several(&document.root, &placements, &placed);
-    several.mention(warnings);
+    let trees = upright::side_by_side(&document.root, &placements, &placed);
+    trees.mention(warnings);
 
     let mut parts: BTreeMap<(Option<usize>, [u32; 3]), (Surface, PlantMesh)> = BTreeMap::new();
     for Placed { material, piece, .. } in placed {
@@ -339,7 +340,7 @@ fn gather(
             append(merged, part.mesh);
         }
     }
-    Ok((parts.into_values().collect(), several))
+    Ok((parts.into_values().collect(), trees))
 }
 
 /// What bones and morph targets do to a mesh at rest.

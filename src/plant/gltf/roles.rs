@@ -80,7 +80,7 @@ pub(super) fn may_be_ground(name: &str) -> bool {
 }
 
 /// Names of a placement: of its node, of the nodes above it, of its mesh.
-fn names<'a>(root: &'a Root, placement: &'a Placement) -> impl Iterator<Item = &'a str> {
+pub(super) fn names<'a>(root: &'a Root, placement: &'a Placement) -> impl Iterator<Item = &'a str> {
     let node = |index: &usize| root.nodes.get(*index).and_then(|node| node.name.as_deref());
     let nodes = placement.path.iter().rev().filter_map(node);
     nodes.chain(root.meshes.get(placement.mesh).and_then(|mesh| mesh.name.as_deref()))

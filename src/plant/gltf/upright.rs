@@ -73,14 +73,14 @@ fn seems_to_lie(placed: &[Placed], surfaces: &BTreeMap<Option<usize>, Surface>) 
 
 /// The trees that a file holds side by side: branches of its nodes of about the same height that stand apart.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Several {
+pub(super) struct SideBySide {
     /// What each is called, at least two; none for a file of one tree.
     pub names: Vec<String>,
     /// Whether each can be chosen by its name.
     pub can_be_chosen: bool,
 }
 
-impl Several {
+impl SideBySide {
     /// Warns that they are one plant here.
     pub fn mention(&self, warnings: &mut Warnings) {
         let Some(first) = self.names.first() else { return };
@@ -96,14 +96,14 @@ impl Several {
 }
 
 /// The trees of a file, if there are several.
-pub(super) fn several(root: &gltf::json::Root, placements: &[Placement], placed: &[Placed]) -> Several {
+pub(super) fn side_by_side(root: &gltf::json::Root, placements: &[Placement], placed: &[Placed]) -> SideBySide {
     // The first level at which the nodes part.
     let depth = (0..4).find(|depth| {
         let mut nodes = placements.iter().map(|placement| placement.path.get(*depth));
         let first = nodes.next().flatten();
         first.is_some() && nodes.any(|node| node != first)
     });
-    let Some(depth) = depth else { return Several::default() };
+    let Some(depth) = depth else { return SideBySide::default() };
     let mut groups: BTreeMap<usize, (Vec3, Vec3)> = BTreeMap::new();
     for placed in placed {
         let node = placements.get(placed.placement).and_then(|placement| placement.path.get(depth));
@@ -125,19 +125,16 @@ pub(super) fn several(root: &gltf::json::Root, placements: &[Placement], placed:
     };
     let all_apart = trees.iter().enumerate().all(|(at, (_, a))| trees.iter().skip(at + 1).all(|(_, b)| apart(a, b)));
     if trees.len() < 2 || !all_apart {
-        return Several::default();
+        return SideBySide::default();
     }
     let name = |node: usize| root.nodes.get(node).and_then(|node| node.name.as_deref()).filter(|name| !name.is_empty());
-    let is_unique = |name: &str| {
-        let named = |other: &Option<String>| other.as_deref() == Some(name);
-        root.nodes.iter().filter(|node| named(&node.name)).count() == 1
-            && !root.meshes.iter().enumerate().any(|(index, mesh)| {
-                // A mesh of this name that other trees have too.
-                named(&mesh.name) && placements.iter().filter(|placement| placement.mesh == index).count() > 1
-            })
+    // `node:` takes nodes and meshes of a name, and all below them.
+    let chooses_this_alone = |node: usize, name: &str| {
+        let of_name = |placement: &&Placement| super::roles::names(root, placement).any(|other| other == name);
+        placements.iter().filter(of_name).all(|placement| placement.path.get(depth) == Some(&node))
     };
-    Several {
-        can_be_chosen: trees.iter().all(|(node, _)| name(*node).is_some_and(is_unique)),
+    SideBySide {
+        can_be_chosen: trees.iter().all(|(node, _)| name(*node).is_some_and(|name| chooses_this_alone(*node, name))),
         names: trees
             .iter()
             .map(|(node, _)| name(*node).map_or_else(|| format!("node {node}"), str::to_owned))
