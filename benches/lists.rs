@@ -12,6 +12,7 @@
 #[expect(dead_code, reason = "the other benchmark uses the rest")]
 mod field;
 #[path = "peer/ours.rs"]
+#[expect(dead_code, reason = "another benchmark uses the rest")]
 mod ours;
 
 use std::{path::PathBuf, time::Instant};

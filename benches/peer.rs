@@ -18,6 +18,7 @@ mod field;
 #[path = "peer/measure.rs"]
 mod measure;
 #[path = "peer/ours.rs"]
+#[expect(dead_code, reason = "another benchmark uses the rest")]
 mod ours;
 #[path = "peer/stock.rs"]
 mod stock;

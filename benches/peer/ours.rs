@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use anyhow::Context;
+use bevy::{app::Plugin, render::diagnostic::RenderDiagnosticsPlugin};
 use canopy::{
     app::Renderer,
     bake::{BakedLevel, BakedPlant},
@@ -80,6 +81,14 @@ impl Ours {
     /// Sets who makes the lists of trees.
     pub fn make_lists(&mut self, lists: TreeLists) {
         self.0.app().insert_resource(lists);
+    }
+
+    /// Lets Bevy write timestamps and count shader calls of all passes.
+    pub fn measure(&mut self) {
+        // An app that has been built takes no plugins any more; this one only adds systems.
+        let app = self.0.app();
+        RenderDiagnosticsPlugin.build(app);
+        RenderDiagnosticsPlugin.finish(app);
     }
 
     /// Sets the time; the light follows within the frame.

@@ -108,7 +108,7 @@ pub fn load_plant(path: &Path, options: &GltfOptions) -> Result<(Plant, Vec<Warn
 }
 
 /// Names of the trees that the file holds side by side, each of which [`GltfOptions::node`] can choose; none for a file of one
-/// tree, of trees that no name tells apart, and for one that cannot be read, of which [`load_plant`] says why.
+/// tree, of trees that no name tells apart, of more than 64, and for one that cannot be read, of which [`load_plant`] says why.
 pub fn trees_of(path: &Path, options: &GltfOptions) -> Vec<String> {
     let Ok(bytes) = std::fs::read(path) else { return Vec::new() };
     let mut warnings = Warnings::default();
@@ -119,8 +119,10 @@ pub fn trees_of(path: &Path, options: &GltfOptions) -> Vec<String> {
     if document.root.nodes.len() < 2 {
         return Vec::new();
     }
+    // Where the trees stand does not depend on textures, which take the most time to read.
+    document.root.images.clear();
     match gather(&mut document, options, &mut warnings) {
-        Ok((_, trees)) if trees.can_be_chosen => trees.names,
+        Ok((_, trees)) if trees.can_be_chosen && trees.names.len() <= upright::MOST_INDIVIDUALS => trees.names,
         _ => Vec::new(),
     }
 }

@@ -71,6 +71,9 @@ fn seems_to_lie(placed: &[Placed], surfaces: &BTreeMap<Option<usize>, Surface>) 
     spread < 0.3 * farthest && along.z > 3.0 * along.y.abs() && along.z > 3.0 * along.x.abs()
 }
 
+/// The most trees of a file that become individuals of their own: each is baked.
+pub(super) const MOST_INDIVIDUALS: usize = 64;
+
 /// The trees that a file holds side by side: branches of its nodes of about the same height that stand apart.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct SideBySide {
@@ -84,7 +87,9 @@ impl SideBySide {
     /// Warns that they are one plant here.
     pub fn mention(&self, warnings: &mut Warnings) {
         let Some(first) = self.names.first() else { return };
-        let remedy = if self.can_be_chosen {
+        let remedy = if self.names.len() > MOST_INDIVIDUALS {
+            format!("more than {MOST_INDIVIDUALS} are drawn as one plant: choose some with `node: [\"{first}\"]`")
+        } else if self.can_be_chosen {
             format!("a scene makes each an individual; here they are one plant: choose one with `node: [\"{first}\"]`")
         } else {
             "they are drawn as one plant: give each a node with a name of its own".to_owned()
