@@ -42,6 +42,11 @@ pub(crate) fn replace(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Resu
     Ok(())
 }
 
+/// Whether the name of `path` ends in one of `endings`, which have no dot, in letters of any case.
+pub(crate) fn ends_in(path: &Path, endings: &[&str]) -> bool {
+    path.extension().is_some_and(|own| endings.iter().any(|ending| own.eq_ignore_ascii_case(ending)))
+}
+
 /// Whether [`write_whole`] can create a file at `path`, as far as that is known beforehand. Nothing is left behind.
 ///
 /// # Errors

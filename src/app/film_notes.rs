@@ -1,6 +1,5 @@
 //! What a film on disk needs besides its samples to become an image.
 
-use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::{AppError, RenderedImage, tone::tone_table};
@@ -16,8 +15,8 @@ pub struct FilmNotes {
     pub total: u32,
     /// From nits to display values.
     pub exposure: f32,
-    /// Colour, amount and strength of night vision.
-    pub night: ([f32; 3], f32, f32),
+    /// Night vision.
+    pub night: ScotopicTint,
     /// The text of a PNG: keyword and value.
     pub text: Vec<(String, String)>,
 }
@@ -40,9 +39,8 @@ impl FilmNotes {
     /// [`AppError::Reference`].
     pub fn image(&self, film: &Film) -> Result<RenderedImage, AppError> {
         let table = tone_table()?;
-        let (tint, amount, strength) = self.night;
-        let night = ScotopicTint { tint: Vec3::from_array(tint), amount, strength };
-        let transform = DisplayTransform { exposure: self.exposure, night, tone: Some(&table), dither: true };
+        let tone = Some(&table);
+        let transform = DisplayTransform { exposure: self.exposure, night: self.night, tone, dither: true };
         let (width, height) = film.size();
         Ok(RenderedImage { width, height, pixels: film.display(&transform) })
     }

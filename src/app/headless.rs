@@ -216,35 +216,12 @@ impl Renderer {
         msaa: u32,
         prepare: impl FnOnce(&mut App),
     ) -> Result<Self, AppError> {
-        let mut app = App::new();
-        let mut plugins = DefaultPlugins
-            .set(WindowPlugin {
-                primary_window: None,
-                exit_condition: ExitCondition::DontExit,
-                ..WindowPlugin::default()
-            })
-            .set(RenderPlugin {
-                render_creation: RenderCreation::Automatic(Box::new(settings)),
-                synchronous_pipeline_compilation: true,
-                ..RenderPlugin::default()
-            })
-            .set(LogPlugin { level: Level::WARN, filter: adapter::LOG_FILTER.to_owned(), ..LogPlugin::default() })
-            .disable::<WinitPlugin>()
-            // The program has its own handler; others keep theirs.
-            .disable::<TerminalCtrlCHandlerPlugin>()
-            .disable::<PipelinedRenderingPlugin>();
-        // A second renderer of the process writes into the first one's log.
-        if tracing::dispatcher::has_been_set() {
-            plugins = plugins.disable::<LogPlugin>();
-        }
-        app.add_plugins(plugins);
-        app.add_plugins(CanopyPlugins).insert_resource(LightUpdates::Blocking).insert_resource(ForestUpdates::Blocking);
-        prepare(&mut app);
-        while app.plugins_state() == PluginsState::Adding {
-            bevy::tasks::tick_global_task_pools_on_main_thread();
-        }
-        app.finish();
-        app.cleanup();
+        let mut app = app_without_window(settings, |app| {
+            app.add_plugins(CanopyPlugins)
+                .insert_resource(LightUpdates::Blocking)
+                .insert_resource(ForestUpdates::Blocking);
+            prepare(app);
+        });
         let device = app.world().resource_ref::<RenderDevice>();
         let (fault, device_since) = (report_faults(&device), device.last_changed());
         let limit = device.limits().max_texture_dimension_2d;
@@ -496,6 +473,35 @@ impl Renderer {
     }
 }
 
+/// A Bevy app that draws without a window, on the adapter of `settings`, with the plugins that `prepare` adds.
+pub(super) fn app_without_window(settings: WgpuSettings, prepare: impl FnOnce(&mut App)) -> App {
+    let mut app = App::new();
+    let mut plugins = DefaultPlugins
+        .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..WindowPlugin::default() })
+        .set(RenderPlugin {
+            render_creation: RenderCreation::Automatic(Box::new(settings)),
+            synchronous_pipeline_compilation: true,
+            ..RenderPlugin::default()
+        })
+        .set(LogPlugin { level: Level::WARN, filter: adapter::LOG_FILTER.to_owned(), ..LogPlugin::default() })
+        .disable::<WinitPlugin>()
+        // The program has its own handler; others keep theirs.
+        .disable::<TerminalCtrlCHandlerPlugin>()
+        .disable::<PipelinedRenderingPlugin>();
+    // A second renderer of the process writes into the first one's log.
+    if tracing::dispatcher::has_been_set() {
+        plugins = plugins.disable::<LogPlugin>();
+    }
+    app.add_plugins(plugins);
+    prepare(&mut app);
+    while app.plugins_state() == PluginsState::Adding {
+        bevy::tasks::tick_global_task_pools_on_main_thread();
+    }
+    app.finish();
+    app.cleanup();
+    app
+}
+
 /// Fails if a wait that began at `started` takes too long.
 fn patience(started: Instant, what: &str) -> Result<(), AppError> {
     if started.elapsed() < LONGEST_WAIT {
@@ -519,7 +525,8 @@ fn report_faults(device: &RenderDevice) -> Arc<Mutex<Option<String>>> {
     fault
 }
 
-fn render_target(app: &mut App, (width, height): (u32, u32)) -> Handle<Image> {
+/// An image of this size to draw into.
+pub(super) fn render_target(app: &mut App, (width, height): (u32, u32)) -> Handle<Image> {
     let mut image = Image::new_uninit(
         Extent3d { width, height, depth_or_array_layers: 1 },
         TextureDimension::D2,

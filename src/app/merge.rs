@@ -112,10 +112,9 @@ fn images(options: &MergeOptions) -> Result<BTreeMap<PathBuf, Vec<PathBuf>>, App
     if let (Some(folder), Some(file)) = (folders.first(), single.first()) {
         return Err(MergeError::Mixed { folder: (*folder).clone(), file: (*file).clone() }.into());
     }
-    let ends_in = |ending: &&str| options.out.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending));
-    let is_image = ["exr", "png", "film"].iter().any(ends_in);
+    let is_image = files::ends_in(&options.out, &["exr", "png", "film"]);
     if folders.is_empty() {
-        return match is_image && (!options.exr || ends_in(&"exr")) {
+        return match is_image && (!options.exr || files::ends_in(&options.out, &["exr"])) {
             true => Ok(BTreeMap::from([(options.out.clone(), options.parts.clone())])),
             false => Err(MergeError::Ending(options.out.clone()).into()),
         };
@@ -144,10 +143,9 @@ fn images(options: &MergeOptions) -> Result<BTreeMap<PathBuf, Vec<PathBuf>>, App
 }
 
 fn films_in(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
-    let is_film = |path: &PathBuf| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("film"));
     let mut films = Vec::new();
     for entry in std::fs::read_dir(folder)? {
-        films.extend(Some(entry?.path()).filter(is_film));
+        films.extend(Some(entry?.path()).filter(|path| files::ends_in(path, &["film"])));
     }
     Ok(films)
 }
@@ -186,7 +184,7 @@ fn merge_one(parts: &[PathBuf], image: &Path, incomplete: bool) -> Result<(), Ap
         if start > end {
             return Err(missing(end, start, true).into());
         }
-        film.append(&next.film).map_err(|error: ReferenceError| AppError::from(error))?;
+        film.append(&next.film)?;
         before = part;
     }
     if film.samples() < notes.total && !incomplete {

@@ -7,6 +7,7 @@ use std::path::{Path as FilePath, PathBuf};
 use chrono::{DateTime, Utc};
 
 use super::request::{Clock, Output, Part, RenderOptions, Selection, View};
+use crate::files::ends_in;
 use crate::scene::{LocalTime, Path, Pose, Scene, Viewpoint};
 
 /// Default frames per second of a flight.
@@ -301,11 +302,6 @@ fn instant(clock: Clock, scene: LocalTime, number: u32, frames: u32) -> DateTime
             from.toward(to, f64::from(number) / f64::from(last)).utc()
         }
     }
-}
-
-fn ends_in(path: &FilePath, endings: &[&str]) -> bool {
-    let ends = |extension: &OsStr| endings.iter().any(|ending| extension.eq_ignore_ascii_case(ending));
-    path.extension().is_some_and(ends) && path.file_stem().is_some()
 }
 
 /// The name of frame `number` of `frames`: four digits, or as many as the last one needs.

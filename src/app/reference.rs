@@ -76,7 +76,7 @@ pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Res
         if count > 1 {
             progress.note(&format!("image {} of {count}: {}", number + 1, frame.file.display()));
         }
-        let shot = Exposure {
+        let shot = TraceJob {
             frame,
             size: options.size,
             samples: samples.clone(),
@@ -130,7 +130,7 @@ impl Model {
 
 /// One image to trace.
 #[derive(Clone, Debug)]
-pub(super) struct Exposure<'a> {
+pub(super) struct TraceJob<'a> {
     /// File, camera and instant.
     pub frame: &'a Frame,
     /// Width and height in pixels.
@@ -168,8 +168,8 @@ impl Truth {
     ///
     /// # Errors
     /// Those of [`reference`].
-    pub fn trace(&self, exposure: &Exposure, progress: &mut dyn Progress) -> Result<(), AppError> {
-        let Exposure { frame, size, samples, total, resume } = exposure;
+    pub fn trace(&self, job: &TraceJob, progress: &mut dyn Progress) -> Result<(), AppError> {
+        let TraceJob { frame, size, samples, total, resume } = job;
         let sun = self.stage.sun(frame.instant);
         let atmosphere = Atmosphere::new(AtmosphereParams::with_visibility_km(sun.visibility_km))?;
         let light = Arc::new(sun.light(&atmosphere)?);
@@ -187,8 +187,8 @@ impl Truth {
         };
         let kept = checkpoint_of(&frame.file);
         let fingerprint = tracer.fingerprint(&shot);
-        let notes = self.notes(exposure, &light, &fingerprint);
-        if *resume && !kept.exists() && is_finished(&frame.file, exposure, &fingerprint, &notes) {
+        let notes = self.notes(job, &light, &fingerprint);
+        if *resume && !kept.exists() && is_finished(&frame.file, job, &fingerprint, &notes) {
             progress.note(&format!("{}: finished already", frame.file.display()));
             return Ok(());
         }
@@ -244,15 +244,15 @@ impl Truth {
     }
 
     /// What the film needs to become an image: the renderer's exposure at the camera, and the text of the file.
-    fn notes(&self, exposure: &Exposure, light: &Arc<LightState>, fingerprint: &[u8; 32]) -> FilmNotes {
-        let Exposure { frame, total, .. } = exposure;
+    fn notes(&self, job: &TraceJob, light: &Arc<LightState>, fingerprint: &[u8; 32]) -> FilmNotes {
+        let TraceJob { frame, total, .. } = job;
         let there = CameraExposure::new(light.clone(), self.totals).at(&self.stage.ground(), frame.view.position);
         let mut text = notes(&self.stage, &frame.view, frame.instant);
         text.push(("Fingerprint", blake3::Hash::from_bytes(*fingerprint).to_hex().to_string()));
         FilmNotes {
             total: *total,
             exposure: exposure_from_ev100(there.ev100),
-            night: (light.scotopic.tint.to_array(), light.scotopic.amount, light.scotopic.strength),
+            night: light.scotopic,
             text: text.into_iter().map(|(keyword, value)| (keyword.to_owned(), value)).collect(),
         }
     }
@@ -284,32 +284,32 @@ fn scene(stage: &Stage) -> Result<ReferenceScene, AppError> {
 /// # Errors
 /// [`AppError::Reference`], [`AppError::Write`].
 pub(super) fn save(film: &Film, file: &Path, fingerprint: &[u8; 32], notes: &FilmNotes) -> Result<(), AppError> {
-    if ends_in(file, "exr") {
+    if files::ends_in(file, &["exr"]) {
         return Ok(film.save_exr(file)?);
     }
-    if ends_in(file, "film") {
+    if files::ends_in(file, &["film"]) {
         return Ok(film.keep(file, fingerprint, &notes.to_bytes())?);
     }
     notes.image(film)?.save(file, &notes.text_of(film.samples()))
 }
 
 /// Whether `file` is the finished image of these samples. OpenEXR files do not say what they are of.
-fn is_finished(file: &Path, exposure: &Exposure, fingerprint: &[u8; 32], notes: &FilmNotes) -> bool {
-    let Range { start, end } = exposure.samples;
-    if ends_in(file, "png") {
-        return RenderedImage::is_stored(file, exposure.size, &notes.text_of(end - start));
+fn is_finished(file: &Path, job: &TraceJob, fingerprint: &[u8; 32], notes: &FilmNotes) -> bool {
+    let Range { start, end } = job.samples;
+    if files::ends_in(file, &["png"]) {
+        return RenderedImage::is_stored(file, job.size, &notes.text_of(end - start));
     }
     let film = |kept: KeptFilm| {
         kept.fingerprint == *fingerprint && (kept.film.first(), kept.film.samples()) == (start, end - start)
     };
-    ends_in(file, "film") && KeptFilm::load(file).ok().flatten().is_some_and(film)
-}
-
-fn ends_in(file: &Path, ending: &str) -> bool {
-    file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(ending))
+    files::ends_in(file, &["film"]) && KeptFilm::load(file).ok().flatten().is_some_and(film)
 }
 
 /// The file that has the state of a trace. That of a film is its own: another part has other samples.
 fn checkpoint_of(file: &Path) -> PathBuf {
-    if ends_in(file, "film") { file.with_added_extension("checkpoint") } else { file.with_extension("checkpoint") }
+    if files::ends_in(file, &["film"]) {
+        file.with_added_extension("checkpoint")
+    } else {
+        file.with_extension("checkpoint")
+    }
 }

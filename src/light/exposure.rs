@@ -119,7 +119,7 @@ pub fn exposure_from_ev100(ev100: f32) -> f32 {
 /// A pixel of the luminance `Y` nits loses `min(amount, strength * rods(Y))` of its colour: what is bright, the glow
 /// of dusk or the moon, keeps its colour by night, and a shadow keeps it by day. `rods` falls from 1 at 0.01 nits to
 /// 0 at 4 nits (10^0.6) as a smoothstep of the logarithm (Jensen et al. 2000, eq. 4).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ScotopicTint {
     /// Linear Rec. 709 colour of luminance 1 that rod vision is displayed in.
     pub tint: Vec3,

@@ -87,8 +87,7 @@ pub fn bake(options: &BakeOptions, progress: &mut dyn Progress) -> Result<(), Ap
 }
 
 fn check_kind(path: &Path) -> Result<(), AppError> {
-    let known =
-        path.extension().is_some_and(|ending| ["glb", "gltf"].iter().any(|kind| ending.eq_ignore_ascii_case(kind)));
+    let known = crate::files::ends_in(path, &["glb", "gltf"]);
     if known { Ok(()) } else { Err(AppError::NoPlant { path: path.to_owned() }) }
 }
 

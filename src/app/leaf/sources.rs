@@ -42,7 +42,7 @@ pub fn material(options: &LeafOptions, progress: &mut dyn Progress) -> Result<Pl
 }
 
 fn is_plant(path: &Path) -> bool {
-    path.extension().is_some_and(|ending| ["glb", "gltf"].iter().any(|kind| ending.eq_ignore_ascii_case(kind)))
+    crate::files::ends_in(path, &["glb", "gltf"])
 }
 
 fn of_image(options: &LeafOptions, progress: &mut dyn Progress) -> Result<PlantMaterial, AppError> {

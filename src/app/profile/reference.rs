@@ -6,7 +6,7 @@ use super::{error::ProfileError, stages::Stages, views::ProfileView};
 use crate::{
     app::{
         AppError, Frame, RenderedImage, Renderer, adapter,
-        reference::{Exposure, Model, Truth},
+        reference::{Model, TraceJob, Truth},
     },
     assets::Stage,
     bake::BakedPlant,
@@ -234,7 +234,7 @@ fn trace_all(
         // An earlier trace of the same scene, light and camera is its cache.
         let mut trace = |name: String, samples: u32| {
             let frame = Frame { file: asked.folder.join(name), view: view.view, instant: view.instant };
-            let whole = Exposure { frame: &frame, size: asked.size, samples: 0..samples, total: samples, resume: true };
+            let whole = TraceJob { frame: &frame, size: asked.size, samples: 0..samples, total: samples, resume: true };
             truth.trace(&whole, progress).map(|()| frame.file)
         };
         let half = if samples > 1 { Some(trace(format!("{}-half.png", view.name), samples / 2)?) } else { None };

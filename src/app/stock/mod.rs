@@ -14,32 +14,31 @@ mod trees;
 use std::{ops::Range, time::Instant};
 
 use bevy::{
-    app::{App, PluginGroup, PluginsState, TerminalCtrlCHandlerPlugin},
-    asset::{Assets, Handle, RenderAssetUsages},
+    app::App,
+    asset::Handle,
     camera::{Camera, Camera3d, ClearColorConfig, Exposure, PerspectiveProjection, Projection, RenderTarget},
     color::{Color, LinearRgba},
     core_pipeline::tonemapping::Tonemapping,
     ecs::{entity::Entity, world::World},
     image::Image,
     light::{CascadeShadowConfigBuilder, DirectionalLight, DirectionalLightShadowMap, GlobalAmbientLight},
-    log::LogPlugin,
     math::Vec3,
-    prelude::{DefaultPlugins, Transform},
+    prelude::Transform,
     render::{
-        RenderApp, RenderPlugin,
-        pipelined_rendering::PipelinedRenderingPlugin,
+        RenderApp,
         render_asset::RenderAssets,
-        render_resource::{Extent3d, PollType, TextureDimension, TextureFormat, TextureUsages},
+        render_resource::PollType,
         renderer::{RenderDevice, RenderQueue},
-        settings::{RenderCreation, WgpuSettings},
+        settings::WgpuSettings,
         texture::GpuImage,
         view::Msaa,
     },
-    window::{ExitCondition, WindowPlugin},
-    winit::WinitPlugin,
 };
 
-use super::{AppError, RenderedImage, UpdateTime};
+use super::{
+    AppError, RenderedImage, UpdateTime,
+    headless::{app_without_window, render_target},
+};
 use crate::{
     bake::BakedPlant,
     light::LightState,
@@ -106,32 +105,9 @@ pub struct StockRenderer {
 }
 
 impl StockRenderer {
-    /// Spawns `scene` in an app to which `prepare` adds plugins. It logs nothing: the other renderer of the process has the log.
+    /// Spawns `scene` in an app to which `prepare` adds plugins.
     pub fn new(scene: &StockScene, settings: WgpuSettings, prepare: impl FnOnce(&mut App)) -> Self {
-        let mut app = App::new();
-        app.add_plugins(
-            DefaultPlugins
-                .set(WindowPlugin {
-                    primary_window: None,
-                    exit_condition: ExitCondition::DontExit,
-                    ..WindowPlugin::default()
-                })
-                .set(RenderPlugin {
-                    render_creation: RenderCreation::Automatic(Box::new(settings)),
-                    synchronous_pipeline_compilation: true,
-                    ..RenderPlugin::default()
-                })
-                .disable::<LogPlugin>()
-                .disable::<WinitPlugin>()
-                .disable::<TerminalCtrlCHandlerPlugin>()
-                .disable::<PipelinedRenderingPlugin>(),
-        );
-        prepare(&mut app);
-        while app.plugins_state() == PluginsState::Adding {
-            bevy::tasks::tick_global_task_pools_on_main_thread();
-        }
-        app.finish();
-        app.cleanup();
+        let mut app = app_without_window(settings, prepare);
         app.insert_resource(DirectionalLightShadowMap { size: scene.shadow_map_size as usize });
         trees::spawn(&mut app, scene);
         ground::spawn(&mut app, scene);
@@ -247,15 +223,4 @@ impl StockRenderer {
 
 fn linear(color: Vec3) -> Color {
     LinearRgba::rgb(color.x, color.y, color.z).into()
-}
-
-fn render_target(app: &mut App, (width, height): (u32, u32)) -> Handle<Image> {
-    let mut image = Image::new_uninit(
-        Extent3d { width, height, depth_or_array_layers: 1 },
-        TextureDimension::D2,
-        TextureFormat::Rgba8UnormSrgb,
-        RenderAssetUsages::RENDER_WORLD,
-    );
-    image.texture_descriptor.usage |= TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC;
-    app.world_mut().resource_mut::<Assets<Image>>().add(image)
 }

@@ -45,7 +45,7 @@ impl AssetLoader for PlantLoader {
     ) -> Result<PlantAsset, StageError> {
         let path = context.path().path().to_owned();
         let bytes = read::all(reader, &path).await?;
-        let recipe = if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("ron")) {
+        let recipe = if crate::files::ends_in(&path, &["ron"]) {
             species(&bytes, &path, settings, context).await?
         } else {
             let files = files_of(&bytes, &path, context).await?;
