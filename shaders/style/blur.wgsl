@@ -4,6 +4,8 @@
 struct BlurJob {
     // From one point to the next, in texels: 3/8 of the standard deviation.
     step: vec2<f32>,
+    // Texels of the source along the sides of a texel of the target.
+    scale: vec2<f32>,
     first_layer: u32,
 }
 
@@ -35,7 +37,7 @@ fn fragment(in: Corner) -> @location(0) vec4<f32> {
     for (var i = -REACH; i <= REACH; i += 1) {
         let x = 0.375 * f32(i);
         let weight = exp(-0.5 * x * x);
-        let at = in.clip.xy + f32(i) * job.step;
+        let at = in.clip.xy * job.scale + f32(i) * job.step;
 #ifdef IDENTITIES
         let texel = vec2<i32>(clamp(at, vec2(0.0), size - 1.0));
         let layer = textureLoad(source, texel, 0).x - job.first_layer;

@@ -18,7 +18,8 @@ use glam::Vec4;
 use half::f16;
 
 use super::{
-    targets::StyleTargets,
+    blur::Deviations,
+    targets::{MapKey, StyleTargets},
     uniforms::{BlurUniform, LayerUniform, StyleUniform},
 };
 use crate::{
@@ -95,32 +96,6 @@ impl FromWorld for StyleInputs {
     }
 }
 
-/// Standard deviations of the Gaussians for one style, pixels of a picture of 720 lines.
-struct Deviations {
-    shapes: f32,
-    lights: f32,
-    wide: f32,
-    normals: f32,
-    dabs: f32,
-}
-
-impl Deviations {
-    fn of(style: &Style) -> Self {
-        match style {
-            Style::Watercolour(w) => {
-                let s = w.simplification;
-                Self { shapes: s, lights: 0.6 * s, wide: 3.0 * s, normals: 0.6 * s, dabs: 0.3 * s }
-            }
-            Style::Lines(l) => {
-                let s = l.simplification;
-                Self { shapes: 0.0, lights: s, wide: 0.0, normals: s, dabs: 0.0 }
-            }
-            Style::Toon(_) => Self { shapes: 0.0, lights: 1.6, wide: 0.0, normals: 1.2, dabs: 0.0 },
-            Style::Photograph => Self { shapes: 0.0, lights: 0.0, wide: 0.0, normals: 0.0, dabs: 0.0 },
-        }
-    }
-}
-
 /// Uploads the style's values, and what follows from palette, paper and plants when those change.
 pub fn prepare_inputs(
     views: Query<&DrawnStyle, With<CanopyCamera>>,
@@ -137,7 +112,7 @@ pub fn prepare_inputs(
     };
     let uniform = StyleUniform::new(drawn, view, maps.picture, maps.key.size);
     gpu.queue.write_buffer(&inputs.uniform, 0, bytemuck::bytes_of(&uniform));
-    write_blurs(&gpu, &inputs.blurs, &Deviations::of(&drawn.style), maps.key.size.1, maps.key.layers);
+    write_blurs(&gpu, &inputs.blurs, &Deviations::of(&drawn.style), &maps.key);
 
     let wetness = if let Style::Watercolour(w) = &drawn.style { w.wetness } else { 0.0 };
     let key = InputKey { palette: drawn.palette().cloned(), paper: drawn.paper(), layers: maps.key.layers, wetness };
@@ -154,15 +129,25 @@ pub fn prepare_inputs(
 }
 
 /// Writes the steps of all Gaussians, in the order in which `blur` runs them.
-fn write_blurs(gpu: &Gpu, buffer: &Buffer, deviations: &Deviations, lines: u32, layers: u32) {
-    let maps = [deviations.lights, deviations.wide, deviations.normals, deviations.lights, deviations.dabs]
-        .map(|deviation| (deviation, 0));
-    let slices = (0..layers.div_ceil(4)).map(|slice| (deviations.shapes, 4 * slice));
-    for (index, (deviation, first_layer)) in maps.into_iter().chain(slices).enumerate() {
+fn write_blurs(gpu: &Gpu, buffer: &Buffer, deviations: &Deviations, key: &MapKey) {
+    let maps = [
+        (deviations.lights, 1),
+        (deviations.wide, key.wide_divisor),
+        (deviations.normals, 1),
+        (deviations.lights, key.color_divisor),
+        (deviations.dabs, 1),
+    ];
+    let maps = maps.map(|(deviation, divisor)| (deviation, divisor, 0));
+    let slices = (0..key.layers.div_ceil(4)).map(|slice| (deviations.shapes, 1, 4 * slice));
+    for (index, (deviation, divisor, first_layer)) in maps.into_iter().chain(slices).enumerate() {
         // The shader's points are 3/8 of the deviation apart.
-        let step = 0.375 * deviation * lines as f32 / 720.0;
-        for (axis, step) in [[step, 0.0], [0.0, step]].into_iter().enumerate() {
-            let uniform = BlurUniform { step, first_layer, padding: 0 };
+        let step = 0.375 * deviation * key.size.1 as f32 / 720.0;
+        let coarse = key.coarse(divisor);
+        let ratio = [key.size.0 as f32 / coarse.0 as f32, key.size.1 as f32 / coarse.1 as f32];
+        // The first axis leads to the size of the target, the second stays at it.
+        let axes = [([step, 0.0], ratio), ([0.0, step / ratio[1]], [1.0; 2])];
+        for (axis, (step, scale)) in axes.into_iter().enumerate() {
+            let uniform = BlurUniform { step, scale, first_layer, padding: 0 };
             let slot = (2 * index + axis) as u64;
             if slot < MOST_BLURS {
                 gpu.queue.write_buffer(buffer, slot * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));

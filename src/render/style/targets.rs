@@ -17,6 +17,7 @@ use bevy::{
     },
 };
 
+use super::blur::{self, Deviations};
 use crate::render::{
     components::{CanopyCamera, DrawnStyle},
     forest::GpuForests,
@@ -42,6 +43,17 @@ pub struct MapKey {
     pub layers: u32,
     /// Whether there are particles.
     pub dabs: bool,
+    /// Texels along a side that become one in the map of the light around.
+    pub wide_divisor: u32,
+    /// The same in that of the colours.
+    pub color_divisor: u32,
+}
+
+impl MapKey {
+    /// Texels of a map of which `divisor` along a side become one.
+    pub fn coarse(&self, divisor: u32) -> (u32, u32) {
+        (self.size.0.div_ceil(divisor), self.size.1.div_ceil(divisor))
+    }
 }
 
 /// The maps.
@@ -70,6 +82,10 @@ pub struct StyleMaps {
     pub soft_colors: TextureView,
     /// What is blurred along one axis.
     pub half_blurred: TextureView,
+    /// The same of the light around.
+    pub half_wide: TextureView,
+    /// The same of albedo.
+    pub half_colors: TextureView,
     /// The same of layers.
     pub half_shapes: TextureView,
     /// One view a slice of four layers.
@@ -116,10 +132,15 @@ pub fn prepare_targets(
     let most = device.limits().max_texture_dimension_2d;
     let texels = |pixels: u32| ((pixels as f32 * drawn.map_scale()).round() as u32).clamp(1, most);
     let picture = (view.viewport.z.max(1), view.viewport.w.max(1));
+    let size = (texels(picture.0), texels(picture.1));
+    let deviations = Deviations::of(&drawn.style);
+    let divisor = |deviation: f32| blur::divisor(deviation * size.1 as f32 / 720.0);
     let key = MapKey {
-        size: (texels(picture.0), texels(picture.1)),
+        size,
         layers: layer_count(&drawn.style, &forests),
         dabs: has_particles(&drawn.style),
+        wide_divisor: divisor(deviations.wide),
+        color_divisor: divisor(deviations.lights),
     };
     match &mut targets.0 {
         Some(maps) if maps.key == key => maps.picture = picture,
@@ -143,6 +164,10 @@ impl StyleMaps {
         };
         let view = |texture: Texture| texture.create_view(&TextureViewDescriptor::default());
         let map = |label| view(texture(label, MAP_FORMAT, 1, key.size));
+        // Only layers are painted with the light around and with soft colours.
+        let coarse = |label, divisor| {
+            view(texture(label, MAP_FORMAT, 1, if key.layers > 0 { key.coarse(divisor) } else { (1, 1) }))
+        };
         // Without layers a single texel is bound.
         let slices = key.layers.div_ceil(4).max(1);
         let shape_size = if key.layers > 0 { key.size } else { (1, 1) };
@@ -165,15 +190,12 @@ impl StyleMaps {
             colors: view(texture("canopy_style_colors", COLOR_FORMAT, 1, key.size)),
             lights: map("canopy_style_lights"),
             soft_lights: map("canopy_style_soft_lights"),
-            wide_lights: map("canopy_style_wide_lights"),
+            wide_lights: coarse("canopy_style_wide_lights", key.wide_divisor),
             soft_normals: map("canopy_style_soft_normals"),
-            soft_colors: view(texture(
-                "canopy_style_soft_colors",
-                MAP_FORMAT,
-                1,
-                if key.layers > 0 { key.size } else { (1, 1) },
-            )),
+            soft_colors: coarse("canopy_style_soft_colors", key.color_divisor),
             half_blurred: map("canopy_style_half_blurred"),
+            half_wide: coarse("canopy_style_half_wide", key.wide_divisor),
+            half_colors: coarse("canopy_style_half_colors", key.color_divisor),
             half_shapes: view(texture("canopy_style_half_shapes", SHAPE_FORMAT, 1, shape_size)),
             shape_slices: (0..key.layers.div_ceil(4)).map(slice).collect(),
             shapes: shapes.create_view(&array),

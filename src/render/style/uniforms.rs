@@ -112,6 +112,8 @@ pub struct ParticleViewUniform {
 pub struct BlurUniform {
     /// From one point to the next, in texels.
     pub step: [f32; 2],
+    /// Texels of the source along the sides of a texel of the target.
+    pub scale: [f32; 2],
     /// First of the four layers, for identifiers.
     pub first_layer: u32,
     /// WGSL rounds the size up to 8 bytes.
