@@ -107,3 +107,36 @@ fn a_forest_is_exported_once_as_instances_and_as_nodes_and_read_back_whole() -> 
     );
     Ok(())
 }
+
+#[test]
+fn a_photograph_over_the_ground_is_its_texture() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    std::fs::write(folder.path().join("four.png"), crate::drape::four())?;
+    let scene = folder.path().join("plane.ron");
+    let place = crate::support::stage::PLACE;
+    std::fs::write(&scene, format!("({}, {place}, drape: (path: \"four.png\", brightness: 1))", crate::drape::FLAT))?;
+    let out = folder.path().join("plane.glb");
+    let written = canopy(&["export", &scene.display().to_string(), "--out", &out.display().to_string()])?;
+    assert_eq!(written.status.code(), Some(0), "{}", said(&written));
+    assert!(said(&written).contains("stretched over the whole terrain"), "{}", said(&written));
+    let whole = gltf::Gltf::from_slice(&std::fs::read(&out)?)?;
+    let bytes = whole.blob.as_deref().ok_or("no buffer")?;
+    let primitive = whole.meshes().next().and_then(|mesh| mesh.primitives().next()).ok_or("no ground")?;
+    let reader = primitive.reader(|_| Some(bytes));
+    let positions: Vec<[f32; 3]> = reader.read_positions().ok_or("no positions")?.collect();
+    let uvs: Vec<[f32; 2]> = reader.read_tex_coords(0).ok_or("no coordinates")?.into_f32().collect();
+    // North-west is the first texel, and the ground faces up.
+    for ([x, _, z], [u, v]) in positions.into_iter().zip(uvs) {
+        assert!((u - (x / 200.0 + 0.5)).abs() < 1e-5 && (v - (z / 200.0 + 0.5)).abs() < 1e-5, "{x} {z} {u} {v}");
+    }
+    let gltf::image::Source::View { view, .. } = whole.images().next().ok_or("no image")?.source() else {
+        return Err("an image beside the file".into());
+    };
+    let image = image::load_from_memory(&bytes[view.offset()..view.offset() + view.length()])?.into_rgb8();
+    assert_eq!(image.width(), 64);
+    let texel = |x: u32, y: u32| image.get_pixel(x, y).0;
+    assert!(texel(10, 10)[0] > 180 && texel(50, 10)[1] > 160 && texel(10, 50)[2] > 200);
+    let sampler = whole.textures().next().ok_or("no texture")?.sampler();
+    assert_eq!(sampler.wrap_s(), gltf::texture::WrappingMode::MirroredRepeat);
+    Ok(())
+}

@@ -17,7 +17,7 @@ use canopy::{
     },
     scatter::{InventoryOptions, parse_inventory},
     scene::Scene,
-    terrain::{ImageScale, ReadOptions, read_terrain_bytes},
+    terrain::{HeightField, ImageScale, ReadOptions, Surroundings, Terrain, read_drape_bytes, read_terrain_bytes},
 };
 use tiff::{
     encoder::{TiffEncoder, colortype},
@@ -147,6 +147,42 @@ fn damaged_terrains_are_answered() {
     fuzz("terrain", &[geotiff(), png(), grid.as_bytes().to_vec()], |bytes| {
         if let Ok((terrain, _)) = read_terrain_bytes(bytes, Path::new("terrain"), &options) {
             assert!(terrain.height(1.0, 2.0).is_finite() && terrain.extent().is_finite());
+        }
+    });
+}
+
+#[test]
+fn damaged_photographs_are_answered() {
+    let photo = |format| {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        let image = image::RgbImage::from_fn(24, 16, |x, y| image::Rgb([10 * x as u8, 10 * y as u8, 77]));
+        image.write_to(&mut bytes, format).expect("a photograph");
+        bytes.into_inner()
+    };
+    let mut tiff = std::io::Cursor::new(Vec::new());
+    let mut write = || -> tiff::TiffResult<()> {
+        let mut encoder = TiffEncoder::new(&mut tiff)?;
+        let mut image = encoder.new_image::<colortype::RGBA8>(9, 7)?;
+        image.encoder().write_tag(Tag::ModelPixelScaleTag, &[10.0, 10.0, 0.0][..])?;
+        image.encoder().write_tag(Tag::ModelTiepointTag, &[0.0, 0.0, 0.0, 500_000.0, 4_000_000.0, 0.0][..])?;
+        image.encoder().write_tag(Tag::GeoKeyDirectoryTag, &[1u16, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 32617][..])?;
+        image.encoder().write_tag(Tag::GdalNodata, "0")?;
+        image.write_data(&(0..252u8).collect::<Vec<_>>())
+    };
+    write().expect("a GeoTIFF");
+    let (terrain, _) =
+        read_terrain_bytes(&geotiff(), Path::new("terrain"), &ReadOptions::default()).expect("a terrain");
+    let bare = HeightField::new(2, 2, glam::DVec2::splat(50.0), vec![0.0; 4]).expect("a plane");
+    let bare = Terrain::new(bare, None, Surroundings::Mirror);
+    let files = [tiff.into_inner(), photo(image::ImageFormat::Png), photo(image::ImageFormat::Jpeg)];
+    for terrain in [&terrain, &bare] {
+        assert!(read_drape_bytes(files[0].clone(), Path::new("photo"), None, terrain).is_ok(), "a control");
+    }
+    fuzz("photograph", &files, |bytes| {
+        for terrain in [&terrain, &bare] {
+            if let Ok((drape, _)) = read_drape_bytes(bytes.to_vec(), Path::new("photo"), None, terrain) {
+                assert!(drape.sample(glam::DVec2::new(1.0, 2.0)).is_finite() && drape.texel().is_finite());
+            }
         }
     });
 }

@@ -6,6 +6,7 @@ mod app;
 mod bake;
 mod cli;
 mod compare;
+mod drape;
 mod export;
 mod front_door;
 mod fuzz;

@@ -2,6 +2,7 @@
 
 mod arrival;
 mod device;
+mod drape;
 mod exposure;
 mod foliage;
 mod forests;

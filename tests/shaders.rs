@@ -22,7 +22,7 @@ use canopy::{
         },
         shaders::{ShaderFile, sources},
         style::uniforms::{BlurUniform, GpuParticle, LayerUniform, ParticleViewUniform, StyleUniform},
-        terrain::{GpuTile, GpuTileVertex},
+        terrain::{DrapeUniform, GpuTile, GpuTileVertex},
     },
     scatter::PackedTree,
 };
@@ -34,7 +34,7 @@ use naga::{
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 
 /// All that the pipelines switch on or off.
-const DEFINES: [&str; 14] = [
+const DEFINES: [&str; 16] = [
     "FOLIAGE",
     "ALPHA_TO_COVERAGE",
     "NORMAL_MAP",
@@ -49,6 +49,8 @@ const DEFINES: [&str; 14] = [
     "OWN_NORMALS",
     "IDENTITIES",
     "TOON",
+    "DRAPE",
+    "SOFT_SHADOW",
 ];
 
 /// All combinations of [`DEFINES`]; some mean something with transfer only, and crosses have no others with their depth
@@ -59,13 +61,13 @@ fn variants() -> impl Iterator<Item = Vec<&'static str>> {
     });
     let needs = ["TRANSFER_COLOR", "SUN_HARMONICS", "PLAIN_TOO"];
     let never_of_crosses = ["NORMAL_MAP", "LAYERED", "TRANSFER_COLOR", "SUN_HARMONICS", "SUN_DETAIL"];
-    // Of the styles, only foliage has a variant, and only without light.
-    let styles = ["STYLED", "OWN_NORMALS", "IDENTITIES", "TOON"];
+    // Of the styles, only foliage and the ground have variants, and only without light; the ground has no others.
+    let styles = ["STYLED", "OWN_NORMALS", "IDENTITIES", "TOON", "DRAPE", "SOFT_SHADOW"];
     let style_variant = |defines: &[&str]| match defines {
-        ["IDENTITIES"] | ["TOON"] => true,
+        ["IDENTITIES"] | ["TOON"] | ["DRAPE"] | ["SOFT_SHADOW"] | ["DRAPE", "SOFT_SHADOW"] => true,
         _ => {
             defines.contains(&"STYLED")
-                && defines.iter().all(|define| ["FOLIAGE", "STYLED", "OWN_NORMALS"].contains(define))
+                && defines.iter().all(|define| ["FOLIAGE", "STYLED", "OWN_NORMALS", "DRAPE"].contains(define))
         }
     };
     let any_of = |defines: &[&str], some: &[&str]| some.iter().any(|define| defines.contains(define));
@@ -254,7 +256,8 @@ fn gpu_structs_are_what_the_shaders_think() {
         }
     );
     twin!(layouts, "Cascade", CascadeUniform { map_from_relative, texel, radius });
-    twin!(layouts, "Shadow", ShadowUniform { cascades, ground, cascade_count, inverse_map_size });
+    twin!(layouts, "Shadow", ShadowUniform { cascades, ground, cascade_count, inverse_map_size, softness });
+    twin!(layouts, "Drape", DrapeUniform { origin, inverse_size, edge, texel, brightness, mirrored });
     twin!(layouts, "CascadeView", CascadeViewUniform { clip_from_anchor, direction });
     twin!(
         layouts,
@@ -357,7 +360,7 @@ fn gpu_structs_are_what_the_shaders_think() {
         }
     );
     twin!(layouts, "Layer", LayerUniform { threshold, softness, edge, foliage });
-    twin!(layouts, "BlurJob", BlurUniform { step, first_layer });
+    twin!(layouts, "BlurJob", BlurUniform { step, scale, first_layer });
     twin!(layouts, "Particle", GpuParticle { position, normal });
     twin!(
         layouts,

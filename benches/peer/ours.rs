@@ -33,6 +33,7 @@ impl Ours {
         cameras.iter_mut(world).for_each(|mut options| options.depth_first = look.depth_first);
         if look.ground {
             world.spawn(Ground {
+                drape: None,
                 terrain: field.terrain.clone(),
                 cover: Some(field.cover.clone()),
                 surroundings: 0.0,

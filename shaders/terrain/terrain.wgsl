@@ -1,12 +1,16 @@
 // The ground: tiles that morph into each other (src/terrain/tiles), coloured by slope, canopy cover and noise.
 #import canopy::octahedral::decode_octahedral_y
-#import canopy::constants::TILE_SIDE
+#import canopy::constants::{TILE_SIDE, DETAIL_TEXELS, LEAST_DETAIL, MOST_DETAIL}
 #import canopy::frame::{frame, light, shadow}
 #import canopy::ground_color::{GroundColor, ground_color}
-#import canopy::lighting::{Surface, shade_matt, even_sky}
+#import canopy::lighting::{LUMINANCE, Surface, shade_matt, even_sky}
 #import canopy::output::finish
 #import canopy::stand::{ground_light, stand_light}
 #import canopy::sun_visibility::{GroundSample, sample_ground, terrain_visibility, cascaded_visibility}
+#ifdef SOFT_SHADOW
+#import canopy::soft_shadow::soft_visibility
+#import canopy::sun_visibility::{CascadeSample, cascade_at, cascade_weight}
+#endif
 #ifdef STYLED
 #import canopy::constants::{GROUND_LAYER, FIRST_FOLIAGE_LAYER}
 #import canopy::style_surface::{StyledSurface, styled_surface}
@@ -37,6 +41,27 @@ struct Tile {
 
 @group(1) @binding(0) var<storage, read> vertices: array<TileVertex>;
 @group(1) @binding(1) var<storage, read> tiles: array<Tile>;
+
+#ifdef DRAPE
+// A photograph over the ground (src/terrain/drape).
+struct Drape {
+    // North-western corner relative to the camera (x, z), metres.
+    origin: vec2<f32>,
+    inverse_size: vec2<f32>,
+    // Metres over which it gives way to the ground at its border.
+    edge: f32,
+    // Metres of a texel.
+    texel: f32,
+    // Factor from its values to reflectance.
+    brightness: f32,
+    // 1 where it is mirrored at its borders, else 0.
+    mirrored: f32,
+}
+
+@group(1) @binding(2) var<uniform> drape: Drape;
+@group(1) @binding(3) var drape_texture: texture_2d<f32>;
+@group(1) @binding(4) var drape_sampler: sampler;
+#endif
 
 struct Varying {
     @builtin(position) clip: vec4<f32>,
@@ -107,6 +132,28 @@ fn color_of_pixel(in: Varying, normal: vec3<f32>, cover: f32, far: f32) -> Groun
     return GroundColor(sum.albedo / places, sum.tilt / places, sum.ambient_visibility / places);
 }
 
+#ifdef DRAPE
+// The albedo under a photograph, where `own` is that of the ground without it. What the photograph is too coarse for, it has
+// from the ground's own colour. The twin is Soil::albedo in src/reference/soil.rs.
+fn draped(in: Varying, normal: vec3<f32>, cover: f32, far: f32, own: vec3<f32>) -> vec3<f32> {
+    let uv = (in.relative.xz - drape.origin) * drape.inverse_size;
+    // Colour times opacity, and opacity.
+    let photo = textureSampleGrad(drape_texture, drape_sampler, uv, dpdx(uv), dpdy(uv));
+    let to_border = min(uv, 1.0 - uv) / drape.inverse_size;
+    let inside = max(smoothstep(0.0, max(drape.edge, 1e-6), min(to_border.x, to_border.y)), drape.mirrored);
+    let shown = photo * inside;
+
+    let across = length(in.relative) / frame.focal_length_pixels;
+    var detail = 1.0;
+    if across < DETAIL_TEXELS * drape.texel {
+        let place = frame.camera.xz + in.relative.xz;
+        let mean = ground_color(place, 1.0 - normal.y, cover, far, DETAIL_TEXELS * drape.texel).albedo;
+        detail = clamp(dot(own, LUMINANCE) / max(dot(mean, LUMINANCE), 1e-4), LEAST_DETAIL, MOST_DETAIL);
+    }
+    return clamp(own * (1.0 - shown.a) + shown.rgb * (drape.brightness * detail), vec3(0.0), vec3(1.0));
+}
+#endif
+
 fn seen_at(in: Varying) -> Seen {
     let normal = normalize(in.normal);
     let ground = sample_ground(in.relative);
@@ -116,7 +163,11 @@ fn seen_at(in: Varying) -> Seen {
     let undrawn = select(ground.undrawn_cover, frame.mean_cover, outside);
     let cover = undrawn + select(ground.cover, 0.0, outside);
     let far = undrawn / max(cover, 1e-3);
-    return Seen(normal, ground, outside, cover, undrawn, far, color_of_pixel(in, normal, cover, far));
+    var color = color_of_pixel(in, normal, cover, far);
+#ifdef DRAPE
+    color.albedo = draped(in, normal, cover, far, color.albedo);
+#endif
+    return Seen(normal, ground, outside, cover, undrawn, far, color);
 }
 
 // Relief that leaves level ground at least half of the light: in a low sun its slopes would be black blots, as nothing that
@@ -142,7 +193,13 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let stand = ground_light(shade_cover);
     var visibility = select(terrain_visibility(seen.ground, 0.0), 1.0, seen.outside);
     if visibility > 0.0 {
+#ifdef SOFT_SHADOW
+        let distance = length(in.relative);
+        let soft = soft_visibility(cascade_at(distance, in.clip.xy), in.relative, seen.normal, shadow.softness);
+        let cascades = CascadeSample(soft, cascade_weight(distance));
+#else
         let cascades = cascaded_visibility(in.relative, seen.normal, 1.0, in.clip.xy);
+#endif
         // Beyond the maps: the fraction of light that passes between the crowns.
         let passed = mix(stand.key_transmittance, cascades.visibility, cascades.weight);
         // A canopy is rough: in low light its crowns shade each other near their tops, as those of drawn trees do.

@@ -40,9 +40,16 @@ fn hash(hasher: &mut blake3::Hasher, path: &Path) {
 fn paths(scene: &mut Scene) -> Vec<&mut PathBuf> {
     let mut paths = Vec::new();
     match &mut scene.terrain {
-        Ground::File(file) => paths.push(&mut file.path),
+        Ground::File(file) => {
+            paths.push(&mut file.path);
+            paths.extend(&mut file.tiles);
+        }
         Ground::Image(image) => paths.push(&mut image.path),
         Ground::Noise(_) | Ground::Flat(_) => {}
+    }
+    if let Some(drape) = &mut scene.drape {
+        paths.push(&mut drape.path);
+        paths.extend(&mut drape.tiles);
     }
     if let Trees::Inventory(inventory) = &mut scene.trees {
         paths.push(&mut inventory.path);

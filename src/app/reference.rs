@@ -28,7 +28,10 @@ use crate::{
         Camera, Film, Fog, Ground, GroundColor, GroundShape, Instance, KeptFilm, Light, PathTracer, ReferenceError,
         ReferenceScene, Shot, Soil, TraceSettings,
     },
-    render::exposure::{CameraExposure, StandTotals},
+    render::{
+        components::GroundDrape,
+        exposure::{CameraExposure, StandTotals},
+    },
     scene::Scene,
 };
 
@@ -271,9 +274,13 @@ fn interrupted(samples: u32, total: u32, checkpoint: &Path) -> AppError {
 
 fn scene(stage: &Stage) -> Result<ReferenceScene, AppError> {
     let plants: Vec<_> = stage.plants.iter().map(|baked| baked.plant.clone()).collect();
+    let mut soil = Soil::new(&stage.terrain, stage.cover.clone(), stage.surroundings);
+    if let Some(GroundDrape { drape, brightness }) = &stage.drape {
+        soil = soil.with_drape(drape.clone(), *brightness);
+    }
     let ground = Ground {
         shape: GroundShape::Terrain(stage.terrain.clone()),
-        color: GroundColor::Soil(Soil::new(&stage.terrain, stage.cover.clone(), stage.surroundings).into()),
+        color: GroundColor::Soil(soil.into()),
         max_distance: stage.scene.quality.view_distance,
     };
     Ok(ReferenceScene::new(&plants, &Instance::of_stand(&stage.stand, DVec3::ZERO), Some(ground))?)

@@ -1,15 +1,18 @@
 //! The ground of a scene: from a file, an image, noise, or flat.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::DVec2;
 
 use super::StageError;
 use crate::{
     progress::Progress,
+    render::components::GroundDrape,
     scene,
     terrain::{
-        HeightField, NoiseKind, NoiseTerrain, ReadOptions, Surroundings, Terrain, read_terrain, read_terrain_tiles,
+        HeightField, NoiseKind, NoiseTerrain, ReadOptions, Surroundings, Terrain, read_drape, read_terrain,
+        read_terrain_tiles,
     },
 };
 
@@ -73,6 +76,22 @@ pub fn build_terrain(ground: &scene::Ground, progress: &mut dyn Progress) -> Res
             Terrain::new(field, None, surroundings)
         }
     })
+}
+
+/// Reads the photograph over the ground of a scene; decisions of the readers become warnings.
+///
+/// # Errors
+/// [`StageError::Terrain`].
+pub fn build_drape(
+    drape: &scene::Drape,
+    terrain: &Terrain,
+    progress: &mut dyn Progress,
+) -> Result<GroundDrape, StageError> {
+    let (read, warnings) = read_drape(&drape.files(), drape.coordinates, terrain)?;
+    for warning in warnings {
+        progress.warn(&warning.to_string());
+    }
+    Ok(GroundDrape { drape: Arc::new(read), brightness: drape.brightness as f32 })
 }
 
 fn exaggerated(terrain: Terrain, factor: f64) -> Result<Terrain, StageError> {

@@ -15,7 +15,7 @@ use crate::{
     light::sun::Observer,
     progress::Progress,
     render::{
-        components::{CanopyStyle, Forest, Ground, SunShadowSettings},
+        components::{CanopyStyle, Forest, Ground, GroundDrape, SunShadowSettings},
         forest::most_trees,
     },
     scatter::{CoverMap, PackedStand, PlantSize, ScatterError, Surveys, bounded_cover_map, packed::DEFAULT_CELL_SIZE},
@@ -36,6 +36,8 @@ const NO_PLANT: PlantSize = PlantSize { radius: 0.1, height: 0.1 };
 pub struct Stage {
     /// The ground.
     pub terrain: Arc<Terrain>,
+    /// The photograph over it.
+    pub drape: Option<GroundDrape>,
     /// The trees.
     pub stand: Arc<PackedStand>,
     /// The plants, by variant.
@@ -87,6 +89,18 @@ impl Stage {
         progress.note(&format!("terrain: {:.2} s", started.elapsed().as_secs_f64()));
         let observer = observer(scene, &terrain)?;
         check_wanted(progress)?;
+        let drape = match &scene.drape {
+            Some(drape) => {
+                let started = Instant::now();
+                progress.begin("Photograph", 0);
+                let read = ground::build_drape(drape, &terrain, progress)?;
+                progress.end();
+                progress.note(&format!("photograph over the ground: {:.2} s", started.elapsed().as_secs_f64()));
+                Some(read)
+            }
+            None => None,
+        };
+        check_wanted(progress)?;
 
         let mut planned = StandPlan::new(scene, &terrain, WoodBeyond::Grows)?;
         planned.check(most_trees)?;
@@ -134,7 +148,7 @@ impl Stage {
         let suns = scene.species.iter().zip(&species.variants).flat_map(sun).collect();
         let (stand, plants, variants) = (Arc::new(packed), Arc::new(plants), species.variants);
         let (scene, surveys) = (scene.clone(), planned.surveys());
-        Ok(Self { terrain, stand, plants, variants, suns, cover, surroundings, observer, scene, style, surveys })
+        Ok(Self { terrain, drape, stand, plants, variants, suns, cover, surroundings, observer, scene, style, surveys })
     }
 
     /// Whether `device` can hold the trees, all of which lie in one storage buffer.
@@ -168,6 +182,7 @@ impl Stage {
     pub fn ground(&self) -> Ground {
         Ground {
             terrain: self.terrain.clone(),
+            drape: self.drape.clone(),
             cover: self.cover.clone(),
             surroundings: self.surroundings,
             error_pixels: self.scene.quality.terrain_error,
@@ -187,6 +202,7 @@ fn shadow(quality: &Quality) -> SunShadowSettings {
         map_size: quality.shadow_map_size,
         cascades: quality.cascades as usize,
         distance: quality.shadow_distance,
+        softness: quality.shadow_softness,
         // A billboard's horizontal plane would draw a line across the crowns of full models.
         proxy_distance: quality.nearest_level_end(),
         ..SunShadowSettings::default()

@@ -23,10 +23,10 @@ use tracing::error;
 
 use crate::{
     assets::{TerrainMap, load_error::load_error},
-    render::components::Ground,
+    render::components::{Ground, GroundDrape},
 };
 
-/// The ground of a [`TerrainMap`]. Once the map is loaded, the entity gets the renderer's [`Ground`], and
+/// The ground of a [`TerrainMap`]; a [`GroundDrape`] on the same entity is a photograph over it. Once the map is loaded, the entity gets the renderer's [`Ground`], and
 /// [`TerrainReady`] is triggered on it. Another map, or a changed one, replaces the previous map when it is loaded.
 #[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
 #[reflect(Component, Default)]
@@ -68,7 +68,7 @@ pub struct TerrainFailed {
 /// Updates the [`Ground`] of each terrain.
 pub fn show_terrains(
     mut commands: Commands,
-    terrains: Query<(Entity, Ref<Terrain3d>, Ref<TerrainSettings>, Option<&Ground>)>,
+    terrains: Query<(Entity, Ref<Terrain3d>, Ref<TerrainSettings>, Option<&GroundDrape>, Option<&Ground>)>,
     maps: Res<Assets<TerrainMap>>,
     mut events: MessageReader<AssetEvent<TerrainMap>>,
     mut failures: MessageReader<AssetLoadFailedEvent<TerrainMap>>,
@@ -94,7 +94,7 @@ pub fn show_terrains(
             commands.trigger(TerrainFailed { entity, error });
         }
     }
-    for (entity, terrain, settings, ground) in &terrains {
+    for (entity, terrain, settings, drape, ground) in &terrains {
         let id = terrain.0.id();
         let Some(map) = maps.get(id) else {
             if gone.contains(&id) {
@@ -102,11 +102,13 @@ pub fn show_terrains(
             }
             continue;
         };
-        if !(ground.is_none() || changed.contains(&id) || terrain.is_changed() || settings.is_changed()) {
+        let same_drape = ground.is_some_and(|ground| ground.drape.as_ref() == drape);
+        if !(!same_drape || changed.contains(&id) || terrain.is_changed() || settings.is_changed()) {
             continue;
         }
         commands.entity(entity).try_insert(Ground {
             terrain: map.terrain.clone(),
+            drape: drape.cloned(),
             cover: ground.and_then(|ground| ground.cover.clone()),
             surroundings: ground.map_or(0.0, |ground| ground.surroundings),
             error_pixels: settings.error_pixels,

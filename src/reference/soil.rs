@@ -7,8 +7,10 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3, Vec3};
 
+use crate::math::luminance;
 use crate::scatter::{Area, CoverMap, distance_beyond, surroundings_density};
 use crate::terrain::Terrain;
+use crate::terrain::drape::{DETAIL_TEXELS, Drape, LEAST_DETAIL, MOST_DETAIL};
 use crate::terrain::ground_noise::{LEAF_OCTAVE, noise_band, noise_step, scattered_leaves, visible_part};
 
 /// Points along an axis of the terrain from which its mean cover is taken.
@@ -22,6 +24,8 @@ pub struct Soil {
     mean_cover: f32,
     /// Metres beyond the terrain's data on which trees stand too.
     surroundings: f64,
+    /// A photograph over the ground, and the factor from its values to reflectance.
+    drape: Option<(Arc<Drape>, f32)>,
 }
 
 impl Soil {
@@ -29,11 +33,16 @@ impl Soil {
     /// thin out there; farther out the ground has the colour of crowns.
     pub fn new(terrain: &Terrain, cover: Option<Arc<CoverMap>>, surroundings: f64) -> Self {
         let extent = terrain.extent();
-        let mut soil = Self { cover, extent, mean_cover: 0.0, surroundings };
+        let mut soil = Self { cover, extent, mean_cover: 0.0, surroundings, drape: None };
         let step = |i: u32| (f64::from(i) + 0.5) / f64::from(MEAN_POINTS) - 0.5;
         let points = (0..MEAN_POINTS).flat_map(|z| (0..MEAN_POINTS).map(move |x| DVec2::new(step(x), step(z))));
         soil.mean_cover = points.map(|p| soil.cover_at(p * extent)).sum::<f32>() / (MEAN_POINTS * MEAN_POINTS) as f32;
         soil
+    }
+
+    /// The same under a photograph, whose values times `brightness` are reflectances.
+    pub fn with_drape(self, drape: Arc<Drape>, brightness: f32) -> Self {
+        Self { drape: Some((drape, brightness)), ..self }
     }
 
     /// Canopy cover around a position, bilinear.
@@ -53,13 +62,27 @@ impl Soil {
         let undrawn = self.mean_cover * (1.0 - drawn);
         let planted = if distance > self.surroundings { 0.0 } else { self.cover_at(xz) };
         let cover = undrawn + planted;
-        ground_color(xz, 1.0 - normal.y, cover, undrawn / cover.max(1e-3), 0.0)
+        let color = |footprint: f32| ground_color(xz, 1.0 - normal.y, cover, undrawn / cover.max(1e-3), footprint);
+        let own = color(0.0);
+        let Some((drape, brightness)) = &self.drape else { return own };
+        let photo = drape.sample(xz);
+        if photo.w <= 0.0 {
+            return own;
+        }
+        // What the photograph is too coarse for, it has from the ground's own colour.
+        let detail = luminance(own) / luminance(color(DETAIL_TEXELS * drape.texel() as f32)).max(1e-4);
+        let shown = photo.truncate() * (brightness * detail.clamp(LEAST_DETAIL, MOST_DETAIL));
+        (own * (1.0 - photo.w) + shown).clamp(Vec3::ZERO, Vec3::ONE)
     }
 
     /// Everything that the colour depends on, as bytes for a fingerprint.
     pub(crate) fn feed(&self, hasher: &mut blake3::Hasher) {
         hasher.update(bytemuck::bytes_of(&self.extent));
         hasher.update(&self.surroundings.to_le_bytes());
+        if let Some((drape, brightness)) = &self.drape {
+            drape.feed(hasher);
+            hasher.update(&brightness.to_le_bytes());
+        }
         if let Some(cover) = &self.cover {
             hasher.update(&cover.cover);
             hasher.update(format!("{:?} {} {} {}", cover.origin, cover.texel, cover.columns, cover.rows).as_bytes());

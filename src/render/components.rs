@@ -27,7 +27,7 @@ use crate::{
     lod::Levels,
     math::Range,
     scatter::{CoverMap, PackedStand},
-    terrain::Terrain,
+    terrain::{Drape, Terrain},
 };
 
 pub use super::camera_style::{CanopyStyle, DrawnStyle};
@@ -119,6 +119,9 @@ pub struct Ground {
     /// Heights; scene metres, origin at the terrain's centre.
     #[reflect(ignore, clone)]
     pub terrain: Arc<Terrain>,
+    /// A photograph over it, if there is one.
+    #[reflect(ignore, clone)]
+    pub drape: Option<GroundDrape>,
     /// Canopy cover, if a forest stands on it.
     #[reflect(ignore, clone)]
     pub cover: Option<Arc<CoverMap>>,
@@ -129,6 +132,26 @@ pub struct Ground {
     pub error_pixels: f64,
     /// Distance in metres to which the ground is drawn, its mirrored surroundings included.
     pub view_distance: f64,
+}
+
+/// A photograph over a [`Ground`]: part of it, or beside a [`Terrain3d`](crate::components::Terrain3d) on the same entity.
+///
+/// Reflection does not show its texels.
+#[derive(Component, Clone, Debug, Reflect)]
+#[reflect(Component, Debug, from_reflect = false)]
+pub struct GroundDrape {
+    /// The photograph, as [`read_drape`](crate::terrain::read_drape) brings it to the terrain's frame.
+    #[reflect(ignore, clone)]
+    pub drape: Arc<Drape>,
+    /// Factor from its values (linear, 1 is white) to the reflectance of the ground, 0.05 to 4.
+    pub brightness: f32,
+}
+
+impl PartialEq for GroundDrape {
+    /// Two are equal if they share the same photograph.
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.drape, &other.drape) && self.brightness == other.brightness
+    }
 }
 
 /// The current light. Replace it whenever the sun moves; while it stays the same [`Arc`], nothing is computed again. Two
@@ -202,12 +225,23 @@ pub struct SunShadowSettings {
     /// Radius in metres around the camera within which plants cast as shadow proxies instead of billboards.
     #[reflect(@Range::factor(0.0..=1e5).unit("m"), @"Radius around the camera within which plants cast as shadow proxies instead of billboards.")]
     pub proxy_distance: f64,
+    /// Half width in metres of the soft edge that shadows on the ground have by the blurred depth test [Luft 2006, 2 and 3.3], 0.05
+    /// to 20: coarse maps show no steps then. 0: an edge of three texels, at less cost.
+    #[reflect(@Range::steps(0.0..=20.0, 0.05, 0.5).unit("m"), @"Half width of the soft edge of shadows on the ground; 0: an edge of three texels.")]
+    pub softness: f64,
+}
+
+impl SunShadowSettings {
+    /// The softness as the shader has it: within its range, or 0.
+    pub(crate) fn soft_edge(&self) -> f32 {
+        if self.softness > 0.0 { self.softness.clamp(0.05, 20.0) as f32 } else { 0.0 }
+    }
 }
 
 impl Default for SunShadowSettings {
     /// The settings of a scene with the default quality.
     fn default() -> Self {
-        Self { map_size: 2048, cascades: 4, finest_radius: 30.0, distance: 800.0, proxy_distance: 80.0 }
+        Self { map_size: 2048, cascades: 4, finest_radius: 30.0, distance: 800.0, proxy_distance: 80.0, softness: 0.0 }
     }
 }
 
@@ -280,7 +314,7 @@ impl Plugin for ComponentsPlugin {
             ExtractComponentPlugin::<CanopyStyle>::default(),
         ))
         .register_type::<(CanopyCamera, CanopyOrigin, SunShadowSettings, ViewOptions, CastsCanopyShadow)>()
-        .register_type::<(Forest, Ground, TreeLists, CanopyStyle)>()
+        .register_type::<(Forest, Ground, GroundDrape, TreeLists, CanopyStyle)>()
         .register_type::<(LightUpdates, ForestUpdates)>()
         .init_resource::<CanopyOrigin>()
         .init_resource::<LightUpdates>()

@@ -19,7 +19,7 @@ use crate::{
     lod::{self, level_distance},
     scatter::packed,
     style::{Paper, anchor, layers},
-    terrain::{ground_noise, tiles},
+    terrain::{drape, ground_noise, tiles},
 };
 
 /// A scalar of WGSL.
@@ -66,6 +66,9 @@ pub fn constants() -> Vec<(&'static str, &'static str, Value)> {
         ("NOISE_WEIGHT_RATIO", "Weight of an octave relative to the one before.", ground_noise::WEIGHT_RATIO.into()),
         ("LEAF_OCTAVE", "Octave in whose cells fallen leaves lie.", Value::Int(ground_noise::LEAF_OCTAVE)),
         ("LEAF_SEED", "Their seed.", ground_noise::LEAF_SEED.into()),
+        ("DETAIL_TEXELS", "Texels below which a photograph of the ground lacks detail.", drape::DETAIL_TEXELS.into()),
+        ("LEAST_DETAIL", "The least that added detail multiplies it by.", drape::LEAST_DETAIL.into()),
+        ("MOST_DETAIL", "The most that it does.", drape::MOST_DETAIL.into()),
         ("POSITION_STEPS", "Steps of a tree's position along a cell's side.", packed::POSITION_STEPS.into()),
         ("YAW_BITS", "Bits of a tree's yaw, the lowest of `look`.", packed::YAW_BITS.into()),
         ("YAWS", "Yaws that a tree can have.", uint(transfer::YAWS)),

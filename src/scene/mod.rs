@@ -41,6 +41,7 @@
 
 mod camera;
 mod check;
+mod drape;
 mod error;
 mod ground;
 pub(crate) mod lighting;
@@ -57,6 +58,7 @@ mod time;
 mod trees;
 
 pub use camera::{Camera, PathKey, Pose, Viewpoint};
+pub use drape::Drape;
 #[cfg(feature = "program")]
 pub(crate) use error::nearest;
 pub use error::{Problem, SceneError};
@@ -95,6 +97,9 @@ pub struct Scene {
     pub seed: u64,
     /// The ground. Required.
     pub terrain: Ground,
+    /// A photograph over the ground, such as an orthophoto. Default: none; the ground has a colour of its own.
+    #[serde(default)]
+    pub drape: Option<Drape>,
     /// The species. Default: none; required if there are trees.
     #[serde(default)]
     pub species: Vec<Species>,
@@ -142,6 +147,7 @@ impl Scene {
             name: "scene".to_owned(),
             seed: one(),
             terrain,
+            drape: None,
             species: Vec::new(),
             trees: Trees::default(),
             place,
@@ -172,6 +178,9 @@ impl Scene {
 
     fn check(&self, mut check: Check, label: String) -> Result<(), SceneError> {
         self.terrain.check(&mut check);
+        if let Some(drape) = &self.drape {
+            drape.check(&mut check);
+        }
         species::check_all(&self.species, &mut check);
         self.trees.check(&self.species, &mut check);
         self.place.check(&self.terrain, &mut check);
@@ -185,6 +194,9 @@ impl Scene {
     /// scene that was built in code are relative to the working directory.
     pub fn resolve_paths(&mut self, folder: &FilePath) {
         self.terrain.resolve(folder);
+        if let Some(drape) = &mut self.drape {
+            drape.resolve(folder);
+        }
         self.trees.resolve(folder);
         self.species.iter_mut().for_each(|species| species.resolve(folder));
         style::resolve(&mut self.style, folder);

@@ -96,6 +96,28 @@ pub enum TerrainError {
         /// Northern limit.
         north: f64,
     },
+    /// A photograph that lies elsewhere than the terrain.
+    #[error(
+        "{path}: the photograph does not reach the terrain; it covers west {west}, south {south}, east {east}, north {north} in \
+         its own coordinates, where the terrain's centre is at {centre_x}, {centre_y}; check the coordinate system of both, or \
+         state that of the photograph by `drape: (coordinates: ...)`", path = .path.display()
+    )]
+    PhotoOutside {
+        /// The file.
+        path: PathBuf,
+        /// Western limit of the photograph, in its coordinates.
+        west: f64,
+        /// Southern limit.
+        south: f64,
+        /// Eastern limit.
+        east: f64,
+        /// Northern limit.
+        north: f64,
+        /// Where the terrain's centre lies in these coordinates, to the east.
+        centre_x: f64,
+        /// The same to the north.
+        centre_y: f64,
+    },
     /// A height field needs two samples each way to have a surface.
     #[error("a height field of {columns} columns and {rows} rows has no surface; at least 2 of each are needed")]
     TooSmall {
@@ -222,6 +244,30 @@ pub enum Warning {
     },
     /// A projected file states no linear unit; metres were assumed.
     AssumedMetres,
+    /// A photograph says not where it lies, or the terrain does not: it covers the whole terrain.
+    PhotoStretched {
+        /// The photograph.
+        path: PathBuf,
+        /// Whether the photograph says where it lies.
+        has_place: bool,
+    },
+    /// A photograph names no coordinate system; that of the terrain was assumed.
+    PhotoSystemAssumed {
+        /// The photograph.
+        path: PathBuf,
+    },
+    /// The photograph has more pixels on the terrain than a texture holds.
+    PhotoReduced {
+        /// Metres of a pixel as it is drawn.
+        drawn: f64,
+        /// Metres of a pixel of the file.
+        own: f64,
+    },
+    /// A tile of a photograph lies outside the terrain.
+    PhotoTileUnused {
+        /// The tile.
+        path: PathBuf,
+    },
 }
 
 impl Warning {
@@ -290,6 +336,32 @@ impl fmt::Display for Warning {
                  state them for the sun"
             ),
             Warning::AssumedMetres => write!(f, "the file states no linear unit; metres were assumed"),
+            Warning::PhotoStretched { path, has_place: false } => write!(
+                f,
+                "{}: the photograph has neither a place in the file nor a world file beside it (.pgw, .jgw, .wld): it is \
+                 stretched over the whole terrain",
+                path.display()
+            ),
+            Warning::PhotoStretched { path, has_place: true } => write!(
+                f,
+                "{}: the terrain has no coordinates to which the photograph's could be related: it is stretched over the whole \
+                 terrain",
+                path.display()
+            ),
+            Warning::PhotoSystemAssumed { path } => write!(
+                f,
+                "{}: the photograph names no coordinate system, and that of the terrain was assumed; state another by \
+                 `drape: (coordinates: ...)`",
+                path.display()
+            ),
+            Warning::PhotoReduced { drawn, own } => write!(
+                f,
+                "the photograph is drawn with pixels of {drawn:.2} m instead of {own:.2} m, because a texture holds no more; \
+                 crop the terrain to keep them"
+            ),
+            Warning::PhotoTileUnused { path } => {
+                write!(f, "{}: this tile of the photograph lies outside the terrain", path.display())
+            }
         }
     }
 }

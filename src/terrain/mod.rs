@@ -8,8 +8,9 @@
 //! ```
 //!
 //! The local frame of everything here: metres, origin at the centre of the field, x east, z south, heights above the
-//! datum of the data. [`GeoReference`] leads from the coordinates of a file to this frame and back.
+//! datum of the data. A [`Drape`] is a photograph over the ground in the same frame. [`GeoReference`] leads from the coordinates of a file to this frame and back.
 
+pub mod drape;
 mod error;
 mod extended_grid;
 mod geo_reference;
@@ -24,6 +25,7 @@ pub mod sun_horizon;
 mod surface;
 pub mod tiles;
 
+pub use drape::{Drape, read_drape, read_drape_bytes};
 pub use error::{TerrainError, Warning};
 pub use extended_grid::Surroundings;
 pub use geo_reference::{CoordinateSystem, GeoReference, SystemMap};

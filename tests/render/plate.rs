@@ -213,7 +213,14 @@ fn plain(covered: bool) -> Ground {
     let terrain = Arc::new(Terrain::new(field, None, Surroundings::Border));
     let cover = vec![if covered { 255 } else { 0 }; 64 * 64];
     let cover = CoverMap { origin: DVec2::splat(-128.0), texel: 4.0, columns: 64, rows: 64, cover };
-    Ground { terrain, cover: Some(Arc::new(cover)), surroundings: 0.0, error_pixels: 1.0, view_distance: 1e3 }
+    Ground {
+        terrain,
+        drape: None,
+        cover: Some(Arc::new(cover)),
+        surroundings: 0.0,
+        error_pixels: 1.0,
+        view_distance: 1e3,
+    }
 }
 
 /// What is in the common field of trees that are lit together was once counted again, by the cover around each of them.

@@ -13,6 +13,11 @@ const UNSIGNED_INT: u32 = 5125;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
+/// How textures go on beyond their borders.
+const REPEATED: u32 = 10497;
+pub const MIRRORED: u32 = 33648;
+pub const CLAMPED: u32 = 33071;
+
 /// A GLB 2.0.
 #[derive(Default)]
 pub struct Glb {
@@ -25,6 +30,8 @@ pub struct Glb {
     pub materials: Vec<Value>,
     /// Images of the document; each has a texture of the same index.
     pub images: Vec<Value>,
+    /// The image that is not repeated, and how it goes on instead.
+    pub own_wrap: Option<(usize, u32)>,
     /// Nodes of the document; those of the scene are [`roots`](Self::roots).
     pub nodes: Vec<Value>,
     /// Nodes of the scene.
@@ -98,9 +105,16 @@ impl Glb {
             "scenes": [{ "name": name, "nodes": self.roots }],
             "nodes": self.nodes,
         });
-        let textures: Vec<Value> =
-            (0..self.images.len()).map(|image| json!({ "source": image, "sampler": 0 })).collect();
-        let samplers = if textures.is_empty() { Vec::new() } else { vec![json!({ "wrapS": 10497, "wrapT": 10497 })] };
+        let own = |image: usize| self.own_wrap.is_some_and(|(other, _)| other == image);
+        let textures: Vec<Value> = (0..self.images.len())
+            .map(|image| json!({ "source": image, "sampler": usize::from(own(image)) }))
+            .collect();
+        let wraps = std::iter::once(REPEATED).chain(self.own_wrap.map(|(_, wrap)| wrap));
+        let samplers: Vec<Value> = if textures.is_empty() {
+            Vec::new()
+        } else {
+            wraps.map(|wrap| json!({ "wrapS": wrap, "wrapT": wrap })).collect()
+        };
         let buffers = if self.bytes.is_empty() { Vec::new() } else { vec![json!({ "byteLength": self.bytes.len() })] };
         // Empty lists are not valid.
         let lists = [

@@ -1,15 +1,16 @@
 //! A scene's forest for other programs: what `canopy export` does.
 
 mod glb;
+mod ground;
 mod plants;
 
 use std::path::PathBuf;
 
-use glam::{DVec2, DVec3, Quat, Vec3};
+use glam::{DVec3, Quat, Vec3};
 use serde_json::json;
 
 use self::glb::{FLOAT, Glb};
-use super::{error::AppError, ground_grid, interrupt};
+use super::{error::AppError, interrupt};
 use crate::{
     assets::Stage,
     files,
@@ -96,7 +97,7 @@ pub fn export(options: &ExportOptions, progress: &mut dyn Progress) -> Result<Ex
     }
     progress.end();
     if !options.without_ground {
-        report.ground_triangles = ground(&mut glb, &stage, options.within);
+        report.ground_triangles = ground::add(&mut glb, &stage, options.within)?;
     }
     if glb.nodes.is_empty() {
         return Err(AppError::Export("there is neither a tree nor ground to export".to_owned()));
@@ -154,35 +155,6 @@ fn place(glb: &mut Glb, stage: &Stage, trees: &[PackedTree], mesh: usize, name: 
         "extensions": { INSTANCING: { "attributes": attributes } },
     }));
     glb.roots.push(glb.nodes.len() - 1);
-}
-
-/// Adds the ground; returns its number of triangles.
-fn ground(glb: &mut Glb, stage: &Stage, within: Option<f64>) -> usize {
-    // The wood goes on beyond the data.
-    let half = 0.5 * stage.terrain.extent() + stage.surroundings;
-    let half = within.map_or(half, |most| half.min(DVec2::splat(most)));
-    glb.materials.push(json!({
-        "name": "ground",
-        "pbrMetallicRoughness": { "baseColorFactor": ground_grid::SOIL.extend(1.0).to_array(), "metallicFactor": 0.0, "roughnessFactor": 1.0 },
-    }));
-    let material = glb.materials.len() - 1;
-    let mut primitives = Vec::new();
-    let mut triangles = 0;
-    for piece in ground_grid::pieces(&stage.terrain, half) {
-        triangles += piece.indices.len() / 3;
-        primitives.push(json!({
-            "attributes": {
-                "POSITION": glb.positions(&piece.positions),
-                "NORMAL": glb.vertices(&piece.normals, "VEC3"),
-            },
-            "indices": glb.indices(&piece.indices),
-            "material": material,
-        }));
-    }
-    glb.meshes.push(json!({ "name": "ground", "primitives": primitives }));
-    glb.nodes.push(json!({ "name": "ground", "mesh": glb.meshes.len() - 1 }));
-    glb.roots.push(glb.nodes.len() - 1);
-    triangles
 }
 
 /// Where the origin lies on earth.

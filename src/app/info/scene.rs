@@ -10,7 +10,7 @@ use super::{
 use crate::{
     app::AppError,
     assets::{
-        ground::build_terrain,
+        ground::{build_drape, build_terrain},
         plants,
         stage::observer,
         trees::{StandPlan, WoodBeyond},
@@ -22,7 +22,7 @@ use crate::{
     progress::Progress,
     scatter::{FIRST_SURROUNDING_INDEX, Inventory, PlantSize, Stand},
     scene::{self, PlantSource, Scene, Species, Trees},
-    terrain::Terrain,
+    terrain::{Drape, Terrain},
 };
 
 /// A scene; or the rules of a grown species, which are RON too.
@@ -60,6 +60,7 @@ fn describe_species_file(page: &mut Page, path: &Path, species: &GrowParameters)
 fn describe(page: &mut Page, scene: &Scene, path: &Path) -> Result<(), AppError> {
     let mut heard = Heard::default();
     let ground = build_terrain(&scene.terrain, &mut heard)?;
+    let drape = scene.drape.as_ref().map(|drape| build_drape(drape, &ground, &mut heard)).transpose()?;
     let observer = observer(scene, &ground)?;
     let plan = plants::plan(scene)?;
     let mut individuals = Vec::with_capacity(plan.individuals.len());
@@ -79,6 +80,9 @@ fn describe(page: &mut Page, scene: &Scene, path: &Path) -> Result<(), AppError>
         page.row("name", &scene.name);
         page.row("seed", scene.seed);
         describe_ground(page, scene, &ground);
+        if let (Some(stated), Some(drape)) = (&scene.drape, &drape) {
+            describe_drape(page, stated, &drape.drape, &ground);
+        }
         for (species, variants) in scene.species.iter().zip(&plan.variants) {
             describe_species(page, species, variants, &individuals);
         }
@@ -125,6 +129,27 @@ fn describe_ground(page: &mut Page, scene: &Scene, ground: &Terrain) {
     };
     page.row("terrain", source);
     page.inset(|page| terrain::describe(page, ground));
+}
+
+fn describe_drape(page: &mut Page, stated: &scene::Drape, drape: &Drape, ground: &Terrain) {
+    let tiles = match stated.tiles.len() {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    page.row("photograph", format!("{}{tiles}", stated.path.display()));
+    page.inset(|page| {
+        let ((columns, rows), extent) = (drape.size(), drape.extent());
+        page.row("texels", format!("{columns} x {rows} of {:.2} m", drape.texel()));
+        let whole = ground.extent();
+        let share = (extent.min(whole) / whole).element_product().min(1.0);
+        page.row(
+            "covers",
+            format!("{} x {}, {:.0} % of the terrain", length(extent.x), length(extent.y), 100.0 * share),
+        );
+        if drape.is_mirrored() {
+            page.row("beyond", "mirrored, as the terrain is");
+        }
+    });
 }
 
 fn describe_species(page: &mut Page, species: &Species, variants: &Range<u16>, individuals: &[Plant]) {

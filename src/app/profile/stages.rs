@@ -75,6 +75,7 @@ impl Stages {
         };
         Ok(Stage {
             terrain: stage.terrain.clone(),
+            drape: stage.drape.clone(),
             stand: stage.stand.clone(),
             plants: stage.plants.clone(),
             variants: stage.variants.clone(),

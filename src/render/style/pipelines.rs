@@ -33,7 +33,7 @@ use crate::{
         },
         gpu::opaque_depth,
         shaders::{CanopyShaders, ShaderFile},
-        terrain::terrain_layout,
+        terrain::{DRAPE, GpuTerrain, terrain_defs, terrain_layout},
         view::{PreparedFrame, ViewFormat},
     },
     style::{LineNormals, Style},
@@ -52,7 +52,7 @@ pub const LEVEL_TARGET: LevelTarget = LevelTarget::View(ViewFormat::ANY);
 pub struct StylePipelines {
     shaders: CanopyShaders,
     levels: HashMap<(Representation, u32, bool), CachedRenderPipelineId>,
-    ground: Option<CachedRenderPipelineId>,
+    ground: [Option<CachedRenderPipelineId>; 2],
     illumination: Option<CachedRenderPipelineId>,
     blurs: Option<[CachedRenderPipelineId; 3]>,
     particles: Option<CachedRenderPipelineId>,
@@ -66,7 +66,7 @@ impl FromWorld for StylePipelines {
         Self {
             shaders: world.resource::<CanopyShaders>().clone(),
             levels: HashMap::default(),
-            ground: None,
+            ground: [None; 2],
             illumination: None,
             blurs: None,
             particles: None,
@@ -82,9 +82,9 @@ impl StylePipelines {
         self.levels.get(&(level.renderer.representation(), features, self.own_normals)).copied()
     }
 
-    /// That of the ground.
-    pub fn ground(&self) -> Option<CachedRenderPipelineId> {
-        self.ground
+    /// That of the ground, with a photograph over it or without.
+    pub fn ground(&self, draped: bool) -> Option<CachedRenderPipelineId> {
+        self.ground[usize::from(draped)]
     }
 
     /// That of the light.
@@ -107,7 +107,14 @@ impl StylePipelines {
         self.pictures.get(&(picture, format)).copied()
     }
 
-    fn request(&mut self, drawn: &DrawnStyle, format: TextureFormat, forests: &GpuForests, cache: &PipelineCache) {
+    fn request(
+        &mut self,
+        drawn: &DrawnStyle,
+        format: TextureFormat,
+        forests: &GpuForests,
+        draped: bool,
+        cache: &PipelineCache,
+    ) {
         let Some(picture) = Picture::of(&drawn.style) else { return };
         self.own_normals = match &drawn.style {
             Style::Lines(lines) => lines.normals == LineNormals::Own,
@@ -130,7 +137,8 @@ impl StylePipelines {
             }
         }
         let shaders = &self.shaders;
-        self.ground.get_or_insert_with(|| cache.queue_render_pipeline(ground(shaders.get(ShaderFile::Terrain))));
+        self.ground[usize::from(draped)]
+            .get_or_insert_with(|| cache.queue_render_pipeline(ground(shaders.get(ShaderFile::Terrain), draped)));
         self.illumination.get_or_insert_with(|| {
             let shader = shaders.get(ShaderFile::StyleIllumination);
             let layout = vec![frame_layout(), illumination_layout()];
@@ -185,7 +193,7 @@ fn surface_targets() -> Vec<Option<ColorTargetState>> {
 /// of what is defined for light alone.
 fn styled(mut pipeline: RenderPipelineDescriptor, own_normals: bool) -> RenderPipelineDescriptor {
     let restyle = |defs: &mut Vec<ShaderDefVal>| {
-        let kept = |def: &ShaderDefVal| *def == ShaderDefVal::from("FOLIAGE");
+        let kept = |def: &ShaderDefVal| ["FOLIAGE", DRAPE].iter().any(|name| *def == ShaderDefVal::from(*name));
         defs.retain(kept);
         defs.push(STYLED.into());
         if own_normals {
@@ -203,13 +211,13 @@ fn styled(mut pipeline: RenderPipelineDescriptor, own_normals: bool) -> RenderPi
     pipeline
 }
 
-fn ground(shader: Handle<Shader>) -> RenderPipelineDescriptor {
+fn ground(shader: Handle<Shader>, draped: bool) -> RenderPipelineDescriptor {
     let format = ViewFormat { color: MAP_FORMAT, samples: 1 };
     styled(
         RenderPipelineDescriptor {
-            layout: vec![frame_layout(), terrain_layout()],
+            layout: vec![frame_layout(), terrain_layout(draped)],
             primitive: PrimitiveState { cull_mode: Some(Face::Back), ..Default::default() },
-            ..format.pipeline(&shader, Vec::new(), opaque_depth())
+            ..format.pipeline(&shader, terrain_defs(draped, false), opaque_depth())
         },
         false,
     )
@@ -220,11 +228,12 @@ pub fn prepare_pipelines(
     views: Query<&DrawnStyle, With<CanopyCamera>>,
     frame: Res<PreparedFrame>,
     forests: Res<GpuForests>,
+    terrain: Res<GpuTerrain>,
     cache: Res<PipelineCache>,
     mut pipelines: ResMut<StylePipelines>,
 ) {
     let Some(view) = &frame.view else { return };
     if let Ok(drawn) = views.get(view.entity) {
-        pipelines.request(drawn, view.attachment.color, &forests, &cache);
+        pipelines.request(drawn, view.attachment.color, &forests, terrain.is_draped(), &cache);
     }
 }

@@ -6,8 +6,10 @@
 //! same smooth surface on which the trees stand, once, and kept on the GPU while the tile is in use.
 //!
 //! Ground colour follows slope, canopy cover and noise that never repeats (`shaders/terrain/ground_color.wgsl`,
-//! [`crate::terrain::ground_noise`]). Octaves finer than a pixel are not computed.
+//! [`crate::terrain::ground_noise`]). Octaves finer than a pixel are not computed. A photograph over the ground
+//! ([`GroundDrape`](super::components::GroundDrape)) replaces the colour; what it is too coarse for, it has from the ground's own.
 
+mod drape;
 mod ground_map;
 mod pass;
 mod pipeline;
@@ -23,8 +25,9 @@ use bevy::{
 };
 
 use super::sets::{CanopyPasses, CanopyRenderSystems};
+pub use drape::DrapeUniform;
 pub use ground_map::GroundMap;
-pub(super) use pipeline::terrain_layout;
+pub(super) use pipeline::{DRAPE, terrain_defs, terrain_layout};
 pub(super) use tiles::GpuTerrain;
 pub use tiles::TerrainStatistics;
 pub use vertex::{GpuTile, GpuTileVertex};

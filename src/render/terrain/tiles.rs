@@ -15,6 +15,7 @@ use bevy::{
 use glam::DVec3;
 
 use super::{
+    drape::GpuDrape,
     pipeline::terrain_layout,
     tile_cache::{TILE_VERTICES, TileCache},
     vertex::GpuTile,
@@ -45,6 +46,8 @@ pub struct GpuTerrain {
     pub count: u32,
     /// Group 1.
     pub bind_group: Option<BindGroup>,
+    /// The photograph over it.
+    drape: Option<GpuDrape>,
     frame: u64,
 }
 
@@ -59,8 +62,16 @@ impl FromWorld for GpuTerrain {
             index_count: indices.len() as u32,
             count: 0,
             bind_group: None,
+            drape: None,
             frame: 0,
         }
+    }
+}
+
+impl GpuTerrain {
+    /// Whether a photograph lies over it.
+    pub fn is_draped(&self) -> bool {
+        self.drape.is_some()
     }
 }
 
@@ -90,6 +101,7 @@ pub fn prepare_tiles(
     let Some((_, ground, origin)) = &scene.ground else {
         gpu.cache = None;
         gpu.bind_group = None;
+        gpu.drape = None;
         report.skipped("terrain", "the scene has no ground");
         return;
     };
@@ -158,9 +170,27 @@ pub fn prepare_tiles(
     } else {
         report.ran("terrain tiles", format!("{made} uploaded"));
     }
+    let same = match (&gpu.drape, &ground.drape) {
+        (Some(known), Some(wanted)) => known.is_of(wanted),
+        (known, wanted) => known.is_none() && wanted.is_none(),
+    };
+    if !same {
+        gpu.drape = ground.drape.as_ref().map(|drape| GpuDrape::new(&device, &queue, &drape.drape));
+        let what = if gpu.drape.is_some() { "a new one was uploaded" } else { "the ground has one no more" };
+        report.ran("photograph", what);
+    } else if gpu.drape.is_some() {
+        report.skipped("photograph", "it is on the GPU");
+    }
+    if let (Some(known), Some(drape)) = (&gpu.drape, &ground.drape) {
+        known.place(&queue, camera, drape.brightness);
+    }
+    let tiles =
+        BindGroupEntries::sequential((cache.vertices.as_entire_binding(), gpu.tiles.buffer().as_entire_binding()));
+    let mut entries = tiles.to_vec();
+    entries.extend(gpu.drape.iter().flat_map(|drape| drape.entries(2)));
     gpu.bind_group = Some(device.create_bind_group(
         "canopy_terrain",
-        &pipelines.get_bind_group_layout(&terrain_layout()),
-        &BindGroupEntries::sequential((cache.vertices.as_entire_binding(), gpu.tiles.buffer().as_entire_binding())),
+        &pipelines.get_bind_group_layout(&terrain_layout(gpu.drape.is_some())),
+        &entries,
     ));
 }

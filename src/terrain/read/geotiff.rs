@@ -1,17 +1,20 @@
 //! GeoTIFF [OGC 19-008r4] and BigTIFF: one band of heights and its location on earth.
 
+mod chunks;
 mod directory;
 mod keys;
 mod metadata;
 mod overlay;
+pub(super) mod photo;
 
 use glam::DVec2;
 use tiff::ColorType;
-use tiff::decoder::{ChunkType, Decoder, DecodingResult, Limits};
+use tiff::decoder::{Decoder, Limits};
 use tiff::tags::Tag;
 
 use super::{Grid, Input, Raster, Source, Window, sentinels, side_files};
-use crate::terrain::{MAX_SAMPLES, TerrainError, Warning};
+use crate::terrain::{TerrainError, Warning};
+use chunks::{Plane, Visited, visit_chunks};
 use directory::Directory;
 use keys::GeoKeys;
 use metadata::BandMetadata;
@@ -41,14 +44,7 @@ pub(super) fn read(source: &Source) -> Result<Raster, TerrainError> {
     let mask = mask_of(&directory, &mut plain);
     let images: Vec<usize> = std::iter::once(0).chain(mask).collect();
     let overlay = Overlay::new(source, &directory, &images)?;
-    let mut limits = Limits::default();
-    limits.decoding_buffer_size = MAX_CHUNK;
-    limits.intermediate_buffer_size = MAX_CHUNK;
-    limits.ifd_value_size = MAX_TAG;
-    let mut decoder =
-        Decoder::new(overlay).map_err(|error| source.malformed("TIFF directory", error, FETCH))?.with_limits(limits);
-    let (columns, rows) = decoder.dimensions().map_err(|error| source.malformed("TIFF directory", error, FETCH))?;
-    let colour = decoder.colortype().map_err(|error| source.malformed("TIFF directory", error, FETCH))?;
+    let (mut decoder, columns, rows, colour) = decoder_of(source, overlay)?;
     let with_alpha = bands.alpha && matches!(colour, ColorType::Multiband { num_samples: 2, .. });
     if !(matches!(colour, ColorType::Gray(_)) || with_alpha) {
         return Err(source.unsupported(
@@ -56,7 +52,6 @@ pub(super) fn read(source: &Source) -> Result<Raster, TerrainError> {
             "pick the band with the heights: `gdal_translate -b 1 IN OUT.tif`",
         ));
     }
-    let (columns, rows) = (columns as usize, rows as usize);
     let keys = GeoKeys::read(source, &mut decoder)?;
     let (grid, south_up) = read_grid(source, &mut decoder, columns, rows, keys.point)?;
     let window = source.window(&grid)?;
@@ -116,6 +111,22 @@ pub(super) fn read(source: &Source) -> Result<Raster, TerrainError> {
         warnings.push(Warning::HeightsConverted { factor, offset, unit: metadata.unit });
     }
     Ok(Raster { grid, window, system: keys.system, heights, warnings })
+}
+
+/// A decoder within limits of memory, with the columns, rows and kind of samples of the first image.
+fn decoder_of<'a>(
+    source: &Source,
+    overlay: Overlay<'a>,
+) -> Result<(Decoder<Overlay<'a>>, usize, usize, ColorType), TerrainError> {
+    let broken = |error: tiff::TiffError| source.malformed("TIFF directory", error, FETCH);
+    let mut limits = Limits::default();
+    limits.decoding_buffer_size = MAX_CHUNK;
+    limits.intermediate_buffer_size = MAX_CHUNK;
+    limits.ifd_value_size = MAX_TAG;
+    let mut decoder = Decoder::new(overlay).map_err(broken)?.with_limits(limits);
+    let (columns, rows) = decoder.dimensions().map_err(broken)?;
+    let colour = decoder.colortype().map_err(broken)?;
+    Ok((decoder, columns as usize, rows as usize, colour))
 }
 
 /// How the bands of a raster are stored.
@@ -206,7 +217,7 @@ fn read_grid(
         let scale = numbers(decoder, Tag::ModelPixelScaleTag).filter(|scale| scale.len() >= 2);
         let tie = numbers(decoder, Tag::ModelTiepointTag).filter(|tie| tie.len() >= 6);
         let (Some(scale), Some(tie)) = (scale, tie) else {
-            if let Some((first, step)) = side_files::world(source) {
+            if let Some((first, step)) = side_files::world(source)? {
                 // A world file names the middle of the first cell.
                 let step = DVec2::new(step.x, -step.y);
                 let origin = first - DVec2::new(middle, -middle) * step;
@@ -263,180 +274,28 @@ fn read_missing(decoder: &mut Decoder<Overlay>) -> Option<f64> {
     text.trim_matches(|c: char| c.is_whitespace() || c == '\0').parse().ok()
 }
 
-/// What is to be read of an image.
-#[derive(Clone, Copy, Debug)]
-struct Plane {
-    columns: usize,
-    rows: usize,
-    window: Window,
-    bands: Bands,
-}
-
-/// Decodes the strips or tiles that overlap a window.
+/// The samples of one band in a window as heights; NaN where they are missing.
 fn read_samples(
     source: &Source,
     decoder: &mut Decoder<Overlay>,
     plane: &Plane,
     missing: Option<f64>,
 ) -> Result<Vec<f32>, TerrainError> {
-    let Plane { columns, rows, window, bands } = *plane;
-    let broken = |error: tiff::TiffError| source.malformed("TIFF directory", error, FETCH);
-    let tiled = decoder.get_chunk_type() == ChunkType::Tile;
-    // The decoder's own functions for this panic if the directory contradicts itself.
-    let (chunk_columns, chunk_rows) = if tiled {
-        let width: u32 = decoder.get_tag_unsigned(Tag::TileWidth).map_err(broken)?;
-        let length: u32 = decoder.get_tag_unsigned(Tag::TileLength).map_err(broken)?;
-        (width as usize, length as usize)
-    } else {
-        let height: Option<u64> = decoder.find_tag_unsigned(Tag::RowsPerStrip).map_err(broken)?;
-        (columns, height.unwrap_or(rows as u64).min(rows as u64) as usize)
-    };
-    if chunk_columns == 0 || chunk_rows == 0 || chunk_columns.saturating_mul(chunk_rows) > MAX_SAMPLES {
-        return Err(source.malformed("TIFF directory", format!("tiles of {chunk_columns} x {chunk_rows}"), FETCH));
-    }
-    let across = columns.div_ceil(chunk_columns);
-    // Bands apart have their strips or tiles one after the other; otherwise the samples of a pixel stand together.
-    let before = if bands.apart { bands.index * across * rows.div_ceil(chunk_rows) } else { 0 };
-    let (together, band) = if bands.apart { (1, 0) } else { (bands.count, bands.index) };
-    let tag = if tiled { Tag::TileByteCounts } else { Tag::StripByteCounts };
-    let sizes: Vec<u64> = decoder.find_tag_unsigned_vec(tag).map_err(broken)?.unwrap_or_default();
-    let chunk_range = |from: usize, count: usize, size: usize| from / size..(from + count).div_ceil(size);
-    let across_range = chunk_range(window.column, window.columns, chunk_columns);
-    let down_range = chunk_range(window.row, window.rows, chunk_rows);
-
-    // Before allocating: can the stored bytes hold the requested samples at all?
-    let (mut stored, mut wanted) = (0_u64, 0_u64);
-    for down in down_range.clone() {
-        for column in across_range.clone() {
-            let index = before + down * across + column;
-            let Some(size) = sizes.get(index) else {
-                let problem = format!("strip or tile {index} is missing");
-                return Err(source.malformed("TIFF directory", problem, FETCH));
-            };
-            stored = stored.saturating_add(*size);
-            // A tile without bytes is empty and takes none.
-            if *size > 0 {
-                let overlap = |from: usize, count: usize, start: usize, size: usize| {
-                    (from + count).min(start + size).saturating_sub(from.max(start)) as u64
-                };
-                wanted += overlap(window.column, window.columns, column * chunk_columns, chunk_columns)
-                    * overlap(window.row, window.rows, down * chunk_rows, chunk_rows);
-            }
-        }
-    }
-    if wanted > stored.min(source.length).saturating_mul(MAX_EXPANSION) {
-        return Err(source.malformed(
-            "TIFF directory",
-            format!("{} x {} samples cannot be in the {stored} bytes stored for them", window.columns, window.rows),
-            FETCH,
-        ));
-    }
-
+    let window = plane.window;
+    let band = if plane.bands.apart { 0 } else { plane.bands.index };
+    // The marker is written in decimals, while a float sample holds the nearest f32.
+    let is_missing = |value: f64| missing.is_some_and(|m| value == m || value as f32 == m as f32);
     let mut heights = vec![f32::NAN; window.columns * window.rows];
-    for down in down_range {
-        for column in across_range.clone() {
-            let index = before + down * across + column;
-            // A tile without bytes: GDAL omits tiles in which all data are missing.
-            if sizes[index] == 0 {
-                continue;
-            }
-            let at = || format!("strip or tile {index}");
-            let (left, top) = (column * chunk_columns, down * chunk_rows);
-            let (width, height) = (chunk_columns.min(columns - left), chunk_rows.min(rows - top));
-            // The decoder reserves memory for all of it, of which the window may be the least part.
-            if (width * height) as u64 > sizes[index].min(source.length).saturating_mul(MAX_EXPANSION) {
-                let problem = format!("{width} x {height} samples cannot be in {} bytes", sizes[index]);
-                return Err(source.malformed(at(), problem, FETCH));
-            }
-            let number = u32::try_from(index).map_err(|error| source.malformed(at(), error, FETCH))?;
-            let samples = decoder.read_chunk(number).map_err(|error| {
-                let anew = "write it anew: `gdal_translate -co COMPRESS=DEFLATE -co PREDICTOR=1 IN OUT.tif`";
-                match error {
-                    // A sound file may use what is not read here.
-                    tiff::TiffError::UnsupportedError(what) => {
-                        source.unsupported(format!("{}: {what} (the file may be sound)", at()), anew)
-                    }
-                    error => source.malformed(at(), error, format!("{FETCH}, or {anew}")),
+    visit_chunks(source, decoder, plane, |visited| {
+        if let Visited::Chunk(chunk) = visited {
+            chunk.pixels_in(&window, |x, y, at| {
+                let value = chunk.sample(at + band);
+                if value.is_finite() && !is_missing(value) {
+                    heights[y * window.columns + x] = value as f32;
                 }
-            })?;
-            // The decoder crops strips and tiles at the border of the image.
-            let samples = Samples { values: samples, missing };
-            // One bit a pixel, each row in whole bytes: a mask.
-            let bits = bits_of(decoder) == Some(1) && together == 1;
-            let row_bytes = width.div_ceil(8);
-            let expected = if bits { row_bytes * height } else { width * height * together };
-            if samples.len() < expected {
-                return Err(source.malformed(
-                    at(),
-                    format!("{} samples instead of {width} x {height}", samples.len()),
-                    FETCH,
-                ));
-            }
-            for y in top.max(window.row)..(top + height).min(window.row + window.rows) {
-                for x in left.max(window.column)..(left + width).min(window.column + window.columns) {
-                    let target = (y - window.row) * window.columns + x - window.column;
-                    let (row, column) = (y - top, x - left);
-                    heights[target] = if bits {
-                        let byte = samples.get(row * row_bytes + column / 8) as u8;
-                        f32::from(byte >> (7 - column % 8) & 1)
-                    } else {
-                        samples.get((row * width + column) * together + band)
-                    };
-                }
-            }
+            });
         }
-    }
+        Ok(())
+    })?;
     Ok(heights)
-}
-
-/// Bits of a sample.
-fn bits_of(decoder: &mut Decoder<Overlay>) -> Option<u8> {
-    match decoder.colortype().ok()? {
-        ColorType::Gray(bits) => Some(bits),
-        _ => None,
-    }
-}
-
-/// Decoded samples of any type, read as heights.
-struct Samples {
-    values: DecodingResult,
-    missing: Option<f64>,
-}
-
-impl Samples {
-    fn len(&self) -> usize {
-        match &self.values {
-            DecodingResult::U8(v) => v.len(),
-            DecodingResult::U16(v) => v.len(),
-            DecodingResult::U32(v) => v.len(),
-            DecodingResult::U64(v) => v.len(),
-            DecodingResult::F16(v) => v.len(),
-            DecodingResult::F32(v) => v.len(),
-            DecodingResult::F64(v) => v.len(),
-            DecodingResult::I8(v) => v.len(),
-            DecodingResult::I16(v) => v.len(),
-            DecodingResult::I32(v) => v.len(),
-            DecodingResult::I64(v) => v.len(),
-        }
-    }
-
-    /// The height at an index below `len`; NaN if it is missing.
-    fn get(&self, at: usize) -> f32 {
-        let value = match &self.values {
-            DecodingResult::U8(v) => f64::from(v[at]),
-            DecodingResult::U16(v) => f64::from(v[at]),
-            DecodingResult::U32(v) => f64::from(v[at]),
-            DecodingResult::U64(v) => v[at] as f64,
-            DecodingResult::F16(v) => v[at].to_f64(),
-            DecodingResult::F32(v) => f64::from(v[at]),
-            DecodingResult::F64(v) => v[at],
-            DecodingResult::I8(v) => f64::from(v[at]),
-            DecodingResult::I16(v) => f64::from(v[at]),
-            DecodingResult::I32(v) => f64::from(v[at]),
-            DecodingResult::I64(v) => v[at] as f64,
-        };
-        // The marker is written in decimals, while a float sample holds the nearest f32.
-        let is_missing = self.missing.is_some_and(|m| value == m || value as f32 == m as f32);
-        if is_missing || !value.is_finite() { f32::NAN } else { value as f32 }
-    }
 }

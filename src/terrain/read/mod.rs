@@ -13,6 +13,7 @@ mod geotiff;
 mod hgt;
 mod image;
 mod mosaic;
+pub(super) mod photo;
 mod sentinels;
 mod side_files;
 

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use glam::DVec2;
 
 use super::Source;
-use crate::terrain::CoordinateSystem;
 use crate::terrain::projection::{self, Kind};
+use crate::terrain::{CoordinateSystem, TerrainError};
 
 /// Largest side file that is read, in bytes.
 const LARGEST: u64 = 64 << 10;
@@ -34,16 +34,29 @@ fn text(source: &Source, endings: &[&str]) -> Option<(PathBuf, String)> {
 }
 
 /// Position of the north-western sample and the distance between samples (to the east, to the north: mostly negative) from a
-/// world file: six numbers, of which the second and third are rotations.
-pub(super) fn world(source: &Source) -> Option<(DVec2, DVec2)> {
-    let (_, text) = text(source, &["tfw", "TFW", "tifw", "tiffw", "wld", "pgw", "jgw"])?;
-    let numbers: Vec<f64> =
-        text.split_whitespace().map(|word| word.replace(',', ".").parse().ok()).collect::<Option<_>>()?;
-    match *numbers.as_slice() {
-        [width, a, b, height, x, y] if is_straight([width, a, b, height]) => {
-            Some((DVec2::new(x, y), DVec2::new(width, height)))
+/// world file: six numbers, of which the second and third are rotations. `None` where there is none.
+///
+/// # Errors
+/// [`TerrainError::Unsupported`] for a world file that rotates the raster, or is no world file.
+pub(super) fn world(source: &Source) -> Result<Option<(DVec2, DVec2)>, TerrainError> {
+    const ENDINGS: [&str; 16] = [
+        "tfw", "TFW", "tifw", "tiffw", "wld", "WLD", "pgw", "PGW", "pngw", "jgw", "JGW", "jpgw", "jpegw", "jpw", "wbw",
+        "webpw",
+    ];
+    let Some((path, text)) = text(source, &ENDINGS) else { return Ok(None) };
+    let numbers: Option<Vec<f64>> = text.split_whitespace().map(|word| word.replace(',', ".").parse().ok()).collect();
+    match numbers.as_deref() {
+        Some(&[width, a, b, height, x, y]) if is_straight([width, a, b, height]) => {
+            Ok(Some((DVec2::new(x, y), DVec2::new(width, height))))
         }
-        _ => None,
+        Some([_, _, _, _, _, _]) => Err(source.unsupported(
+            format!("the world file {} rotates the raster against its coordinates", path.display()),
+            "turn it to the north: `gdalwarp IN OUT.tif`",
+        )),
+        _ => Err(source.unsupported(
+            format!("the world file {} does not hold six numbers", path.display()),
+            "correct it: width of a pixel, two zeros, minus its height, and x and y of the middle of the first one",
+        )),
     }
 }
 
@@ -66,6 +79,8 @@ pub(super) struct Auxiliary {
     pub unit: Option<String>,
     pub missing: Option<f64>,
     pub system: Option<CoordinateSystem>,
+    /// Origin (corner of the first pixel) and size of a pixel, to the east and to the north.
+    pub place: Option<(DVec2, DVec2)>,
 }
 
 /// The auxiliary file of a raster.
@@ -91,7 +106,19 @@ impl Auxiliary {
             unit: element(band, "UnitType"),
             missing: number("NoDataValue"),
             system: element(text, "SRS").and_then(|wkt| of_wkt(&wkt)),
+            place: element(text, "GeoTransform").and_then(|text| transform(&text)),
         }
+    }
+}
+
+/// The six numbers in which GDAL keeps origin, pixel and rotation, where there is no rotation.
+fn transform(text: &str) -> Option<(DVec2, DVec2)> {
+    let numbers: Vec<f64> = text.split(',').map(|word| word.trim().parse().ok()).collect::<Option<_>>()?;
+    match *numbers.as_slice() {
+        [x, width, a, y, b, height] if is_straight([width, a, b, height]) => {
+            Some((DVec2::new(x, y), DVec2::new(width, height)))
+        }
+        _ => None,
     }
 }
 
@@ -207,7 +234,7 @@ mod tests {
     #[test]
     fn auxiliary_files_of_gdal_are_read() {
         let text = "<PAMDataset>\n<SRS dataAxisToSRSAxisMapping=\"1,2\">PROJCS[&quot;x&quot;,AUTHORITY[&quot;EPSG&quot;,\
-                    &quot;25832&quot;]]</SRS><PAMRasterBand band=\"1\"><NoDataValue le_hex_endian=\"0\">-9.99900000000000E+03\
+                    &quot;25832&quot;]]</SRS><GeoTransform> 5.0e+05, 0.5, 0, 5.5e+06, 0,-0.5</GeoTransform><PAMRasterBand band=\"1\"><NoDataValue le_hex_endian=\"0\">-9.99900000000000E+03\
                     </NoDataValue><UnitType>ft</UnitType><Offset>5</Offset><Scale>0.5</Scale></PAMRasterBand></PAMDataset>";
         let expected = Auxiliary {
             scale: Some(0.5),
@@ -215,6 +242,7 @@ mod tests {
             unit: Some("ft".to_owned()),
             missing: Some(-9999.0),
             system: Some(CoordinateSystem::Utm { zone: 32, south: false }),
+            place: Some((DVec2::new(500_000.0, 5.5e6), DVec2::new(0.5, -0.5))),
         };
         assert_eq!(Auxiliary::parse(text), expected);
         assert_eq!(Auxiliary::parse("<PAMDataset><PAMRasterBand"), Auxiliary::default());
