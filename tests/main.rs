@@ -9,6 +9,8 @@ mod compare;
 mod export;
 mod front_door;
 mod fuzz;
+#[cfg(feature = "geopackage")]
+mod geopackages;
 mod grow;
 mod implicit;
 mod independent;
