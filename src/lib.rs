@@ -41,6 +41,7 @@
 //! # Cargo features
 //! - `program` (default): the command `canopy` and the module `app`; brings `clap`, `egui` and progress bars.
 //! - `window` (part of `program`): Bevy's window, keyboard and mouse.
+//! - `geopackage` (part of `program`): inventories in GeoPackages; brings `rusqlite` with SQLite, which needs a C compiler.
 //!
 //! A program with its own window uses Canopy with `default-features = false`.
 

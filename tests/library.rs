@@ -9,7 +9,7 @@ use std::{
 use crate::support::program::listing;
 
 /// Crates that only the program needs.
-const PROGRAM: [&str; 7] = ["anyhow", "bevy_egui", "bevy_winit", "clap", "egui", "indicatif", "winit"];
+const PROGRAM: [&str; 8] = ["anyhow", "bevy_egui", "bevy_winit", "clap", "egui", "indicatif", "rusqlite", "winit"];
 
 /// Names of all crates that the package is built from with these arguments.
 fn crates(arguments: &[&str]) -> BTreeSet<String> {

@@ -10,6 +10,8 @@ mod drape;
 mod export;
 mod front_door;
 mod fuzz;
+#[cfg(feature = "geopackage")]
+mod geopackages;
 mod grow;
 mod implicit;
 mod independent;

@@ -148,7 +148,7 @@ pub enum AppError {
     /// A file of unknown kind.
     #[error(
         "{}: this is not a plant (.glb, .gltf), terrain (.tif, .asc, .hgt, .vrt, .png), inventory (.csv, .tsv, .geojson, .json, \
-         .shp) or scene (.ron) file",
+         .shp, .gpkg) or scene (.ron) file",
         path.display()
     )]
     UnknownKind {

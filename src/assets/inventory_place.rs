@@ -45,6 +45,7 @@ pub fn read_and_place(
             positions,
             year: trees.year,
             variant: trees.variant.as_deref(),
+            layer: trees.layer.as_deref(),
             strict: trees.strict,
         };
         read_inventory(&trees.path, options)

@@ -4,7 +4,7 @@
 //! sequence (Halton, Hammersley, random) ─┐
 //! rules (density, slope, height, ...)  ──┼─ place_trees() ────┐
 //! ground (anything that is a Ground)   ──┤                    ├─ Stand ─┬─ PackedStand (GPU: trees by cell)
-//! inventory (CSV, GeoJSON) ──────────────┴─ stand_from_inventory()       └─ cover_map() (shade of the far floor)
+//! inventory (table, GIS layer) ──────────┴─ stand_from_inventory()       └─ cover_map() (shade of the far floor)
 //! ```
 //!
 //! Franzke 2005 (section 4.4, figure 4.17) scatters its plants by the Halton and Hammersley points of

@@ -20,7 +20,7 @@ pub enum Trees {
     None,
     /// Placed by rule.
     Scattered(ScatteredTrees),
-    /// Read from a table of text, GeoJSON or a shapefile.
+    /// Read from a table of text, GeoJSON, a shapefile or a GeoPackage.
     Inventory(InventoryTrees),
 }
 
@@ -70,10 +70,10 @@ impl Default for ScatteredTrees {
     }
 }
 
-/// Trees from a table of text (CSV) with a header line, from GeoJSON, or from a shapefile. Columns are found by name in the words of the large
-/// public tables ([`scatter::inventory`](crate::scatter::inventory)): `x` and `y` in metres or `lon` and `lat` (required),
-/// `dbh` or a girth, `height`, `species`; a unit in a column's name or a cell (`dbh_cm`, `12 m`) overrides the one stated
-/// here.
+/// Trees from a table of text (CSV) with a header line, from GeoJSON, from a shapefile, or from a GeoPackage (cargo feature
+/// `geopackage`). Columns are found by name in the words of the large public tables
+/// ([`scatter::inventory`](crate::scatter::inventory)): `x` and `y` in metres or `lon` and `lat` (required), `dbh` or a
+/// girth, `height`, `species`; a unit in a column's name or a cell (`dbh_cm`, `12 m`) overrides the one stated here.
 #[derive(Clone, Debug, PartialEq, Deserialize, bevy::reflect::Reflect)]
 #[serde(deny_unknown_fields)]
 pub struct InventoryTrees {
@@ -93,6 +93,9 @@ pub struct InventoryTrees {
     /// The variant or scenario of a table that has several. Default: its first.
     #[serde(default)]
     pub variant: Option<String>,
+    /// The layer of a GeoPackage. Default: its first one of points, with a warning that names the others.
+    #[serde(default)]
+    pub layer: Option<String>,
     /// Refuses a table with any row or size that cannot be used, instead of leaving it out with a warning. Default false.
     #[serde(default)]
     pub strict: bool,
@@ -164,6 +167,7 @@ impl InventoryTrees {
             height_unit: None,
             year: None,
             variant: None,
+            layer: None,
             strict: false,
             anchor: Anchor::default(),
             coordinates: None,

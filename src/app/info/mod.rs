@@ -14,8 +14,8 @@ use std::path::Path;
 use super::error::AppError;
 use page::Page;
 
-/// Describes the plant (.glb, .gltf), terrain (.tif, .tiff, .asc, .hgt, .vrt, .png), inventory (.csv, .tsv, .geojson, .json), scene or species
-/// (.ron) in `path`: some lines of text, each ended by a newline. A pipe holds a scene.
+/// Describes the plant (.glb, .gltf), terrain (.tif, .tiff, .asc, .hgt, .vrt, .png), inventory (.csv, .tsv, .geojson, .json,
+/// .shp, .gpkg), scene or species (.ron) in `path`: some lines of text, each ended by a newline. A pipe holds a scene.
 ///
 /// # Errors
 /// [`AppError::UnknownKind`] for another ending; otherwise what the reader of that kind says of a file that it cannot
@@ -27,7 +27,7 @@ pub fn info(path: &Path) -> Result<String, AppError> {
         "glb" | "gltf" => plant::describe_file(&mut page, path)?,
         "png" => terrain::describe_image(&mut page, path)?,
         "tif" | "tiff" | "asc" | "hgt" | "vrt" => terrain::describe_file(&mut page, path)?,
-        "csv" | "tsv" | "geojson" | "json" | "shp" => inventory::describe_file(&mut page, path)?,
+        "csv" | "tsv" | "geojson" | "json" | "shp" | "gpkg" => inventory::describe_file(&mut page, path)?,
         "ron" => scene::describe_file(&mut page, path)?,
         // A pipe, such as `/dev/stdin`, has no name that could say more; a scene can be read from it.
         _ if is_pipe(path) => scene::describe_file(&mut page, path)?,

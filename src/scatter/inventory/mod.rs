@@ -1,4 +1,4 @@
-//! Tree inventories: tables of text, GeoJSON or shapefiles with one tree a row.
+//! Tree inventories: tables of text, GeoJSON, shapefiles or GeoPackages with one tree a row.
 //!
 //! Columns are found by their names, in any order, in the words of the large public tables (`names.rs` has them), and by
 //! what their cells hold:
@@ -21,11 +21,14 @@
 
 mod cells;
 mod geojson;
+#[cfg(feature = "geopackage")]
+mod geopackage;
 mod names;
 mod place;
 mod select;
 mod shapefile;
 mod sizes;
+mod source;
 mod species;
 mod text;
 
@@ -40,6 +43,7 @@ use place::PlaceColumns;
 use select::Selection;
 pub use select::Surveys;
 use sizes::{SizeColumns, Sizes};
+use source::Source;
 use species::SpeciesColumns;
 use text::{Row, Table};
 
@@ -110,6 +114,8 @@ pub struct InventoryOptions<'a> {
     pub year: Option<i32>,
     /// The variant or scenario of a table that has several; `None`: the first one.
     pub variant: Option<&'a str>,
+    /// The layer of a GeoPackage; `None`: the first one of points.
+    pub layer: Option<&'a str>,
     /// Refuses a file with any row that cannot be used, instead of leaving it out with a note.
     pub strict: bool,
 }
@@ -136,7 +142,7 @@ pub struct InventoryTree {
     pub height_m: Option<f64>,
     /// Species as written in the file, genus and epithet joined; not empty.
     pub species: Option<String>,
-    /// Line in the file, from 1; of GeoJSON and shapefiles the number of the feature.
+    /// Line in the file, from 1; of GeoJSON, shapefiles and GeoPackages the number of the feature.
     pub line: u64,
 }
 
@@ -168,21 +174,17 @@ pub struct Column {
     pub meaning: Option<String>,
 }
 
-/// Reads an inventory from a file: a table of text, GeoJSON, or the `.shp` of a shapefile with the files beside it.
+/// Reads an inventory from a file: a table of text, GeoJSON, a GeoPackage (cargo feature `geopackage`), or the `.shp` of a
+/// shapefile with the files beside it.
 ///
 /// # Errors
 /// [`ScatterError::Io`] for a file that cannot be read; otherwise as [`parse_inventory`].
 pub fn read_inventory(path: &Path, options: InventoryOptions) -> Result<Inventory, ScatterError> {
-    let bytes = std::fs::read(path).map_err(|source| ScatterError::Io { path: path.to_owned(), source })?;
-    if shapefile::recognises(&bytes) {
-        let (table, place, wkt) = shapefile::read(path, &bytes)?;
-        let inventory = Reading::new(table, Some(place), &path.display().to_string(), options)?.finish()?;
-        return Ok(Inventory { wkt, ..inventory });
-    }
-    parse_inventory(&bytes, &path.display().to_string(), options)
+    let source = Source::of_file(path, options)?;
+    Reading::new(source, &path.display().to_string(), options)?.finish()
 }
 
-/// Reads an inventory from the bytes of a table of text or of GeoJSON; `name` is the file's name in messages.
+/// Reads an inventory from the bytes of a table of text, of GeoJSON or of a GeoPackage; `name` is the file's name in messages.
 ///
 /// Rows whose position cannot be used or that have another number of cells than the header are left out; a size that is no
 /// length, negative or impossible is left out of its row. Both are counted in a note with the first five lines.
@@ -190,15 +192,10 @@ pub fn read_inventory(path: &Path, options: InventoryOptions) -> Result<Inventor
 /// # Errors
 /// [`ScatterError::NoPosition`], [`ScatterError::AmbiguousColumn`] for the header. [`ScatterError::Record`] and
 /// [`ScatterError::BadValues`] where half of the rows or more cannot be read as written (with
-/// [`strict`](InventoryOptions::strict), any), and for files that are no text.
+/// [`strict`](InventoryOptions::strict), any), and for files that are no text. [`ScatterError::Record`] also for a
+/// GeoPackage that is damaged, has no layer of points or none of the name that `options` states.
 pub fn parse_inventory(bytes: &[u8], name: &str, options: InventoryOptions) -> Result<Inventory, ScatterError> {
-    let (table, stated) = if geojson::recognises(bytes) {
-        let (table, place) = geojson::read(bytes, name)?;
-        (table, Some(place))
-    } else {
-        (text::read(bytes, name)?, None)
-    };
-    Reading::new(table, stated, name, options)?.finish()
+    Reading::new(Source::of_bytes(bytes, name, options)?, name, options)?.finish()
 }
 
 /// Cells that cannot be used: their number and the first of them.
@@ -224,6 +221,7 @@ impl Bad {
 /// A table while its rows are read.
 struct Reading<'a> {
     table: Table,
+    wkt: Option<String>,
     name: &'a str,
     options: InventoryOptions<'a>,
     place: PlaceColumns,
@@ -249,13 +247,9 @@ struct Reading<'a> {
 }
 
 impl<'a> Reading<'a> {
-    fn new(
-        table: Table,
-        stated: Option<PlaceColumns>,
-        name: &'a str,
-        options: InventoryOptions<'a>,
-    ) -> Result<Self, ScatterError> {
-        let place = match stated {
+    fn new(source: Source, name: &'a str, options: InventoryOptions<'a>) -> Result<Self, ScatterError> {
+        let Source { table, place, wkt } = source;
+        let place = match place {
             Some(place) => place,
             None => place::find(&table.header, &table.rows, table.decimal_comma, options.positions, name)?,
         };
@@ -271,6 +265,7 @@ impl<'a> Reading<'a> {
         let sizes = sizes::find(&table, options, in_usa, name)?;
         Ok(Self {
             table,
+            wkt,
             name,
             options,
             place,
@@ -316,7 +311,7 @@ impl<'a> Reading<'a> {
             rows: trees,
             coordinates: self.place.coordinates(),
             epsg: self.table.epsg,
-            wkt: None,
+            wkt: self.wkt,
             columns,
             notes,
             surveys: self.selection.surveys,

@@ -226,7 +226,7 @@ fn sexagesimal(cell: &str) -> Option<f64> {
 
 /// Whether columns of planar names hold degrees: all numbers are within the range of degrees, and the trees would stand
 /// on each other if they were metres.
-fn are_degrees(rows: &[Row], x: usize, y: usize, decimal_comma: bool) -> bool {
+pub(super) fn are_degrees(rows: &[Row], x: usize, y: usize, decimal_comma: bool) -> bool {
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     let (mut count, mut fine) = (0usize, 0usize);
     for row in rows {

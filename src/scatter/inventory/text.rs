@@ -30,8 +30,12 @@ pub(super) struct Row {
 const PREAMBLE: usize = 40;
 
 /// Formats that are no text, by their first bytes, with the way to a table.
-const BINARY: [(&[u8], &str); 6] = [
-    (b"SQLite format 3\0", "a GeoPackage or another SQLite database"),
+const BINARY: &[(&[u8], &str)] = &[
+    #[cfg(not(feature = "geopackage"))]
+    (
+        b"SQLite format 3\0",
+        "a GeoPackage, which a program with the cargo feature `geopackage` reads, or another SQLite database",
+    ),
     (b"PK\x03\x04", "a ZIP archive, such as a spreadsheet (.xlsx, .ods) or a packed shapefile"),
     (b"\xD0\xCF\x11\xE0", "a spreadsheet of an old Excel (.xls)"),
     (b"\x00\x00\x27\x0A", "a shapefile without the files beside it"),
