@@ -28,11 +28,13 @@ mod plan;
 mod profile;
 mod reference;
 mod rendered_image;
+mod renderer;
 mod request;
 pub mod stock;
 mod text;
 mod tone;
 mod tune;
+mod windowless;
 
 pub use crate::measure::PIXELS_PER_DEGREE;
 pub use adapter::list_adapters;
@@ -43,7 +45,7 @@ pub use compare::{
 pub use error::AppError;
 pub use export::{ExportOptions, ExportReport, export};
 pub use fly::fly;
-pub use headless::{Renderer, UpdateTime, render};
+pub use headless::render;
 pub use info::info;
 pub use interrupt::{Interrupt, listen as listen_to_interrupts, received as interrupt_received};
 pub use leaf::{LeafImages, LeafOptions, LeafReport, leaf};
@@ -62,6 +64,7 @@ pub use profile::{
 };
 pub use reference::reference;
 pub use rendered_image::RenderedImage;
+pub use renderer::{Renderer, UpdateTime};
 pub use request::{
     BakeOptions, Clock, FlyOptions, LeafKind, LeafModel, LightGroup, Output, Part, ReferenceOptions, RenderOptions,
     RenderReport, Selection, Still, View,
