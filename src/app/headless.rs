@@ -5,10 +5,13 @@ use std::{path::PathBuf, time::Instant};
 use bevy::render::renderer::RenderDevice;
 
 use super::{
-    Frame, RenderOptions, RenderPlan, RenderReport, Renderer, adapter, error::AppError, fingerprint::fingerprint,
-    interrupt, notes::notes, plan::PlanRequest, rendered_image::RenderedImage,
+    Frame, RenderOptions, RenderPlan, RenderReport, Renderer, adapter,
+    beside::{Choice, Panels},
+    error::AppError,
+    plan::PlanRequest,
+    rendered_image::RenderedImage,
 };
-use crate::{assets::Stage, files, progress::Progress};
+use crate::{files, progress::Progress};
 
 /// Renders the images of `options`.
 ///
@@ -20,21 +23,16 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
     // before anything is left behind.
     let scene = options.overrides.applied(options.scene.read()?);
     RenderPlan::check(options, &scene)?;
+    let choice = Choice::new(&options.beside, &scene)?;
     check_writable(options)?;
     let settings = adapter::settings(options.adapter.as_deref())?;
     let most_trees = adapter::check_size(&settings, options.size)?;
-    let stage = Stage::build_within(&scene, most_trees, progress).map_err(interrupt::building)?;
-    let plan = RenderPlan::new(options, &stage.scene, &|x, z| stage.terrain.height(x, z))?;
+    let mut panels = Panels::build(&scene, &choice, options.size, most_trees, progress)?;
+    let ground = panels.first().terrain.clone();
+    let plan = RenderPlan::new(options, &scene, &|x, z| ground.height(x, z))?;
     let mut report = RenderReport::default();
-    let scene_print = fingerprint(&stage.scene);
-    // An image of other settings, or of a scene whose files have changed since, is stale.
-    let notes_of = |frame: &Frame| {
-        let mut notes = notes(&stage, &frame.view, frame.instant);
-        notes.push(("Fingerprint", scene_print.clone()));
-        notes
-    };
     let finished =
-        |frame: &Frame| options.resume && RenderedImage::is_stored(&frame.file, options.size, &notes_of(frame));
+        |frame: &Frame| options.resume && RenderedImage::is_stored(&frame.file, panels.size(), &panels.notes(frame));
     let wanted: Vec<bool> = plan.frames.iter().map(|frame| !finished(frame)).collect();
     let kept = wanted.iter().filter(|wanted| !*wanted).count();
     if kept > 0 {
@@ -46,9 +44,11 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
     }
     let started = Instant::now();
     progress.begin("Renderer", 0);
-    let mut renderer = Renderer::with_settings(settings, options.size, stage.scene.quality.msaa, |_| ())?;
-    stage.check_device(renderer.world().resource::<RenderDevice>())?;
-    renderer.show(&stage);
+    let mut renderer = Renderer::with_settings(settings, options.size, scene.quality.msaa, |_| ())?;
+    for stage in panels.stages() {
+        stage.check_device(renderer.world().resource::<RenderDevice>())?;
+    }
+    renderer.show(panels.first());
     progress.end();
     progress.note(&format!("renderer: {:.2} s", started.elapsed().as_secs_f64()));
     let mut failures: Vec<(PathBuf, AppError)> = Vec::new();
@@ -63,9 +63,10 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
             return Err(interrupted(&report, plan.frames.len()));
         }
         let started = Instant::now();
-        let drawn = renderer.draw(&stage, &frame.view, frame.instant);
+        let mut explanation = Vec::new();
+        let drawn = panels.draw(&mut renderer, frame, &mut explanation);
         let seconds = started.elapsed().as_secs_f64();
-        if let Err(error) = drawn.and_then(|picture| picture.save(&frame.file, &notes_of(frame))) {
+        if let Err(error) = drawn.and_then(|picture| picture.save(&frame.file, &panels.notes(frame))) {
             // The other frames do not depend on this one.
             progress.warn(&format!("{}: {error}", frame.file.display()));
             failures.push((frame.file.clone(), error));
@@ -79,7 +80,7 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
         ));
         if options.explain {
             report.explanation.push(format!("{}:", frame.file.display()));
-            report.explanation.extend(renderer.explain());
+            report.explanation.append(&mut explanation);
         }
         report.files.push(frame.file.clone());
         progress.advance(1);

@@ -9,6 +9,7 @@
 
 mod adapter;
 mod bake;
+mod beside;
 mod camera;
 mod compare;
 mod error;
@@ -39,6 +40,7 @@ mod windowless;
 pub use crate::measure::PIXELS_PER_DEGREE;
 pub use adapter::list_adapters;
 pub use bake::{LevelFacts, Side, Studio, bake, bake_scene, facts};
+pub use beside::BesideError;
 pub use compare::{
     COMPARE_VERSION, CompareError, CompareOptions, CompareReport, FrameComparison, compare, read_image, save_map,
 };
@@ -66,7 +68,7 @@ pub use reference::reference;
 pub use rendered_image::RenderedImage;
 pub use renderer::{Renderer, UpdateTime};
 pub use request::{
-    BakeOptions, Clock, FlyOptions, LeafKind, LeafModel, LightGroup, Output, Part, ReferenceOptions, RenderOptions,
-    RenderReport, Selection, Still, View,
+    BakeOptions, Beside, Clock, FlyOptions, LeafKind, LeafModel, LightGroup, Output, Part, ReferenceOptions,
+    RenderOptions, RenderReport, Selection, Still, View,
 };
 pub use tune::{Goal, TuneOptions, Tuned, tune};

@@ -332,7 +332,7 @@ fn numbered(out: &FilePath, number: u32, frames: u32, endings: &[&str]) -> PathB
 mod tests {
     use super::*;
     use crate::{
-        app::Still,
+        app::{Beside, Still},
         scene::{Overrides, SceneError},
     };
 
@@ -355,6 +355,7 @@ mod tests {
             output,
             view,
             size: (64, 36),
+            beside: Beside::default(),
             selection: Selection::All,
             resume: false,
             overrides: Overrides::default(),

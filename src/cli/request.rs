@@ -17,6 +17,7 @@ use super::arguments::{
     Arguments, Bake, CameraArguments, Common, Compare, Export, Fly, Leaf, LeafChoice, LightChoice, Measured, Merge,
     PeerChoice, Profile, Reference, Render, SequenceArguments, StyleArguments, Tune,
 };
+use super::surveys;
 
 /// The scene of `canopy fly` without an argument.
 const DEMO: &str = "scenes/demo.ron";
@@ -27,8 +28,8 @@ fn overrides(common: &Common) -> Overrides {
         msaa: common.msaa,
         exposure: common.exposure,
         strict: common.strict,
-        year: common.year,
-        variant: common.variant.clone(),
+        year: common.single_year(),
+        variant: common.single_variant().cloned(),
         lighting: common.lighting.clone(),
         ..Overrides::default()
     }
@@ -68,6 +69,7 @@ pub fn render_options(render: Render, common: &Common) -> Result<RenderOptions, 
     Ok(RenderOptions {
         view: view(&render.view),
         size: render.size,
+        beside: surveys::beside(common),
         output: output(render.out, &render.at, &render.sequence)?,
         selection: selection(render.sequence),
         resume: render.resume,
@@ -336,7 +338,7 @@ fn ends_in(path: &Path, ending: &str) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(ending))
 }
 
-fn usage(message: String) -> clap::Error {
+pub(super) fn usage(message: String) -> clap::Error {
     Arguments::command().error(ErrorKind::ArgumentConflict, message)
 }
 
@@ -454,6 +456,8 @@ mod tests {
             "--out a --frames 2 --at 2026-06-21T06:00Z --from 2026-06-21T06:00Z --to 2026-06-21T07:00Z",
             "--out a.png --seed -1",
             "--out a.png --msaa 2",
+            "--out a.png --year 2000,",
+            "--out a.png --year soon",
             "--out a.png --lighting bright",
             "--out a.png --unknown",
         ] {

@@ -123,6 +123,9 @@ pub struct Fly {
     canopy render demo.ron --out flight --frames 250 --chunk 2/8 --skip-existing
   The same as a watercolour in sepia:
     canopy render demo.ron --out sepia.png --style watercolour --palette sepia
+  Before and after a felling side by side, or years and variants in a grid: each panel has --size, and all have one exposure:
+    canopy render stand.ron --out felling.png --variant kept,felled --size 960x540
+    canopy render stand.ron --out growth.png --year 2000,2010,2020 --size 640x360
   A day from a fixed camera:
     canopy render demo.ron --out day.png --frames 96 --from 2026-06-21T04:00-04:00 --to 2026-06-21T22:00-04:00
 Ctrl-C stops after the current image; the same command with --resume renders the others.")]
@@ -132,7 +135,7 @@ pub struct Render {
     /// PNG file to write; for a sequence, a PNG name to which numbers are added, or a folder.
     #[arg(long, value_name = "FILE", required = true)]
     pub out: Vec<PathBuf>,
-    /// Size of the images in pixels.
+    /// Size of the images in pixels; of several years or variants side by side the size of each.
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = DEFAULT_SIZE)]
     pub size: (u32, u32),
     /// Date and time with the offset from UTC, such as 2026-06-21T15:30+02:00 [default: the scene's].

@@ -72,18 +72,32 @@ pub struct Common {
     /// else it follows the light at the camera].
     #[arg(long, global = true, value_name = "EV", value_parser = parse_exposure, allow_hyphen_values = true)]
     pub exposure: Option<f64>,
-    /// Show this year of an inventory of repeated surveys [default: the scene's, or the last].
-    #[arg(long, global = true, value_name = "YEAR")]
-    pub year: Option<i32>,
-    /// Show this variant or scenario of an inventory with several [default: the scene's, or the first].
+    /// Show this year of an inventory of repeated surveys [default: the scene's, or the last]. `render` shows several side by
+    /// side: 2000,2020.
+    #[arg(long, global = true, value_name = "YEAR", value_delimiter = ',')]
+    pub year: Vec<i32>,
+    /// Show this variant or scenario of an inventory with several [default: the scene's, or the first]. `render` shows several
+    /// side by side: kept,felled.
     #[arg(long, global = true, value_name = "NAME")]
-    pub variant: Option<String>,
+    pub variant: Vec<String>,
     /// Refuse an inventory with rows that cannot be used, instead of leaving them out with a warning.
     #[arg(long, global = true)]
     pub strict: bool,
     /// Print which passes ran, which were skipped, and why.
     #[arg(long, global = true)]
     pub explain: bool,
+}
+
+impl Common {
+    /// The year to show, if it is a single one.
+    pub fn single_year(&self) -> Option<i32> {
+        self.year.first().copied().filter(|_| self.year.len() == 1)
+    }
+
+    /// The variant to show, if it is a single one.
+    pub fn single_variant(&self) -> Option<&String> {
+        self.variant.first().filter(|_| self.variant.len() == 1)
+    }
 }
 
 /// The commands.
