@@ -216,6 +216,7 @@ fn first_view(arguments: &Arguments, scene: &Scene, stage: &Stage) -> anyhow::Re
         output: Output::Stills(vec![Still { out: "picture.png".into(), at: None }]),
         view: View::Scene,
         size: arguments.size,
+        beside: canopy::app::Beside::default(),
         selection: canopy::app::Selection::All,
         resume: false,
         overrides: Overrides::default(),

@@ -17,6 +17,9 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: Arguments) -> Outcome {
+    if let Err(error) = cli::check_surveys(&arguments) {
+        return Outcome::Usage(error);
+    }
     let common = arguments.common;
     if arguments.list_adapters {
         return list_adapters().into();

@@ -1,11 +1,13 @@
 //! Inventories as cities and foresters publish them: read as they are, and nothing dropped in silence.
 
+use std::collections::BTreeMap;
+
 use canopy::app::info;
 use canopy::scatter::{
-    Allometry, Coordinates, Ground, Inventory, InventoryOptions, InventorySpecies, LengthUnit, ScatterError,
-    parse_inventory, stand_from_inventory,
+    Allometry, Coordinates, Ground, Inventory, InventoryOptions, InventorySpecies, InventoryTree, LengthUnit,
+    ScatterError, Tree, parse_inventory, stand_from_inventory,
 };
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 const ROWS: usize = 1000;
 
@@ -557,6 +559,44 @@ fn one_year_and_one_variant_are_shown() {
         &read(Some("never")).expect("an inventory"),
         &["of the variants before, after", "there is no `never`", "--variant"],
     );
+}
+
+#[test]
+fn a_tree_keeps_its_look_and_its_place_from_survey_to_survey() {
+    let text = "x,y,survey_year,height_m\n9,9,2000,12\n1,2,2000,10\n5,6,2000,11\n5,6,2010,14\n1,2,2010,13\n30,3,2010,5\n\
+                0,0,2010,dead\n";
+    let read = |year: i32| {
+        let options = InventoryOptions { year: Some(year), ..InventoryOptions::default() };
+        parse_inventory(text.as_bytes(), "t", options).expect("an inventory")
+    };
+    let pine = InventorySpecies {
+        name: "pine".to_owned(),
+        variants: 0..1000,
+        plant_heights_m: vec![10.0; 1000],
+        default_height_m: 10.0,
+        allometry: Allometry::default(),
+        trunk_radius_m: 0.2,
+    };
+    let looks = |rows: &[InventoryTree]| {
+        let stand = stand_from_inventory(rows, |x, y| DVec3::new(x, 0.0, -y), &Flat, std::slice::from_ref(&pine), 1);
+        let look = |tree: &Tree| (tree.yaw.to_bits(), tree.tint.to_bits(), tree.variant);
+        let trees = stand.expect("a stand").stand.trees;
+        trees.iter().map(|tree| (tree.position.x as i32, look(tree))).collect::<BTreeMap<_, _>>()
+    };
+    let (early, late) = (read(2000), read(2010));
+    let (before, after) = (looks(&early.rows), looks(&late.rows));
+    assert_eq!((before.len(), after.len()), (3, 4));
+    assert!(before[&1] == after[&1] && before[&5] == after[&5], "{before:?} {after:?}");
+    assert!(before[&1] != before[&5] && before[&9] != before[&5] && after[&30] != after[&5]);
+    // By their numbers in the list they would be others.
+    let unnumbered: Vec<InventoryTree> =
+        late.rows.iter().map(|row| InventoryTree { place: None, ..row.clone() }).collect();
+    assert!(looks(&unnumbered)[&1] != before[&1]);
+    // What stands at the edge in one survey alone moves no middle.
+    assert_eq!(early.extent, Some((DVec2::ZERO, DVec2::new(30.0, 9.0))));
+    assert_eq!(late.extent, early.extent);
+    let single = parse("x,y\n1,2\n3,4\n");
+    assert!(single.extent.is_none() && single.rows.iter().all(|row| row.place.is_none()));
 }
 
 #[test]

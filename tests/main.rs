@@ -4,6 +4,7 @@
 
 mod app;
 mod bake;
+mod beside;
 mod cli;
 mod compare;
 mod drape;

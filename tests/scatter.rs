@@ -355,7 +355,7 @@ fn parse(text: &str) -> Result<Inventory, ScatterError> {
 }
 
 fn row(x: f64, y: f64, dbh_m: Option<f64>, height_m: Option<f64>, species: Option<&str>, line: u64) -> InventoryTree {
-    InventoryTree { x, y, dbh_m, height_m, species: species.map(str::to_owned), line }
+    InventoryTree { x, y, dbh_m, height_m, species: species.map(str::to_owned), place: None, line }
 }
 
 #[test]

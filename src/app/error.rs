@@ -28,6 +28,9 @@ pub enum AppError {
     /// The request.
     #[error(transparent)]
     Plan(#[from] super::PlanError),
+    /// Years or variants that cannot be shown side by side.
+    #[error(transparent)]
+    Beside(#[from] super::BesideError),
     /// The ground truth.
     #[error(transparent)]
     Reference(#[from] crate::reference::ReferenceError),

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{error::AppError, film_notes::FilmNotes, reference::save};
+use super::{error::AppError, film_notes::FilmNotes, plan::PlanError, reference::save};
 use crate::{
     files,
     progress::Progress,
@@ -75,15 +75,15 @@ pub enum MergeError {
     /// A file where a folder is needed.
     #[error("`{}` is the name of an image; folders are merged into a folder, as PNG or with --exr", .0.display())]
     Folder(PathBuf),
-    /// A file of another kind.
-    #[error("`{}` is not a valid name for this image; it must end in .exr, .png or .film", .0.display())]
-    Ending(PathBuf),
 }
+
+/// What an image can be written as.
+const IMAGES: &[&str] = &["exr", "png", "film"];
 
 /// Merges the films of `options`; returns the images.
 ///
 /// # Errors
-/// [`AppError::Merge`], [`AppError::Reference`], [`AppError::Write`]; existing images stay as they are.
+/// [`AppError::Merge`], [`AppError::Plan`], [`AppError::Reference`], [`AppError::Write`]; existing images stay as they are.
 pub fn merge(options: &MergeOptions, progress: &mut dyn Progress) -> Result<Vec<PathBuf>, AppError> {
     let images = images(options)?;
     for image in images.keys().take(1) {
@@ -112,14 +112,14 @@ fn images(options: &MergeOptions) -> Result<BTreeMap<PathBuf, Vec<PathBuf>>, App
     if let (Some(folder), Some(file)) = (folders.first(), single.first()) {
         return Err(MergeError::Mixed { folder: (*folder).clone(), file: (*file).clone() }.into());
     }
-    let is_image = files::ends_in(&options.out, &["exr", "png", "film"]);
     if folders.is_empty() {
-        return match is_image && (!options.exr || files::ends_in(&options.out, &["exr"])) {
+        let endings = if options.exr { &["exr"] } else { IMAGES };
+        return match files::ends_in(&options.out, endings) {
             true => Ok(BTreeMap::from([(options.out.clone(), options.parts.clone())])),
-            false => Err(MergeError::Ending(options.out.clone()).into()),
+            false => Err(PlanError::ending(options.out.clone(), endings).into()),
         };
     }
-    if is_image {
+    if files::ends_in(&options.out, IMAGES) {
         return Err(MergeError::Folder(options.out.clone()).into());
     }
     let mut images: BTreeMap<PathBuf, Vec<PathBuf>> = BTreeMap::new();

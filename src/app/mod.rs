@@ -9,6 +9,7 @@
 
 mod adapter;
 mod bake;
+mod beside;
 mod camera;
 mod compare;
 mod error;
@@ -28,22 +29,25 @@ mod plan;
 mod profile;
 mod reference;
 mod rendered_image;
+mod renderer;
 mod request;
 pub mod stock;
 mod text;
 mod tone;
 mod tune;
+mod windowless;
 
 pub use crate::measure::PIXELS_PER_DEGREE;
 pub use adapter::list_adapters;
 pub use bake::{LevelFacts, Side, Studio, bake, bake_scene, facts};
+pub use beside::BesideError;
 pub use compare::{
     COMPARE_VERSION, CompareError, CompareOptions, CompareReport, FrameComparison, compare, read_image, save_map,
 };
 pub use error::AppError;
 pub use export::{ExportOptions, ExportReport, export};
 pub use fly::fly;
-pub use headless::{Renderer, UpdateTime, render};
+pub use headless::render;
 pub use info::info;
 pub use interrupt::{Interrupt, listen as listen_to_interrupts, received as interrupt_received};
 pub use leaf::{LeafImages, LeafOptions, LeafReport, leaf};
@@ -62,8 +66,9 @@ pub use profile::{
 };
 pub use reference::reference;
 pub use rendered_image::RenderedImage;
+pub use renderer::{Renderer, UpdateTime};
 pub use request::{
-    BakeOptions, Clock, FlyOptions, LeafKind, LeafModel, LightGroup, Output, Part, ReferenceOptions, RenderOptions,
-    RenderReport, Selection, Still, View,
+    BakeOptions, Beside, Clock, FlyOptions, LeafKind, LeafModel, LightGroup, Output, Part, ReferenceOptions,
+    RenderOptions, RenderReport, Selection, Still, View,
 };
 pub use tune::{Goal, TuneOptions, Tuned, tune};

@@ -101,6 +101,16 @@ pub enum PlanError {
     SameFile(PathBuf),
 }
 
+impl PlanError {
+    /// The error of a file that ends in none of `endings`, which have no dot.
+    pub(super) fn ending(file: PathBuf, endings: &[&str]) -> Self {
+        let mut endings: Vec<String> = endings.iter().map(|ending| format!(".{ending}")).collect();
+        let last = endings.pop().unwrap_or_default();
+        let endings = if endings.is_empty() { last } else { format!("{} or {last}", endings.join(", ")) };
+        Self::Ending { file, endings }
+    }
+}
+
 /// Endings of the images of a render.
 const PNG: &[&str] = &["png"];
 
@@ -136,11 +146,11 @@ impl PlanRequest<'_> {
                 for (number, still) in stills.iter().enumerate() {
                     if !ends_in(&still.out, self.endings) {
                         let file = still.out.clone();
-                        return Err(if self.endings == PNG {
+                        let is_render = self.endings == PNG;
+                        return Err(if is_render {
                             PlanError::NoPng(file)
                         } else {
-                            let endings = self.endings.iter().map(|ending| format!(".{ending}")).collect::<Vec<_>>();
-                            PlanError::Ending { file, endings: endings.join(", ") }
+                            PlanError::ending(file, self.endings)
                         });
                     }
                     if stills.iter().take(number).any(|before| before.out == still.out) {
@@ -322,7 +332,7 @@ fn numbered(out: &FilePath, number: u32, frames: u32, endings: &[&str]) -> PathB
 mod tests {
     use super::*;
     use crate::{
-        app::Still,
+        app::{Beside, Still},
         scene::{Overrides, SceneError},
     };
 
@@ -345,6 +355,7 @@ mod tests {
             output,
             view,
             size: (64, 36),
+            beside: Beside::default(),
             selection: Selection::All,
             resume: false,
             overrides: Overrides::default(),
@@ -455,6 +466,12 @@ mod tests {
         assert_eq!(error(View::Scene, twice, &bare), Some(PlanError::SameFile("a.png".into())));
         let fault = PlanError::NoPng("a.jpg".into()).to_string();
         assert!(fault.ends_with("call it a.png"), "{fault}");
+        for (endings, words) in
+            [(&["film"][..], "end in .film"), (&["exr", "png", "film"], "end in .exr, .png or .film")]
+        {
+            let fault = PlanError::ending("a.jpg".into(), endings).to_string();
+            assert!(fault.contains("`a.jpg`") && fault.ends_with(words), "{fault}");
+        }
         Ok(())
     }
 }

@@ -40,8 +40,10 @@ pub struct RenderOptions {
     pub output: Output,
     /// Where the camera is.
     pub view: View,
-    /// Size of an image in pixels, each at least 1; the device may have a lower limit.
+    /// Size of an image in pixels, each at least 1; the device may have a lower limit. Of several panels it is the size of each.
     pub size: (u32, u32),
+    /// Years and variants of an inventory to show side by side.
+    pub beside: Beside,
     /// Which frames of a sequence to render.
     pub selection: Selection,
     /// Whether to keep images that an earlier render of the same request has finished: files of the same size and with
@@ -55,6 +57,17 @@ pub struct RenderOptions {
     pub quiet: bool,
     /// Report which passes ran, which were skipped, and why.
     pub explain: bool,
+}
+
+/// Years and variants of an inventory that one picture shows side by side, from one camera and with one exposure; none: the
+/// scene as it is.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Beside {
+    /// Years, beside each other in this order.
+    pub years: Vec<i32>,
+    /// Variants in this order: beside each other, or with several years above each other. A text that is no variant of the
+    /// inventory is a list of them, separated by commas.
+    pub variants: Vec<String>,
 }
 
 /// The light sources of a ground truth render. Light is additive, so the errors of each source can be separated.

@@ -193,11 +193,13 @@ impl Placement {
     }
 }
 
-/// Least and greatest coordinates.
+/// Least and greatest coordinates, of several surveys or variants those of all of them.
 fn span(inventory: &Inventory) -> (DVec2, DVec2) {
-    inventory.rows.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), row| {
-        let at = DVec2::new(row.x, row.y);
-        (low.min(at), high.max(at))
+    inventory.extent.unwrap_or_else(|| {
+        inventory.rows.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), row| {
+            let at = DVec2::new(row.x, row.y);
+            (low.min(at), high.max(at))
+        })
     })
 }
 

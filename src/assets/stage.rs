@@ -87,6 +87,33 @@ impl Stage {
         let terrain = Arc::new(ground::build_terrain(&scene.terrain, progress)?);
         progress.end();
         progress.note(&format!("terrain: {:.2} s", started.elapsed().as_secs_f64()));
+        Self::build_on(terrain, style, scene, None, most_trees, progress)
+    }
+
+    /// As [`build_within`](Self::build_within), for a `scene` that differs from this one's in the year or the variant of its
+    /// inventory alone. It stands on the same ground and shares the plants, unless trees are lit together.
+    ///
+    /// # Errors
+    /// Those of [`build_within`](Self::build_within).
+    pub fn build_beside(
+        &self,
+        scene: &Scene,
+        most_trees: Option<usize>,
+        progress: &mut dyn Progress,
+    ) -> Result<Self, StageError> {
+        scene.validate()?;
+        Self::build_on(self.terrain.clone(), self.style.clone(), scene, Some(&self.plants), most_trees, progress)
+    }
+
+    /// Builds what stands on `terrain`. Plants that are `known` are those of `scene` before trees are lit together.
+    fn build_on(
+        terrain: Arc<Terrain>,
+        style: CanopyStyle,
+        scene: &Scene,
+        known: Option<&[BakedPlant]>,
+        most_trees: Option<usize>,
+        progress: &mut dyn Progress,
+    ) -> Result<Self, StageError> {
         let observer = observer(scene, &terrain)?;
         check_wanted(progress)?;
         let drape = match &scene.drape {
@@ -115,7 +142,12 @@ impl Stage {
 
         let has_trees = !matches!(scene.trees, scene::Trees::None);
         let mut species = if has_trees { plants::plan(scene)? } else { plants::PlantPlan::default() };
-        let plants = bake(&species, &scene.quality, progress)?;
+        // Trees that are lit together have plants of their own.
+        let known = known.filter(|_| !scene.species.iter().any(scene::Species::is_lit_together));
+        let plants = match known.filter(|known| known.len() == species.individuals.len()) {
+            Some(known) => known.to_vec(),
+            None => bake(&species, &scene.quality, progress)?,
+        };
 
         let started = Instant::now();
         progress.begin("Trees", 0);

@@ -69,7 +69,7 @@ pub enum WoodBeyond {
 enum Source<'a> {
     None,
     Rules(&'a ScatteredTrees),
-    Inventory(&'a InventoryTrees, Inventory, Box<Placement>),
+    Inventory(&'a InventoryTrees, Box<Inventory>, Box<Placement>),
 }
 
 impl<'a> StandPlan<'a> {
@@ -85,7 +85,7 @@ impl<'a> StandPlan<'a> {
             Trees::Inventory(trees) => {
                 let (inventory, placement) = read_and_place(scene, trees, terrain)?;
                 let count = count_inside(scene, trees, &inventory, &placement, terrain)? as f64;
-                (Source::Inventory(trees, inventory, Box::new(placement)), count)
+                (Source::Inventory(trees, Box::new(inventory), Box::new(placement)), count)
             }
         };
         let surroundings = match &source {
@@ -158,9 +158,14 @@ impl<'a> StandPlan<'a> {
         match &self.source {
             Source::None => Ok(Stand::default()),
             Source::Rules(rules) => scatter(self.scene, rules, plan, sizes, self.terrain, self.surroundings, progress),
-            Source::Inventory(trees, inventory, placement) => {
-                from_inventory(self.scene, (trees, inventory, placement.as_ref()), plan, sizes, self.terrain, progress)
-            }
+            Source::Inventory(trees, inventory, placement) => from_inventory(
+                self.scene,
+                (trees, inventory.as_ref(), placement.as_ref()),
+                plan,
+                sizes,
+                self.terrain,
+                progress,
+            ),
         }
     }
 }

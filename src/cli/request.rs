@@ -6,7 +6,7 @@ use canopy::{
     app::{
         BakeOptions, Clock, Combination, CompareOptions, ExportOptions, FlyOptions, Goal, LeafImages, LeafModel,
         LeafOptions, LightGroup, MergeOptions, Output, PIXELS_PER_DEGREE, Peer, ProfileOptions, ReferenceKind,
-        ReferenceOptions, RenderOptions, Still, TuneOptions, View, Views,
+        ReferenceOptions, RenderOptions, Selection, Still, TuneOptions, View, Views,
     },
     scene::{LocalTime, Overrides, SceneSource},
 };
@@ -15,8 +15,9 @@ use clap::error::ErrorKind;
 
 use super::arguments::{
     Arguments, Bake, CameraArguments, Common, Compare, Export, Fly, Leaf, LeafChoice, LightChoice, Measured, Merge,
-    PeerChoice, Profile, Reference, Render, StyleArguments, Tune,
+    PeerChoice, Profile, Reference, Render, SequenceArguments, StyleArguments, Tune,
 };
+use super::surveys;
 
 /// The scene of `canopy fly` without an argument.
 const DEMO: &str = "scenes/demo.ron";
@@ -27,8 +28,8 @@ fn overrides(common: &Common) -> Overrides {
         msaa: common.msaa,
         exposure: common.exposure,
         strict: common.strict,
-        year: common.year,
-        variant: common.variant.clone(),
+        year: common.single_year(),
+        variant: common.single_variant().cloned(),
         lighting: common.lighting.clone(),
         ..Overrides::default()
     }
@@ -61,21 +62,22 @@ pub fn fly_options(fly: Fly, common: &Common) -> FlyOptions {
 /// # Errors
 /// A usage error if arguments that are each valid do not fit together.
 pub fn render_options(render: Render, common: &Common) -> Result<RenderOptions, clap::Error> {
-    let is_single = render.frames.is_none() && render.out.len() == render.at.len().max(1);
+    let is_single = render.sequence.frames.is_none() && render.out.len() == render.at.len().max(1);
     if let Some(wrong) = render.out.iter().find(|file| is_single && !ends_in(file, "png")) {
         return Err(usage(format!("--out {}: images are PNG files; the name must end in .png", wrong.display())));
     }
     Ok(RenderOptions {
         view: view(&render.view),
         size: render.size,
-        selection: render.frames_only.or(render.chunk).unwrap_or_default(),
+        beside: surveys::beside(common),
+        output: output(render.out, &render.at, &render.sequence)?,
+        selection: selection(render.sequence),
         resume: render.resume,
         overrides: styled(common, &render.style),
         adapter: common.adapter.clone(),
         quiet: common.quiet,
         explain: common.explain,
         scene: render.scene.into(),
-        output: output(render.out, &render.at, render.frames, render.fps, render.from.zip(render.to))?,
     })
 }
 
@@ -86,7 +88,7 @@ pub fn render_options(render: Render, common: &Common) -> Result<RenderOptions, 
 pub fn reference_options(reference: Reference, common: &Common) -> Result<ReferenceOptions, clap::Error> {
     let endings: &[&str] = if reference.part.is_some() { &["film"] } else { &["exr", "png", "film"] };
     let has = |endings: &[&str]| endings.iter().any(|ending| ends_in(&reference.out, ending));
-    let is_folder = reference.frames.is_some() && !has(&["exr", "png", "film"]);
+    let is_folder = reference.sequence.frames.is_some() && !has(&["exr", "png", "film"]);
     if !has(endings) && !is_folder {
         let file = reference.out.display();
         return Err(usage(match reference.part {
@@ -97,14 +99,8 @@ pub fn reference_options(reference: Reference, common: &Common) -> Result<Refere
     Ok(ReferenceOptions {
         view: view(&reference.view),
         scene: reference.scene.into(),
-        output: output(
-            vec![reference.out],
-            reference.at.as_slice(),
-            reference.frames,
-            reference.fps,
-            reference.from.zip(reference.to),
-        )?,
-        selection: reference.frames_only.or(reference.chunk).unwrap_or_default(),
+        output: output(vec![reference.out], reference.at.as_slice(), &reference.sequence)?,
+        selection: selection(reference.sequence),
         size: reference.size,
         samples: reference.spp,
         part: reference.part,
@@ -305,14 +301,8 @@ fn command_line() -> String {
     std::iter::once("canopy".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
 }
 
-fn output(
-    mut out: Vec<PathBuf>,
-    at: &[LocalTime],
-    frames: Option<u32>,
-    fps: Option<f64>,
-    span: Option<(LocalTime, LocalTime)>,
-) -> Result<Output, clap::Error> {
-    let Some(frames) = frames else {
+fn output(mut out: Vec<PathBuf>, at: &[LocalTime], sequence: &SequenceArguments) -> Result<Output, clap::Error> {
+    let Some(frames) = sequence.frames else {
         if out.len() != at.len().max(1) {
             return Err(usage(format!(
                 "{} --out and {} --at: give one --out for each --at (or --frames for a sequence)",
@@ -330,8 +320,8 @@ fn output(
         (Some(out), true) => Ok(Output::Sequence {
             out,
             frames,
-            fps,
-            clock: match span {
+            fps: sequence.fps,
+            clock: match sequence.from.zip(sequence.to) {
                 Some((from, to)) => Clock::Lapse { from, to },
                 None => Clock::Standing(at.first().copied()),
             },
@@ -340,11 +330,15 @@ fn output(
     }
 }
 
+fn selection(sequence: SequenceArguments) -> Selection {
+    sequence.frames_only.or(sequence.chunk).unwrap_or_default()
+}
+
 fn ends_in(path: &Path, ending: &str) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(ending))
 }
 
-fn usage(message: String) -> clap::Error {
+pub(super) fn usage(message: String) -> clap::Error {
     Arguments::command().error(ErrorKind::ArgumentConflict, message)
 }
 
@@ -462,6 +456,8 @@ mod tests {
             "--out a --frames 2 --at 2026-06-21T06:00Z --from 2026-06-21T06:00Z --to 2026-06-21T07:00Z",
             "--out a.png --seed -1",
             "--out a.png --msaa 2",
+            "--out a.png --year 2000,",
+            "--out a.png --year soon",
             "--out a.png --lighting bright",
             "--out a.png --unknown",
         ] {

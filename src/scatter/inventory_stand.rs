@@ -205,7 +205,7 @@ pub fn stand_from_inventory<G: Ground + ?Sized>(
                 }
             },
         };
-        let n = u64::from(index);
+        let n = u64::from(row.place.unwrap_or(index));
         let variant = hash::below(seed, n, Stream::Variant, entry.variants.len() as u32) as u16;
         let stem = thickest.get(&row.line).and_then(|at| rows.get(*at)).unwrap_or(row);
         let tree_height = stem

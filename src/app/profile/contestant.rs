@@ -9,6 +9,8 @@ use chrono::{DateTime, Utc};
 use super::{
     machine,
     record::{LevelCount, Memory, PictureRecord},
+    stages::Stages,
+    sweep::Point,
     timing,
     views::ProfileView,
 };
@@ -21,6 +23,7 @@ use crate::{
     bake::BakedPlant,
     light::{Atmosphere, AtmosphereParams, LightState},
     lod::level_distance::{NOMINAL_FIELD_OF_VIEW, NOMINAL_HEIGHT},
+    progress::Progress,
     render::{
         exposure::{CameraExposure, StandTotals},
         forest::{ForestStatistics, LevelStatistics},
@@ -244,6 +247,37 @@ impl Contestant for Stock {
     fn memory(&self) -> Memory {
         // Both renderers live in one process, whose memory is nobody's alone.
         Memory { program: None, ..machine::memory(self.world()) }
+    }
+}
+
+/// Those that take part.
+pub struct Contestants {
+    /// This renderer.
+    pub renderer: Renderer,
+    /// The scenes that it draws.
+    pub stages: Stages,
+    /// Stock Bevy, if it takes part.
+    pub stock: Option<Stock>,
+}
+
+impl Contestants {
+    /// Lets `work` have the one that draws `point`.
+    ///
+    /// # Errors
+    /// Those of [`Stages::stage`] and of `work`.
+    pub fn with<R>(
+        &mut self,
+        point: &Point,
+        progress: &mut dyn Progress,
+        work: impl FnOnce(&mut dyn Contestant, &mut dyn Progress) -> Result<R, AppError>,
+    ) -> Result<R, AppError> {
+        match (&mut self.stock, point.peer) {
+            (Some(stock), Some(_)) => work(stock, progress),
+            _ => {
+                let stage = self.stages.stage(&point.scene, progress)?;
+                work(&mut Canopy::new(&mut self.renderer, &stage), progress)
+            }
+        }
     }
 }
 

@@ -45,7 +45,7 @@ pub use self::{
 };
 
 use self::{
-    contestant::{Canopy, Contestant, Stock},
+    contestant::{Contestant, Contestants, Stock},
     reference::{Asked, Reference},
     stages::Stages,
     sweep::{Point, points},
@@ -224,31 +224,6 @@ pub(super) fn profile_of(
     outcome?;
     saved?;
     Ok((work.report, report_files))
-}
-
-/// Those that take part.
-struct Contestants {
-    renderer: Renderer,
-    stages: Stages,
-    stock: Option<Stock>,
-}
-
-impl Contestants {
-    /// Lets `work` have the one that draws `point`.
-    fn with<R>(
-        &mut self,
-        point: &Point,
-        progress: &mut dyn Progress,
-        work: impl FnOnce(&mut dyn Contestant, &mut dyn Progress) -> Result<R, AppError>,
-    ) -> Result<R, AppError> {
-        match (&mut self.stock, point.peer) {
-            (Some(stock), Some(_)) => work(stock, progress),
-            _ => {
-                let stage = self.stages.stage(&point.scene, progress)?;
-                work(&mut Canopy::new(&mut self.renderer, &stage), progress)
-            }
-        }
-    }
 }
 
 /// A profile under way.

@@ -15,35 +15,24 @@ use std::{ops::Range, time::Instant};
 
 use bevy::{
     app::App,
-    asset::Handle,
-    camera::{Camera, Camera3d, ClearColorConfig, Exposure, PerspectiveProjection, Projection, RenderTarget},
+    camera::{Camera, Camera3d, ClearColorConfig, Exposure, PerspectiveProjection, Projection},
     color::{Color, LinearRgba},
     core_pipeline::tonemapping::Tonemapping,
     ecs::{entity::Entity, world::World},
-    image::Image,
     light::{CascadeShadowConfigBuilder, DirectionalLight, DirectionalLightShadowMap, GlobalAmbientLight},
     math::Vec3,
     prelude::Transform,
-    render::{
-        RenderApp,
-        render_asset::RenderAssets,
-        render_resource::PollType,
-        renderer::{RenderDevice, RenderQueue},
-        settings::WgpuSettings,
-        texture::GpuImage,
-        view::Msaa,
-    },
+    render::{render_resource::PollType, renderer::RenderDevice, settings::WgpuSettings, view::Msaa},
 };
 
 use super::{
     AppError, RenderedImage, UpdateTime,
-    headless::{app_without_window, render_target},
+    windowless::{Target, app_without_window},
 };
 use crate::{
     bake::BakedPlant,
     light::LightState,
     math::luminance,
-    render::readback::read_rgb,
     scatter::{CellGrid, PackedTree},
     scene::Viewpoint,
     terrain::Terrain,
@@ -99,8 +88,7 @@ pub struct StockRenderer {
     app: App,
     camera: Entity,
     sun: Entity,
-    target: Handle<Image>,
-    size: (u32, u32),
+    target: Target,
     far: f32,
 }
 
@@ -120,18 +108,18 @@ impl StockRenderer {
         };
         let light = DirectionalLight { shadow_maps_enabled: scene.cascades > 0, ..DirectionalLight::default() };
         let sun = app.world_mut().spawn((light, cascades.build())).id();
-        let target = render_target(&mut app, scene.size);
+        let target = Target::new(&mut app, scene.size);
         let camera = app
             .world_mut()
             .spawn((
                 Camera3d::default(),
                 Camera { clear_color: ClearColorConfig::Custom(SKY), ..Camera::default() },
-                RenderTarget::from(target.clone()),
+                target.camera_target(),
                 Msaa::from_samples(scene.samples),
                 Tonemapping::TonyMcMapface,
             ))
             .id();
-        Self { app, camera, sun, target, size: scene.size, far: scene.far as f32 }
+        Self { app, camera, sun, target, far: scene.far as f32 }
     }
 
     /// The app's world.
@@ -208,16 +196,7 @@ impl StockRenderer {
     /// # Errors
     /// [`AppError::Render`].
     pub fn read(&self) -> Result<RenderedImage, AppError> {
-        let render_world = self.app.sub_app(RenderApp).world();
-        let images = render_world.resource::<RenderAssets<GpuImage>>();
-        let image = images.get(&self.target).ok_or_else(|| {
-            AppError::Render("stock Bevy's image could not be read back: it was never drawn".to_owned())
-        })?;
-        let (device, queue) = (render_world.resource::<RenderDevice>(), render_world.resource::<RenderQueue>());
-        let pixels = read_rgb(device, queue, &image.texture)
-            .map_err(|error| AppError::Render(format!("stock Bevy: {error}")))?;
-        let (width, height) = self.size;
-        Ok(RenderedImage { width, height, pixels })
+        self.target.read(&self.app).map_err(|why| AppError::Render(format!("stock Bevy: {why}")))
     }
 }
 

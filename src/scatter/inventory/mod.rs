@@ -25,6 +25,7 @@ mod geojson;
 mod geopackage;
 mod names;
 mod place;
+mod places;
 mod select;
 mod shapefile;
 mod sizes;
@@ -35,6 +36,7 @@ mod text;
 use std::path::Path;
 
 use csv::StringRecord;
+use glam::DVec2;
 
 use super::{BadValue, ScatterError};
 use cells::{is_missing, length};
@@ -142,6 +144,9 @@ pub struct InventoryTree {
     pub height_m: Option<f64>,
     /// Species as written in the file, genus and epithet joined; not empty.
     pub species: Option<String>,
+    /// In a file of several surveys or variants the number of its place, which is the same in all of them, so that the tree
+    /// there keeps its individual, its rotation and its tint; `None`: they follow from its number in the list.
+    pub place: Option<u32>,
     /// Line in the file, from 1; of GeoJSON, shapefiles and GeoPackages the number of the feature.
     pub line: u64,
 }
@@ -163,6 +168,9 @@ pub struct Inventory {
     pub notes: Vec<String>,
     /// The years and variants that the file has.
     pub surveys: Surveys,
+    /// Least and greatest coordinates of all surveys and variants together, if there are several: the stand does not move when
+    /// another one is shown.
+    pub extent: Option<(DVec2, DVec2)>,
 }
 
 /// A column of an inventory, for display.
@@ -288,13 +296,15 @@ impl<'a> Reading<'a> {
 
     fn finish(mut self) -> Result<Inventory, ScatterError> {
         let mut rows = std::mem::take(&mut self.table.rows);
+        let places = self.selection.is_choice().then(|| self.places(&rows));
         rows.retain(|row| self.selection.keeps(&row.cells));
         let mut trees = Vec::with_capacity(rows.len());
         for row in &rows {
             if let Some(kind) = self.not_a_tree(&row.cells) {
                 self.no_trees.push((kind, row.line));
             } else if let Some(tree) = self.tree(row) {
-                trees.push(tree);
+                let place = places.as_ref().and_then(|places| places.number(tree.x, tree.y));
+                trees.push(InventoryTree { place, ..tree });
             }
         }
         self.refuse_damage(rows.len())?;
@@ -315,6 +325,7 @@ impl<'a> Reading<'a> {
             columns,
             notes,
             surveys: self.selection.surveys,
+            extent: places.and_then(|places| places.extent),
         })
     }
 
@@ -365,7 +376,7 @@ impl<'a> Reading<'a> {
         let dbh_m = diameter.or(girth.map(|around| around / std::f64::consts::PI));
         self.unreadable += usize::from(unreadable);
         let (x, y) = place?;
-        Some(InventoryTree { x, y, dbh_m, height_m, species: self.species.of(&row.cells), line: row.line })
+        Some(InventoryTree { x, y, dbh_m, height_m, species: self.species.of(&row.cells), place: None, line: row.line })
     }
 
     /// The position of a row; what is wrong with it is kept.

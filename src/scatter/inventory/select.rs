@@ -127,6 +127,11 @@ impl Selection {
         self.surveys.variants = variants.into_iter().map(str::to_owned).collect();
     }
 
+    /// Whether there is more than what is shown.
+    pub fn is_choice(&self) -> bool {
+        self.year.is_some() || self.variant.is_some()
+    }
+
     /// Whether a row is shown: of this year and variant, or of none.
     pub fn keeps(&self, row: &StringRecord) -> bool {
         let cell = |column: usize| row.get(column).filter(|cell| !is_missing(cell));
