@@ -227,7 +227,15 @@ fn gpu_structs_are_what_the_shaders_think() {
     twin!(
         layouts,
         "Frame",
-        FrameUniform { clip_from_relative, relative_from_clip, camera, focal_length_pixels, mean_cover, noise_block }
+        FrameUniform {
+            clip_from_relative,
+            relative_from_clip,
+            camera,
+            focal_length_pixels,
+            mean_cover,
+            noise_block,
+            forest_surface
+        }
     );
     twin!(
         layouts,

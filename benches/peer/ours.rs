@@ -37,6 +37,7 @@ impl Ours {
                 terrain: field.terrain.clone(),
                 cover: Some(field.cover.clone()),
                 surroundings: 0.0,
+                forest_surface: None,
                 error_pixels: 1.0,
                 view_distance: GROUND_REACH,
             });

@@ -14,6 +14,8 @@ struct Frame {
     mean_cover: f32,
     // The camera's block of the ground's noise: column and row, modulo 2^32.
     noise_block: vec2<i32>,
+    // The forest as a surface: distances at which it begins and at which no tree is drawn, and its height, metres.
+    forest_surface: vec4<f32>,
 }
 
 // The current light, premultiplied by the exposure.

@@ -69,6 +69,27 @@ struct Varying {
     @location(1) normal: vec3<f32>,
 }
 
+// How much of the forest at a position is drawn as a surface, 0..1. It is whole before the first trees vanish, which do so up to
+// 19 % earlier than their mean (src/lod/level_distance.rs).
+fn surface_share(relative: vec3<f32>) -> f32 {
+    let begin = frame.forest_surface.x;
+    let middle = 0.5 * (begin + frame.forest_surface.y);
+    return smoothstep(begin, max(0.84 * middle, begin + 1e-3), length(relative));
+}
+
+// Whether a position lies outside of the ground map.
+fn is_outside(relative: vec3<f32>) -> bool {
+    let uv = (relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;
+    return max(max(-uv.x, uv.x - 1.0), max(-uv.y, uv.y - 1.0)) > 0.0;
+}
+
+// How closed the canopy over a position is, 0..1: the surface of a forest lies at its height there, and on the ground in the open.
+fn closed_canopy(relative: vec3<f32>) -> f32 {
+    let ground = sample_ground(relative);
+    let cover = select(ground.cover + ground.undrawn_cover, frame.mean_cover, is_outside(relative));
+    return smoothstep(0.1, 0.6, cover);
+}
+
 // Height of a tile's skirt. It covers gaps that are narrower than a pixel.
 const SKIRT_PIXELS: f32 = 1.5;
 
@@ -86,6 +107,7 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     let height = mix(v.height, v.parent_height, k);
     var out: Varying;
     out.relative = vec3(xz.x, height - tile.camera_height, xz.y);
+    out.relative.y += frame.forest_surface.z * closed_canopy(out.relative) * surface_share(out.relative);
     out.relative.y -= select(0.0, SKIRT_PIXELS * length(out.relative) / frame.focal_length_pixels, in_skirt);
     out.clip = frame.clip_from_relative * vec4(out.relative, 1.0);
     out.normal = mix(decode_octahedral_y(v.normal), decode_octahedral_y(v.parent_normal), k);
@@ -157,11 +179,12 @@ fn draped(in: Varying, normal: vec3<f32>, cover: f32, far: f32, own: vec3<f32>) 
 fn seen_at(in: Varying) -> Seen {
     let normal = normalize(in.normal);
     let ground = sample_ground(in.relative);
-    let uv = (in.relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;
-    let outside = max(max(-uv.x, uv.x - 1.0), max(-uv.y, uv.y - 1.0)) > 0.0;
+    let outside = is_outside(in.relative);
     // Forest too far away for its trees to be drawn is coloured as crowns.
-    let undrawn = select(ground.undrawn_cover, frame.mean_cover, outside);
-    let cover = undrawn + select(ground.cover, 0.0, outside);
+    let beyond = select(ground.undrawn_cover, frame.mean_cover, outside);
+    let planted = select(ground.cover, 0.0, outside);
+    let undrawn = beyond + planted * surface_share(in.relative);
+    let cover = beyond + planted;
     let far = undrawn / max(cover, 1e-3);
     var color = color_of_pixel(in, normal, cover, far);
 #ifdef DRAPE

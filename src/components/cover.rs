@@ -7,7 +7,7 @@ use bevy::ecs::{
     component::Component,
     entity::Entity,
     lifecycle::RemovedComponents,
-    query::{Changed, With},
+    query::{Changed, Or, With},
     system::Query,
 };
 use glam::DVec2;
@@ -15,7 +15,7 @@ use glam::DVec2;
 use super::Terrain3d;
 use crate::{
     assets::stage::{COVER_TEXEL, MOST_COVER_TEXELS},
-    render::components::Ground,
+    render::components::{Forest, ForestSurface, Ground},
     scatter::CoverMap,
 };
 
@@ -30,12 +30,14 @@ pub struct ForestCover {
     pub map: Arc<CoverMap>,
     /// Metres beyond the terrain's data on which it stands too.
     pub surroundings: f64,
+    /// Mean height of its trees, metres.
+    pub tree_height: f32,
 }
 
 /// Sets the canopy cover of each ground.
 pub fn cover_grounds(
-    covers: Query<(Entity, &ForestCover)>,
-    changed: Query<(), Changed<ForestCover>>,
+    covers: Query<(Entity, &ForestCover, Option<&Forest>)>,
+    changed: Query<(), Or<(Changed<ForestCover>, (Changed<Forest>, With<ForestCover>))>>,
     mut removed: RemovedComponents<ForestCover>,
     mut grounds: Query<(Entity, &mut Ground), With<Terrain3d>>,
 ) {
@@ -46,8 +48,8 @@ pub fn cover_grounds(
     for (entity, mut ground) in &mut grounds {
         let mut maps: Vec<(Entity, &Arc<CoverMap>)> = covers
             .iter()
-            .filter(|(_, cover)| cover.ground == entity)
-            .map(|(forest, cover)| (forest, &cover.map))
+            .filter(|(_, cover, _)| cover.ground == entity)
+            .map(|(forest, cover, _)| (forest, &cover.map))
             .collect();
         maps.sort_by_key(|(forest, _)| *forest);
         let maps: Vec<&Arc<CoverMap>> = maps.into_iter().map(|(_, map)| map).collect();
@@ -60,8 +62,17 @@ pub fn cover_grounds(
         if !same {
             ground.cover = cover;
         }
-        let of_ground = covers.iter().filter(|(_, cover)| cover.ground == entity);
-        let surroundings = of_ground.map(|(_, cover)| cover.surroundings).fold(0.0, f64::max);
+        let of_ground = || covers.iter().filter(|(_, cover, _)| cover.ground == entity);
+        let surroundings = of_ground().map(|(_, cover, _)| cover.surroundings).fold(0.0, f64::max);
+        // Of several forests, the surface is that of the one whose trees vanish first.
+        let surfaces = of_ground().filter_map(|(_, cover, forest)| {
+            Some(ForestSurface { fade: forest?.levels.surface()?, tree_height: cover.tree_height })
+        });
+        let begin = |surface: &ForestSurface| surface.fade.start * surface.tree_height;
+        let surface = surfaces.min_by(|a, b| begin(a).total_cmp(&begin(b)));
+        if ground.forest_surface != surface {
+            ground.forest_surface = surface;
+        }
         if ground.surroundings != surroundings {
             ground.surroundings = surroundings;
         }

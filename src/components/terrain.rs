@@ -111,6 +111,7 @@ pub fn show_terrains(
             drape: drape.cloned(),
             cover: ground.and_then(|ground| ground.cover.clone()),
             surroundings: ground.map_or(0.0, |ground| ground.surroundings),
+            forest_surface: ground.and_then(|ground| ground.forest_surface),
             error_pixels: settings.error_pixels,
             view_distance: settings.view_distance,
         });

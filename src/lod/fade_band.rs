@@ -25,6 +25,12 @@ impl FadeBand {
         Self { start, end: start + sane(width) }
     }
 
+    /// The band at `factor` times the distances.
+    #[must_use]
+    pub fn scaled(&self, factor: f32) -> Self {
+        Self { start: self.start * factor, end: self.end * factor }
+    }
+
     fn middle(&self) -> f32 {
         0.5 * (self.start + self.end)
     }

@@ -2,13 +2,15 @@
 
 use serde::Serialize;
 
-use super::{FadeBand, GONE, WHOLE, error_curve};
+use super::{FadeBand, GONE, WHOLE, error_curve, level_distance::NOMINAL_HEIGHT};
 
 /// The most levels that a forest has.
 pub const MAX_LEVELS: usize = 8;
 
 /// Width of the fade between levels that are chosen by error, as a fraction of their distance.
 const BAND: f32 = 0.3;
+/// Width of the band in which trees give way to a surface, as a fraction of its distance.
+const SURFACE_BAND: f32 = 0.6;
 
 /// A way to draw a plant, by its name. The renderer has an implementation for each name that it knows
 /// (`render::forest::Representations`); a program can add its own.
@@ -47,12 +49,14 @@ pub struct Levels {
     fades: Vec<FadeBand>,
     /// Whether distances grow with the number of pixels too.
     by_pixels: bool,
+    /// Where trees give way to the surface of the forest, for an image with 1080 rows.
+    surface: Option<FadeBand>,
 }
 
 impl Levels {
     /// One representation at every distance.
     pub fn only(representation: Representation) -> Self {
-        Self { representations: vec![representation], fades: Vec::new(), by_pixels: false }
+        Self { representations: vec![representation], fades: Vec::new(), by_pixels: false, surface: None }
     }
 
     /// Full models that give way to crossed billboards over `fade`.
@@ -70,11 +74,25 @@ impl Levels {
         Self { by_pixels: true, ..Self::model_and_cross(band) }
     }
 
+    /// The same levels up to where a tree is `pixels` high in the image, whatever its size: beyond, no tree is drawn, and the ground
+    /// shows the forest as a surface ([`Ground::forest_surface`](crate::render::components::Ground::forest_surface)). 0 and less: trees
+    /// are drawn however small.
+    #[must_use]
+    pub fn to_size(mut self, pixels: f32) -> Self {
+        self.surface = surface_band(pixels);
+        self.sanitize();
+        self
+    }
+
     /// The levels in a view: `zoom` is its focal length over that of the nominal field of view, `focal_pixels` its focal
     /// length in pixels.
     #[must_use]
     pub fn in_view(&self, zoom: f32, focal_pixels: f32) -> Self {
-        self.scaled(self.view_factor(zoom, focal_pixels))
+        let mut levels = self.scaled(self.view_factor(zoom, focal_pixels));
+        let pixels = focal_pixels / error_curve::nominal_focal_length();
+        levels.surface = self.surface.map(|fade| fade.scaled(pixels));
+        levels.sanitize();
+        levels
     }
 
     /// The factor on the distances in such a view.
@@ -111,15 +129,17 @@ impl Levels {
             fade.end = fade.end.max(fade.start);
             earliest = fade.end;
         }
+        if let Some(surface) = &mut self.surface {
+            surface.start = surface.start.max(earliest);
+            surface.end = surface.end.max(surface.start);
+        }
     }
 
     /// The same levels at `factor` times the distances. A factor that is not a positive number changes nothing.
     fn scaled(&self, factor: f32) -> Self {
         let mut levels = self.clone();
         if factor.is_finite() && factor > 0.0 {
-            for fade in &mut levels.fades {
-                *fade = FadeBand { start: fade.start * factor, end: fade.end * factor };
-            }
+            levels.fades.iter_mut().for_each(|fade| *fade = fade.scaled(factor));
         }
         levels
     }
@@ -140,9 +160,16 @@ impl Levels {
         level.checked_sub(1).and_then(|before| self.fades.get(before)).copied()
     }
 
-    /// The band over which `level` fades out; `None` for the farthest one.
+    /// The band over which `level` fades out; `None` for the farthest one, unless it gives way to a surface.
     pub fn fade_out(&self, level: usize) -> Option<FadeBand> {
-        self.fades.get(level).copied()
+        let last = if level + 1 == self.len() { self.surface } else { None };
+        self.fades.get(level).copied().or(last)
+    }
+
+    /// The band over which trees give way to the surface of the forest, if they do: for trees of
+    /// [`NOMINAL_HEIGHT`](super::level_distance::NOMINAL_HEIGHT) in an image with 1080 rows, or [in a view](Self::in_view).
+    pub fn surface(&self) -> Option<FadeBand> {
+        self.surface
     }
 
     /// Alpha threshold of `level` at `distance` metres, that of [`level_distance`](super::level_distance): [`WHOLE`] to
@@ -157,6 +184,13 @@ impl Levels {
     pub fn draws(&self, level: usize, distance: f32) -> bool {
         self.threshold(level, distance) < GONE
     }
+}
+
+/// Where a tree of the nominal height is `pixels` high in an image with 1080 rows, and a band around it; `None` for no size.
+fn surface_band(pixels: f32) -> Option<FadeBand> {
+    let distance = NOMINAL_HEIGHT * error_curve::nominal_focal_length() / pixels;
+    (pixels > 0.0 && distance.is_finite())
+        .then(|| FadeBand::new(distance * (1.0 - 0.5 * SURFACE_BAND), distance * SURFACE_BAND))
 }
 
 #[cfg(test)]
@@ -211,7 +245,7 @@ mod tests {
     #[test]
     fn lists_that_were_edited_are_repaired() {
         let at = |start, end| FadeBand { start, end };
-        let edited = |representations, fades| Levels { representations, fades, by_pixels: false };
+        let edited = |representations, fades| Levels { representations, fades, by_pixels: false, surface: None };
         let mut levels = edited(vec![CLOUD; 20], vec![at(1.0, 2.0); 19]);
         levels.sanitize();
         assert_eq!((levels.len(), levels.fades.len()), (MAX_LEVELS, MAX_LEVELS - 1));
@@ -236,6 +270,25 @@ mod tests {
         assert_eq!(start(&by_distance, 2.0, 0.5 * nominal), 120.0);
         assert!(start(&Levels::by_error(1000.0), 1.0, nominal) < 1.0);
         assert!((300.0..400.0).contains(&start(&Levels::by_error(0.0), 1.0, nominal)));
+    }
+
+    #[test]
+    fn trees_below_a_size_are_a_surface_in_any_image() {
+        let levels = Levels::model_and_cross(FadeBand::new(60.0, 20.0)).to_size(4.0);
+        for (zoom, pixels) in [(1.0, error_curve::nominal_focal_length()), (1.0, 300.0), (3.0, 2000.0)] {
+            let seen = levels.in_view(zoom, pixels);
+            let band = seen.fade_out(1).expect("a surface");
+            let size = NOMINAL_HEIGHT * pixels / (0.5 * (band.start + band.end));
+            assert!((size - 4.0).abs() < 1e-3, "{size}");
+            assert_eq!(seen.surface(), seen.fade_out(1));
+            assert!(!seen.draws(1, 1.01 * band.end) && seen.draws(1, 0.5 * (band.start + band.end)));
+        }
+        // In a tiny image it begins behind the levels.
+        let tiny = levels.in_view(1.0, 1.0);
+        assert!(tiny.surface().is_some_and(|band| band.start >= 80.0 && band.end >= band.start));
+        for none in [0.0, -1.0, f32::NAN] {
+            assert_eq!(levels.clone().to_size(none).surface(), None);
+        }
     }
 
     #[test]

@@ -24,7 +24,7 @@ use glam::{DVec3, Vec3};
 use crate::{
     bake::BakedPlant,
     light::LightState,
-    lod::Levels,
+    lod::{FadeBand, Levels, error_curve::nominal_focal_length, level_distance::NOMINAL_HEIGHT},
     math::Range,
     scatter::{CoverMap, PackedStand},
     terrain::{Drape, Terrain},
@@ -128,10 +128,33 @@ pub struct Ground {
     /// Metres beyond the terrain's data on which trees stand too, thinning out in the outer half; 0: none. Farther out the
     /// ground has the colour of crowns, as many as the data has.
     pub surroundings: f64,
+    /// Where the trees on it are drawn together, as a surface over the ground. The forests' own
+    /// [levels](crate::lod::Levels::to_size) end there. `None`: nowhere.
+    pub forest_surface: Option<ForestSurface>,
     /// Maximum distance in pixels between the drawn and the true surface, 0.25 to 32. Lower: more triangles.
     pub error_pixels: f64,
     /// Distance in metres to which the ground is drawn, its mirrored surroundings included.
     pub view_distance: f64,
+}
+
+/// The surface of a forest, as a [`Ground`] shows it where trees are too small to be drawn one by one.
+#[derive(Clone, Copy, Debug, PartialEq, Reflect)]
+pub struct ForestSurface {
+    /// Distances over which it takes the place of the trees, for trees of
+    /// [`NOMINAL_HEIGHT`](crate::lod::level_distance::NOMINAL_HEIGHT) in an image with 1080 rows.
+    pub fade: FadeBand,
+    /// Mean height of the trees, metres.
+    pub tree_height: f32,
+}
+
+impl ForestSurface {
+    /// Its distances for the forest's trees and a focal length in pixels.
+    pub(crate) fn in_view(&self, focal_pixels: f32) -> FadeBand {
+        let size = self.tree_height / NOMINAL_HEIGHT;
+        let factor = size * focal_pixels / nominal_focal_length();
+        let fade = self.fade.scaled(factor);
+        FadeBand::new(fade.start, fade.end - fade.start)
+    }
 }
 
 /// A photograph over a [`Ground`]: part of it, or beside a [`Terrain3d`](crate::components::Terrain3d) on the same entity.

@@ -57,6 +57,9 @@ pub struct Quality {
     /// Width in metres of the band behind `near_distance` in which models fade into crosses, 0.1 to 1000.
     /// Wider: softer change, more trees drawn twice. Default 20.
     pub fade_band: f64,
+    /// Height in pixels below which trees are no longer drawn one by one: the ground shows them together, as the surface of the
+    /// forest, 0 to 50. Higher: faster in forests of millions, coarser far away. 0: each tree is drawn, however small. Default 0.
+    pub surface_size: f64,
     /// The levels of detail from near to far, at most 8. Default: empty, which is `"model"` until `near_distance` and
     /// `"cross"` behind it; a list replaces both values.
     pub levels: Vec<QualityLevel>,
@@ -81,6 +84,7 @@ impl Default for Quality {
             near_distance: 60.0,
             tolerance: None,
             fade_band: 20.0,
+            surface_size: 0.0,
             levels: Vec::new(),
             msaa: 4,
             cross_resolution: 256,
@@ -105,13 +109,14 @@ impl Quality {
                 Some((nearer, before)) => (nearer.then(before, representation), fade),
             });
         }
-        levels.map_or_else(
+        let levels = levels.map_or_else(
             || match self.tolerance {
                 Some(tolerance) => Levels::by_error(tolerance as f32),
                 None => Levels::model_and_cross(FadeBand::new(self.near_distance as f32, self.fade_band as f32)),
             },
             |(levels, _)| levels,
-        )
+        );
+        levels.to_size(self.surface_size as f32)
     }
 
     /// Distance in metres at which the nearest level is gone.
@@ -133,6 +138,7 @@ impl Quality {
         check.number("quality.near_distance", self.near_distance, 0.0..=5_000.0, "m");
         check.number("quality.tolerance", self.tolerance.unwrap_or_default(), 0.0..=1_000.0, "");
         check.number("quality.fade_band", self.fade_band, 0.1..=1_000.0, "m");
+        check.number("quality.surface_size", self.surface_size, 0.0..=50.0, "pixels");
         if self.levels.len() > MAX_LEVELS {
             let count = self.levels.len();
             check.problem("quality.levels", format!("has {count} levels"), format!("keep {MAX_LEVELS} at most"));

@@ -218,6 +218,7 @@ fn plain(covered: bool) -> Ground {
         drape: None,
         cover: Some(Arc::new(cover)),
         surroundings: 0.0,
+        forest_surface: None,
         error_pixels: 1.0,
         view_distance: 1e3,
     }

@@ -8,7 +8,7 @@ use crate::{
         PlantAsset, StageError,
         background::Wanted,
         plants::PlantPlan,
-        stage::cover,
+        stage::{cover, mean_tree_height},
         trees::{StandPlan, WoodBeyond},
     },
     bake::{BakedPlant, lighting::SunLight},
@@ -48,6 +48,8 @@ pub struct Built {
     pub cover: Option<Arc<CoverMap>>,
     /// Metres beyond the terrain's data on which its trees stand too.
     pub surroundings: f64,
+    /// Mean height of its trees, metres.
+    pub tree_height: f32,
     /// Warnings for the program's author.
     pub warnings: Vec<String>,
 }
@@ -124,7 +126,9 @@ impl Ingredients {
         if stand.trees.is_empty() {
             listener.warn("the forest has no trees: its rules, area or positions leave no place for any");
         }
+        let tree_height = mean_tree_height(&packed, &plants);
         Ok(Built {
+            tree_height,
             stand: Arc::new(packed),
             plants: Arc::new(plants),
             suns: suns.into(),

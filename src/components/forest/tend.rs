@@ -32,6 +32,7 @@ use crate::{
         stage::check_trees,
     },
     components::{Terrain3d, cover::ForestCover},
+    lod::Levels,
     render::components::Forest,
 };
 
@@ -192,8 +193,9 @@ pub fn tend_forests(
             if shown.origin != place {
                 shown.origin = place;
             }
-            if shown.levels != settings.levels || shown.view_distance != settings.view_distance {
-                shown.levels = settings.levels.clone();
+            let levels = levels(&settings, wanted.ground);
+            if shown.levels != levels || shown.view_distance != settings.view_distance {
+                shown.levels = levels;
                 shown.view_distance = settings.view_distance;
             }
         }
@@ -216,6 +218,12 @@ pub fn tend_forests(
     }
 }
 
+/// The levels of a forest. Without a ground there is none that could show its far trees as a surface.
+fn levels(settings: &ForestSettings, ground: Option<Entity>) -> Levels {
+    let levels = settings.levels.clone();
+    if ground.is_some() { levels } else { levels.to_size(0.0) }
+}
+
 fn show(
     commands: &mut Commands,
     entity: Entity,
@@ -230,7 +238,10 @@ fn show(
     let trees = built.stand.trees.len();
     let mut target = commands.entity(entity);
     match (built.cover, ground) {
-        (Some(map), Some(ground)) => target.try_insert(ForestCover { ground, map, surroundings: built.surroundings }),
+        (Some(map), Some(ground)) => {
+            let (surroundings, tree_height) = (built.surroundings, built.tree_height);
+            target.try_insert(ForestCover { ground, map, surroundings, tree_height })
+        }
         _ => target.try_remove::<ForestCover>(),
     };
     if trees > 0 {
@@ -239,7 +250,7 @@ fn show(
             plants: built.plants,
             suns: built.suns,
             origin,
-            levels: settings.levels.clone(),
+            levels: levels(settings, ground),
             view_distance: settings.view_distance,
         });
     } else {

@@ -30,10 +30,12 @@ use bevy::{
 };
 use glam::DVec3;
 
-use super::{extract::ExtractedScene, gpu, view::PreparedFrame};
+use super::{components::Ground, extract::ExtractedScene, gpu, view::PreparedFrame};
 use crate::terrain::ground_noise::NOISE_BLOCK;
 use uniforms::{CascadeUniform, CascadeViewUniform, FrameUniform, LightUniform, MAX_CASCADES, ShadowUniform};
 
+/// Mean height of the surface of a closed forest over that of its trees.
+const SURFACE_HEIGHT: f32 = 0.75;
 /// Format of the shadow maps.
 pub const SHADOW_FORMAT: TextureFormat = TextureFormat::Depth32Float;
 
@@ -184,6 +186,17 @@ fn noise_position(value: f64) -> (i32, f32) {
     (block as i64 as i32, (value - block * NOISE_BLOCK) as f32)
 }
 
+/// The values of [`FrameUniform::forest_surface`].
+fn forest_surface(ground: Option<&Ground>, focal_pixels: f32) -> [f32; 4] {
+    match ground.and_then(|ground| ground.forest_surface) {
+        Some(surface) => {
+            let fade = surface.in_view(focal_pixels);
+            [fade.start, fade.end, SURFACE_HEIGHT * surface.tree_height, 0.0]
+        }
+        None => [f32::MAX, f32::MAX, 0.0, 0.0],
+    }
+}
+
 fn prepare_bind_group(
     scene: Res<ExtractedScene>,
     frame: Res<PreparedFrame>,
@@ -208,6 +221,7 @@ fn prepare_bind_group(
         mean_cover: placement.mean_cover,
         padding: 0.0,
         noise_block: [block_x, block_z],
+        forest_surface: forest_surface(scene.ground.as_ref().map(|(_, ground, _)| ground), view.focal_pixels),
     };
     let light_uniform = light::light_uniform(&daylight.0, view.exposure);
     let shadow_uniform = ShadowUniform {

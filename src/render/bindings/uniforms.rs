@@ -24,6 +24,8 @@ pub struct FrameUniform {
     pub padding: f32,
     /// The camera's block of the ground's noise: column and row, modulo 2³².
     pub noise_block: [i32; 2],
+    /// The forest as a surface: distances at which it begins and at which no tree is drawn, and its height above the ground, metres.
+    pub forest_surface: [f32; 4],
 }
 
 /// `Light` of `frame.wgsl`, premultiplied by the exposure.

@@ -126,11 +126,15 @@ pub fn prepare_tiles(
     let Some(cache) = &mut gpu.cache else { return };
     gpu.frame += 1;
     let mut chosen: Vec<Tile> = Vec::new();
+    // The surface of a forest lies above the ground.
+    let above = ground.forest_surface.map_or(0.0, |surface| f64::from(surface.tree_height));
     let (clearance, factor) = cache.tree.select_at_most(
         TileCache::most(&device),
         camera,
         f64::from(view.focal_pixels),
-        |min: DVec3, max: DVec3| view.frustum.sees_box((min - camera).as_vec3(), (max - camera).as_vec3()),
+        |min: DVec3, max: DVec3| {
+            view.frustum.sees_box((min - camera).as_vec3(), (max - camera + DVec3::Y * above).as_vec3())
+        },
         &mut chosen,
     );
     cache.reserve(&device, chosen.len());
