@@ -112,11 +112,11 @@ pub(super) fn choose<'a>(layers: &'a [Layer], wanted: Option<&str>) -> Result<(&
             let list = listed(layers.iter());
             return Err(format!("the GeoPackage has no layer of points (it has {list}): export the trees as points"));
         };
-        let note = (layers.len() > 1).then(|| {
-            let others = listed(layers.iter().filter(|other| *other != layer));
-            format!("of its layers `{}` is read, not {others}; choose another by `layer` in the scene", layer.name)
-        });
-        return Ok((layer, note));
+        let others = || layers.iter().filter(|other| *other != layer);
+        let choice = others().any(|other| other.rank().is_some());
+        let choice = if choice { "; choose another by `layer` in the scene" } else { "" };
+        let note = format!("of its layers `{}` is read, not {}{choice}", layer.name, listed(others()));
+        return Ok((layer, (layers.len() > 1).then_some(note)));
     };
     let found = layers
         .iter()
@@ -235,6 +235,27 @@ mod tests {
         ] {
             assert_eq!(kind_of_wkt(text), kind, "{text}");
         }
+    }
+
+    /// A choice is only offered where there is one.
+    #[test]
+    fn the_other_layers_are_named() {
+        let layer = |name: &str, kind: Option<&str>| Layer {
+            name: name.to_owned(),
+            kind: kind.map(str::to_owned),
+            ..Layer::default()
+        };
+        let (trees, stands) = (layer("trees", Some("POINT")), layer("stands", Some("POLYGON")));
+        let notes = |layers: &[Layer]| choose(layers, None).map(|(layer, note)| (layer.name.clone(), note));
+        let found = |note: Option<&str>| Ok(("trees".to_owned(), note.map(str::to_owned)));
+        assert_eq!(notes(std::slice::from_ref(&trees)), found(None));
+        let note = "of its layers `trees` is read, not `stands` (POLYGON), `visits` (no geometry)";
+        assert_eq!(notes(&[stands.clone(), trees.clone(), layer("visits", None)]), found(Some(note)));
+        let note = "of its layers `trees` is read, not `all` (GEOMETRY); choose another by `layer` in the scene";
+        assert_eq!(notes(&[layer("all", Some("GEOMETRY")), trees]), found(Some(note)));
+        assert!(notes(&[stands]).is_err() && notes(&[]).is_err());
+        let many: Vec<Layer> = (0..12).map(|number| layer(&format!("l{number}"), None)).collect();
+        assert!(choose(&many, None).is_err_and(|message| message.contains("`l9` (no geometry) and 2 more")));
     }
 
     #[test]
