@@ -2,6 +2,9 @@
 //!
 //! All panels have the same exposure, the mean of those that they would have alone, so that ground that is brighter after a
 //! felling is brighter in the picture. A picture of a single panel is that of its stage: no caption, and its own exposure.
+//!
+//! Cost: ground and plants are built once and shared in memory. One renderer draws all panels; for each it brings the forest to the
+//! device again, which holds one at a time.
 
 mod choice;
 mod sheet;
