@@ -436,6 +436,7 @@ fn every_bound_struct_has_its_twin_tested() {
         "Style",
         "Layer",
         "BlurJob",
+        "Drape",
         "Particle",
         "ParticleView",
         "MeshPosition",

@@ -155,17 +155,30 @@ fn color_of_pixel(in: Varying, normal: vec3<f32>, cover: f32, far: f32) -> Groun
 }
 
 #ifdef DRAPE
+// The most places along a pixel at which a photograph is looked up.
+const MOST_LOOKUPS: f32 = 6.0;
+
 // The albedo under a photograph, where `own` is that of the ground without it. What the photograph is too coarse for, it has
 // from the ground's own colour. The twin is Soil::albedo in src/reference/soil.rs.
 fn draped(in: Varying, normal: vec3<f32>, cover: f32, far: f32, own: vec3<f32>) -> vec3<f32> {
     let uv = (in.relative.xz - drape.origin) * drape.inverse_size;
-    // Colour times opacity, and opacity.
-    let photo = textureSampleGrad(drape_texture, drape_sampler, uv, dpdx(uv), dpdy(uv));
+    // Several lookups along a pixel that is long and narrow on the ground: colour times opacity, and opacity.
+    let distance = max(length(in.relative), 1e-3);
+    let across = distance / frame.focal_length_pixels;
+    let along = across / max(abs(dot(normal, in.relative)) / distance, 0.02);
+    let places = clamp(ceil(along / across), 1.0, MOST_LOOKUPS);
+    let lod = log2(max(max(across, along / places) / drape.texel, 1.0));
+    let stride = in.relative.xz / max(length(in.relative.xz), 1e-3) * (along / places) * drape.inverse_size;
+    let first = uv - 0.5 * (places - 1.0) * stride;
+    var photo = vec4(0.0);
+    for (var place = 0.0; place < places; place += 1.0) {
+        photo += textureSampleLevel(drape_texture, drape_sampler, first + place * stride, lod);
+    }
+    photo /= places;
     let to_border = min(uv, 1.0 - uv) / drape.inverse_size;
     let inside = max(smoothstep(0.0, max(drape.edge, 1e-6), min(to_border.x, to_border.y)), drape.mirrored);
     let shown = photo * inside;
 
-    let across = length(in.relative) / frame.focal_length_pixels;
     var detail = 1.0;
     if across < DETAIL_TEXELS * drape.texel {
         let place = frame.camera.xz + in.relative.xz;

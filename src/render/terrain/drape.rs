@@ -18,9 +18,6 @@ use crate::{
     terrain::Drape,
 };
 
-/// Samples along the longer side of a pixel's footprint on the ground, at most.
-const ANISOTROPY: u16 = 8;
-
 /// `Drape` of `shaders/terrain/terrain.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -45,6 +42,8 @@ pub struct GpuDrape {
     texture: TextureView,
     sampler: Sampler,
     uniform: Buffer,
+    /// Metres of a texel of its finest level here.
+    texel: f32,
 }
 
 impl GpuDrape {
@@ -75,12 +74,12 @@ impl GpuDrape {
             mag_filter: FilterMode::Linear,
             min_filter: FilterMode::Linear,
             mipmap_filter: MipmapFilterMode::Linear,
-            anisotropy_clamp: ANISOTROPY,
             ..Default::default()
         });
         let usage = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
         let uniform = gpu::buffer_with(device, "canopy_drape", usage, &[DrapeUniform::default()]);
-        Self { source: source.clone(), texture, sampler, uniform }
+        let texel = (source.texel() * f64::from(1u32 << first)) as f32;
+        Self { source: source.clone(), texture, sampler, uniform, texel }
     }
 
     /// Whether it is the photograph `drape`.
@@ -95,7 +94,7 @@ impl GpuDrape {
             origin: [(min.x - camera.x) as f32, (min.y - camera.z) as f32],
             inverse_size: [(1.0 / extent.x) as f32, (1.0 / extent.y) as f32],
             edge: self.source.edge() as f32,
-            texel: self.source.texel() as f32,
+            texel: self.texel,
             brightness: if brightness.is_finite() { brightness.clamp(0.0, 4.0) } else { 0.0 },
             mirrored: if self.source.is_mirrored() { 1.0 } else { 0.0 },
         };

@@ -133,7 +133,9 @@ impl Colors {
             }
         };
         let samples = usize::from(kind.num_samples());
-        let alpha = opacity(colors).filter(|at| *at < samples);
+        // Without a word about it, a fourth sample of colours and a second of grey are taken as opacity.
+        let unsaid = extra.is_empty() && matches!(kind, ColorType::RGBA(_) | ColorType::GrayA(_));
+        let alpha = if unsaid { Some(colors) } else { opacity(colors) }.filter(|at| *at < samples);
         Ok(Self { layout, alpha, missing: read_missing(decoder), inverted })
     }
 
