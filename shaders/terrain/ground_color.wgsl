@@ -5,6 +5,9 @@
 #import canopy::constants::LEAF_OCTAVE
 #import canopy::ground_noise::{noise_band, noise_step, scattered_leaves, visible_part}
 
+// Slope of the relief of crowns that are seen as a surface: with it the picture has the local contrast of the trees that end there.
+const CROWN_RELIEF: f32 = 0.6;
+
 struct GroundColor {
     albedo: vec3<f32>,
     // What bends the normal: a slope along x and z.
@@ -57,7 +60,9 @@ fn ground_color(xz: vec2<f32>, steepness: f32, cover: f32, far: f32, footprint: 
 
     var color: GroundColor;
     color.albedo = albedo;
-    color.tilt = 0.06 * fine.value + 0.13 * grain.value;
+    // Crowns stand beside each other as hills do: a relief of 8 to 16 m.
+    let crown_relief = noise_band(xz, 6, 2, footprint).value;
+    color.tilt = 0.06 * fine.value + 0.13 * grain.value + CROWN_RELIEF * wooded * far * crown_relief;
     color.ambient_visibility = clamp(0.9 + 0.05 * grain.value.x + 0.08 * leaf, 0.6, 1.0);
     return color;
 }
