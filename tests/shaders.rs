@@ -234,7 +234,8 @@ fn gpu_structs_are_what_the_shaders_think() {
             focal_length_pixels,
             mean_cover,
             noise_block,
-            forest_surface
+            forest_surface,
+            crown_albedo
         }
     );
     twin!(

@@ -16,6 +16,8 @@ struct Frame {
     noise_block: vec2<i32>,
     // The forest as a surface: distances at which it begins and at which no tree is drawn, and its height, metres.
     forest_surface: vec4<f32>,
+    // Albedo of crowns that are seen together.
+    crown_albedo: vec3<f32>,
 }
 
 // The current light, premultiplied by the exposure.

@@ -3,6 +3,7 @@
 #define_import_path canopy::ground_color
 
 #import canopy::constants::LEAF_OCTAVE
+#import canopy::frame::frame
 #import canopy::ground_noise::{noise_band, noise_step, scattered_leaves, visible_part}
 
 // Slope of the relief of crowns that are seen as a surface: with it the picture has the local contrast of the trees that end there.
@@ -52,7 +53,7 @@ fn ground_color(xz: vec2<f32>, steepness: f32, cover: f32, far: f32, footprint: 
     var albedo = mix(meadow, forest_floor, wooded);
     // Crowns from above: as bright as the trees that end here, with their variation from crown to crown.
     let crown_tone = noise_step(0.0, 1.4, 0.25 * middle.value.x + 0.9 * fine.value.y, 0.06 * middle.lost + 0.81 * fine.lost);
-    let crowns = mix(vec3(0.006, 0.016, 0.0035), vec3(0.014, 0.034, 0.007), crown_tone);
+    let crowns = frame.crown_albedo * mix(0.62, 1.38, crown_tone);
     albedo = mix(albedo, crowns, wooded * far);
     let stony = noise_step(0.36, 0.06, steepness + 0.025 * middle.value.x + 0.015 * fine.value.x, 0.0006 * middle.lost + 0.0002 * fine.lost);
     albedo = mix(albedo, rock, stony);

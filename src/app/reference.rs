@@ -274,7 +274,8 @@ fn interrupted(samples: u32, total: u32, checkpoint: &Path) -> AppError {
 
 fn scene(stage: &Stage) -> Result<ReferenceScene, AppError> {
     let plants: Vec<_> = stage.plants.iter().map(|baked| baked.plant.clone()).collect();
-    let mut soil = Soil::new(&stage.terrain, stage.cover.clone(), stage.surroundings);
+    let crowns = StandTotals::of(&stage.stand, &stage.plants).crown_albedo();
+    let mut soil = Soil::new(&stage.terrain, stage.cover.clone(), stage.surroundings).with_crowns(crowns);
     if let Some(GroundDrape { drape, brightness }) = &stage.drape {
         soil = soil.with_drape(drape.clone(), *brightness);
     }

@@ -51,6 +51,10 @@ const SWEEPS: usize = 12;
 const RINGS: usize = 32;
 const AZIMUTHS: usize = 32;
 
+/// What crowns that shade each other leave of the light of a level layer: with it a forest that is drawn as a surface is as bright
+/// as the trees that end there (`canopy compare` of the demo with `surface_size` 6 and 0).
+const CROWN_SHADE: f32 = 0.42;
+
 /// Mean optical properties of a stand's trees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StandTrees {
@@ -68,6 +72,18 @@ impl StandTrees {
     /// Black leaves.
     pub const BLACK: Self =
         Self { reflectance: Vec3::ZERO, transmittance: Vec3::ZERO, crown_width: 0.5, crown_length: 0.7 };
+
+    /// Albedo of their closed crowns, seen from far above: that of a deep layer of isotropic scatterers, `(1 − γ) / (1 + γ)` with
+    /// `γ² = 1 − R − T` [Hapke 1981, "Bidirectional reflectance spectroscopy", eq. 12], times [`CROWN_SHADE`].
+    pub fn crown_albedo(&self) -> Vec3 {
+        let scattered = (self.reflectance + self.transmittance).clamp(Vec3::ZERO, Vec3::ONE);
+        let layer = |scattered: f32| {
+            let gamma = (1.0 - scattered).sqrt();
+            (1.0 - gamma) / (1.0 + gamma)
+        };
+        let albedo = CROWN_SHADE * Vec3::new(layer(scattered.x), layer(scattered.y), layer(scattered.z));
+        if albedo.is_finite() { albedo } else { Vec3::ZERO }
+    }
 
     /// Width and length of a crown within their ranges; those of [`BLACK`](Self::BLACK) for what is no positive number.
     fn crown(&self) -> (f32, f32) {

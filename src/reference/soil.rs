@@ -16,6 +16,9 @@ use crate::terrain::ground_noise::{LEAF_OCTAVE, noise_band, noise_step, scattere
 /// Points along an axis of the terrain from which its mean cover is taken.
 const MEAN_POINTS: u32 = 64;
 
+/// Albedo of crowns where nothing is known of the trees.
+const GREEN_CROWNS: Vec3 = Vec3::new(0.010, 0.025, 0.005);
+
 /// Everything that the colour of the ground depends on.
 #[derive(Clone, Debug)]
 pub struct Soil {
@@ -26,6 +29,8 @@ pub struct Soil {
     surroundings: f64,
     /// A photograph over the ground, and the factor from its values to reflectance.
     drape: Option<(Arc<Drape>, f32)>,
+    /// Albedo of crowns that are seen together.
+    crowns: Vec3,
 }
 
 impl Soil {
@@ -33,11 +38,17 @@ impl Soil {
     /// thin out there; farther out the ground has the colour of crowns.
     pub fn new(terrain: &Terrain, cover: Option<Arc<CoverMap>>, surroundings: f64) -> Self {
         let extent = terrain.extent();
-        let mut soil = Self { cover, extent, mean_cover: 0.0, surroundings, drape: None };
+        let mut soil = Self { cover, extent, mean_cover: 0.0, surroundings, drape: None, crowns: GREEN_CROWNS };
         let step = |i: u32| (f64::from(i) + 0.5) / f64::from(MEAN_POINTS) - 0.5;
         let points = (0..MEAN_POINTS).flat_map(|z| (0..MEAN_POINTS).map(move |x| DVec2::new(step(x), step(z))));
         soil.mean_cover = points.map(|p| soil.cover_at(p * extent)).sum::<f32>() / (MEAN_POINTS * MEAN_POINTS) as f32;
         soil
+    }
+
+    /// The same with crowns of this albedo ([`StandTrees::crown_albedo`](crate::light::StandTrees::crown_albedo)) where trees are seen
+    /// together, beyond those that stand there.
+    pub fn with_crowns(self, crowns: Vec3) -> Self {
+        Self { crowns, ..self }
     }
 
     /// The same under a photograph, whose values times `brightness` are reflectances.
@@ -62,7 +73,8 @@ impl Soil {
         let undrawn = self.mean_cover * (1.0 - drawn);
         let planted = if distance > self.surroundings { 0.0 } else { self.cover_at(xz) };
         let cover = undrawn + planted;
-        let color = |footprint: f32| ground_color(xz, 1.0 - normal.y, cover, undrawn / cover.max(1e-3), footprint);
+        let color =
+            |footprint: f32| ground_color(xz, 1.0 - normal.y, cover, undrawn / cover.max(1e-3), footprint, self.crowns);
         let own = color(0.0);
         let Some((drape, brightness)) = &self.drape else { return own };
         let photo = drape.sample(xz);
@@ -79,6 +91,7 @@ impl Soil {
     pub(crate) fn feed(&self, hasher: &mut blake3::Hasher) {
         hasher.update(bytemuck::bytes_of(&self.extent));
         hasher.update(&self.surroundings.to_le_bytes());
+        hasher.update(bytemuck::bytes_of(&self.crowns));
         if let Some((drape, brightness)) = &self.drape {
             drape.feed(hasher);
             hasher.update(&brightness.to_le_bytes());
@@ -91,9 +104,9 @@ impl Soil {
 }
 
 /// Albedo of the ground at a position in metres (x east, y south), as the shader has it: `steepness` is 1 less the normal's
-/// height, `cover` the canopy cover, of which the part `far` is seen as crowns, and `footprint` the width of a pixel on the
-/// ground, metres; 0 shows everything.
-pub(crate) fn ground_color(xz: DVec2, steepness: f32, cover: f32, far: f32, footprint: f32) -> Vec3 {
+/// height, `cover` the canopy cover, of which the part `far` is seen as crowns (of the albedo `crowns`), and `footprint`
+/// the width of a pixel on the ground, metres; 0 shows everything.
+pub(crate) fn ground_color(xz: DVec2, steepness: f32, cover: f32, far: f32, footprint: f32, crowns: Vec3) -> Vec3 {
     let wide = noise_band(xz, 0, 4, footprint);
     let middle = noise_band(xz, 4, 4, footprint);
     let fine = noise_band(xz, 8, 3, footprint);
@@ -131,7 +144,7 @@ pub(crate) fn ground_color(xz: DVec2, steepness: f32, cover: f32, far: f32, foot
 
     let crown_lost = 0.06 * middle.lost + 0.81 * fine.lost;
     let crown_tone = noise_step(0.0, 1.4, 0.25 * middle.value.x + 0.9 * fine.value.y, crown_lost);
-    let crowns = mix([0.006, 0.016, 0.0035], [0.014, 0.034, 0.007], crown_tone);
+    let crowns = crowns * (0.62 + 0.76 * crown_tone);
     let at_cliff = steepness + 0.025 * middle.value.x + 0.015 * fine.value.x;
     let stony = noise_step(0.36, 0.06, at_cliff, 0.0006 * middle.lost + 0.0002 * fine.lost);
 

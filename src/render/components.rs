@@ -141,7 +141,7 @@ pub struct Ground {
 #[derive(Clone, Copy, Debug, PartialEq, Reflect)]
 pub struct ForestSurface {
     /// Distances over which it takes the place of the trees, for trees of
-    /// [`NOMINAL_HEIGHT`](crate::lod::level_distance::NOMINAL_HEIGHT) in an image with 1080 rows.
+    /// [`NOMINAL_HEIGHT`] in an image with 1080 rows.
     pub fade: FadeBand,
     /// Mean height of the trees, metres.
     pub tree_height: f32,

@@ -12,7 +12,7 @@
 
 use std::{fmt, sync::Arc};
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 
 use super::{components::Ground, forest::Leaves};
 use crate::{
@@ -49,6 +49,11 @@ impl StandTotals {
             trees: stand.trees.len() as f64,
             heights: stand.trees.iter().map(|tree| f64::from(height(tree.variant(), tree.scale()))).sum(),
         }
+    }
+
+    /// Albedo of their crowns, seen together from far above.
+    pub fn crown_albedo(&self) -> Vec3 {
+        self.leaves.trees().crown_albedo()
     }
 
     /// The sums of two stands.

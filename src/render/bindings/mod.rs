@@ -28,7 +28,7 @@ use bevy::{
         renderer::{RenderDevice, RenderQueue},
     },
 };
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use super::{components::Ground, extract::ExtractedScene, gpu, view::PreparedFrame};
 use crate::terrain::ground_noise::NOISE_BLOCK;
@@ -117,6 +117,8 @@ pub struct SharedPlacement {
     pub ground: [f32; 4],
     /// Mean canopy cover where the terrain is known.
     pub mean_cover: f32,
+    /// Albedo of crowns that are seen together, as a surface.
+    pub crown_albedo: Vec3,
 }
 
 /// Group 0 of this frame and its view; empty while a part of it is missing.
@@ -222,6 +224,8 @@ fn prepare_bind_group(
         padding: 0.0,
         noise_block: [block_x, block_z],
         forest_surface: forest_surface(scene.ground.as_ref().map(|(_, ground, _)| ground), view.focal_pixels),
+        crown_albedo: placement.crown_albedo.to_array(),
+        end_padding: 0.0,
     };
     let light_uniform = light::light_uniform(&daylight.0, view.exposure);
     let shadow_uniform = ShadowUniform {

@@ -26,6 +26,10 @@ pub struct FrameUniform {
     pub noise_block: [i32; 2],
     /// The forest as a surface: distances at which it begins and at which no tree is drawn, and its height above the ground, metres.
     pub forest_surface: [f32; 4],
+    /// Albedo of crowns that are seen together.
+    pub crown_albedo: [f32; 3],
+    /// WGSL rounds the size up to 16 bytes.
+    pub end_padding: f32,
 }
 
 /// `Light` of `frame.wgsl`, premultiplied by the exposure.

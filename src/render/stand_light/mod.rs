@@ -24,7 +24,7 @@ use crate::{
         stand::{COVERS, DEPTHS, StandSample},
     },
     render::{
-        bindings::SharedTextures,
+        bindings::{SharedPlacement, SharedTextures},
         components::{Daylight, LightUpdates},
         extract::ExtractedScene,
         follow::{Followed, Follower},
@@ -100,10 +100,12 @@ fn upload_stand_light(
     report: Res<FrameReport>,
     mut stand: ResMut<StandTexture>,
     mut shared: ResMut<SharedTextures>,
+    mut placement: ResMut<SharedPlacement>,
 ) {
     let StandTexture { table, light } = &mut *stand;
     shared.stand_light = table.view().clone();
     let (Some(view), Some(daylight)) = (&frame.view, &scene.daylight) else { return };
+    placement.crown_albedo = forests.trees().crown_albedo();
     let wanted = StandKey { daylight: daylight.clone(), trees: forests.trees() };
     let key = wanted.clone();
     let compute = move || StandLight::new(&key.daylight.0, &key.trees);

@@ -18,7 +18,7 @@ use glam::Vec4;
 use half::f16;
 
 use super::{
-    blur::Deviations,
+    deviations::Deviations,
     targets::{MapKey, StyleTargets},
     uniforms::{BlurUniform, LayerUniform, StyleUniform},
 };

@@ -16,6 +16,7 @@
 //! in it either.
 
 mod blur;
+mod deviations;
 mod full_screen;
 mod illumination;
 mod inputs;

@@ -17,7 +17,7 @@ use bevy::{
     },
 };
 
-use super::blur::{self, Deviations};
+use super::deviations::{self, Deviations};
 use crate::render::{
     components::{CanopyCamera, DrawnStyle},
     forest::GpuForests,
@@ -134,7 +134,7 @@ pub fn prepare_targets(
     let picture = (view.viewport.z.max(1), view.viewport.w.max(1));
     let size = (texels(picture.0), texels(picture.1));
     let deviations = Deviations::of(&drawn.style);
-    let divisor = |deviation: f32| blur::divisor(deviation * size.1 as f32 / 720.0);
+    let divisor = |deviation: f32| deviations::divisor(deviation * size.1 as f32 / 720.0);
     let key = MapKey {
         size,
         layers: layer_count(&drawn.style, &forests),

@@ -11,6 +11,7 @@
 
 mod drape;
 mod ground_map;
+mod layout;
 mod pass;
 mod pipeline;
 mod tile_cache;
@@ -27,7 +28,7 @@ use bevy::{
 use super::sets::{CanopyPasses, CanopyRenderSystems};
 pub use drape::DrapeUniform;
 pub use ground_map::GroundMap;
-pub(super) use pipeline::{DRAPE, terrain_defs, terrain_layout};
+pub(super) use layout::{DRAPE, terrain_defs, terrain_layout};
 pub(super) use tiles::GpuTerrain;
 pub use tiles::TerrainStatistics;
 pub use vertex::{GpuTile, GpuTileVertex};

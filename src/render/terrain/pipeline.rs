@@ -1,6 +1,4 @@
-//! Bind group layout and pipelines of the terrain pass.
-
-use std::num::NonZeroU64;
+//! Pipelines of the terrain pass.
 
 use bevy::{
     asset::Handle,
@@ -10,15 +8,16 @@ use bevy::{
         world::{FromWorld, World},
     },
     render::render_resource::{
-        BindGroupLayoutDescriptor, BindGroupLayoutEntries, CachedRenderPipelineId, Face, PipelineCache, PrimitiveState,
-        RenderPipelineDescriptor, SamplerBindingType, ShaderStages, SpecializedRenderPipeline,
-        SpecializedRenderPipelines, TextureSampleType,
-        binding_types::{sampler, storage_buffer_read_only_sized, texture_2d, uniform_buffer_sized},
+        CachedRenderPipelineId, Face, PipelineCache, PrimitiveState, RenderPipelineDescriptor,
+        SpecializedRenderPipeline, SpecializedRenderPipelines,
     },
-    shader::{Shader, ShaderDefVal},
+    shader::Shader,
 };
 
-use super::{DrapeUniform, tiles::GpuTerrain};
+use super::{
+    layout::{terrain_defs, terrain_layout},
+    tiles::GpuTerrain,
+};
 
 use crate::render::{
     bindings::frame_layout,
@@ -27,34 +26,6 @@ use crate::render::{
     shaders::{CanopyShaders, ShaderFile},
     view::{PreparedFrame, ViewFormat},
 };
-
-/// Shader definition of ground with a photograph over it.
-pub const DRAPE: &str = "DRAPE";
-/// Shader definition of ground whose shadows have soft edges.
-const SOFT_SHADOW: &str = "SOFT_SHADOW";
-
-/// Group 1: vertices, tiles; with a photograph over them also its place, its texture and how it is sampled.
-pub fn terrain_layout(draped: bool) -> BindGroupLayoutDescriptor {
-    let tiles = || (storage_buffer_read_only_sized(false, None), storage_buffer_read_only_sized(false, None));
-    let stages = ShaderStages::VERTEX_FRAGMENT;
-    if !draped {
-        return BindGroupLayoutDescriptor::new("canopy_terrain", &BindGroupLayoutEntries::sequential(stages, tiles()));
-    }
-    let photograph = (
-        uniform_buffer_sized(false, NonZeroU64::new(size_of::<DrapeUniform>() as u64)),
-        texture_2d(TextureSampleType::Float { filterable: true }),
-        sampler(SamplerBindingType::Filtering),
-    );
-    let ((vertices, tiles), (place, texture, sampler)) = (tiles(), photograph);
-    let entries = BindGroupLayoutEntries::sequential(stages, (vertices, tiles, place, texture, sampler));
-    BindGroupLayoutDescriptor::new("canopy_draped_terrain", &entries)
-}
-
-/// The shader definitions of ground.
-pub fn terrain_defs(draped: bool, soft_shadow: bool) -> Vec<ShaderDefVal> {
-    let defs = [(DRAPE, draped), (SOFT_SHADOW, soft_shadow)];
-    defs.into_iter().filter(|(_, wanted)| *wanted).map(|(name, _)| name.into()).collect()
-}
 
 /// What the pipeline of the ground depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -16,7 +16,7 @@ use glam::DVec3;
 
 use super::{
     drape::GpuDrape,
-    pipeline::terrain_layout,
+    layout::terrain_layout,
     tile_cache::{TILE_VERTICES, TileCache},
     vertex::GpuTile,
 };
