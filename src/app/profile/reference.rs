@@ -95,6 +95,7 @@ impl Reference {
 pub fn full_scene(scene: &Scene) -> Scene {
     let mut full = scene.clone();
     full.quality.levels = vec![QualityLevel { draw: "model".to_owned(), until: 0.0, fade: 20.0 }];
+    full.quality.surface_size = 0.0;
     full.quality.msaa = 4;
     full.quality.terrain_error = 0.25;
     full

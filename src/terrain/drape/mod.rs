@@ -192,7 +192,7 @@ mod tests {
     #[test]
     fn a_mirrored_drape_goes_on_and_another_ends_softly() {
         let drape = four(true);
-        for (inside, outside) in [(-5.0, -15.0), (5.0, 15.0), (5.0, 35.0), (-5.0, 25.0)] {
+        for (inside, outside) in [(-5.0, -15.0), (5.0, 15.0), (-5.0, 35.0), (-5.0, 25.0)] {
             let (a, b) = (drape.sample(DVec2::new(inside, 3.0)), drape.sample(DVec2::new(outside, 3.0)));
             assert!(a.abs_diff_eq(b, 1e-6), "{inside} {outside}: {a} {b}");
         }

@@ -80,7 +80,7 @@ impl Bytes<'_> {
         Some(if x.is_finite() && y.is_finite() { Geometry::Point(x, y) } else { Geometry::Empty })
     }
 
-    /// The first of several points.
+    /// The first of several points, all of which must be there.
     fn first_point(&mut self, coordinates: usize) -> Option<Geometry> {
         let count = usize::try_from(self.whole()?).ok()?;
         if count == 0 {
@@ -90,10 +90,14 @@ impl Bytes<'_> {
         if self.rest.len() < count.checked_mul(5 + 8 * coordinates)? {
             return None;
         }
-        match self.kind()? {
-            (1, coordinates) => self.point(coordinates),
-            _ => None,
+        let mut first = None;
+        for _ in 0..count {
+            match self.kind()? {
+                (1, coordinates) => first = first.or(Some(self.point(coordinates)?)),
+                _ => return None,
+            }
         }
+        first
     }
 }
 
