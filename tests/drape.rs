@@ -175,7 +175,7 @@ fn geotiffs_of_several_kinds_of_samples_are_photographs() {
         .iter()
         .flat_map(|(x, y)| {
             let [r, g, b] = color(*x, *y);
-            [r, g, b, if *x < 8 { 0 } else { 255 }]
+            [r, g, b, if *x < 4 { 0 } else { 255 }]
         })
         .collect();
     let wide: Vec<u16> = rgb.iter().map(|code| u16::from(*code) * 257).collect();
