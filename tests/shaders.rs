@@ -34,7 +34,7 @@ use naga::{
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 
 /// All that the pipelines switch on or off.
-const DEFINES: [&str; 16] = [
+const DEFINES: [&str; 15] = [
     "FOLIAGE",
     "ALPHA_TO_COVERAGE",
     "NORMAL_MAP",
@@ -50,7 +50,6 @@ const DEFINES: [&str; 16] = [
     "IDENTITIES",
     "TOON",
     "DRAPE",
-    "SOFT_SHADOW",
 ];
 
 /// All combinations of [`DEFINES`]; some mean something with transfer only, and crosses have no others with their depth
@@ -62,9 +61,9 @@ fn variants() -> impl Iterator<Item = Vec<&'static str>> {
     let needs = ["TRANSFER_COLOR", "SUN_HARMONICS", "PLAIN_TOO"];
     let never_of_crosses = ["NORMAL_MAP", "LAYERED", "TRANSFER_COLOR", "SUN_HARMONICS", "SUN_DETAIL"];
     // Of the styles, only foliage and the ground have variants, and only without light; the ground has no others.
-    let styles = ["STYLED", "OWN_NORMALS", "IDENTITIES", "TOON", "DRAPE", "SOFT_SHADOW"];
+    let styles = ["STYLED", "OWN_NORMALS", "IDENTITIES", "TOON", "DRAPE"];
     let style_variant = |defines: &[&str]| match defines {
-        ["IDENTITIES"] | ["TOON"] | ["DRAPE"] | ["SOFT_SHADOW"] | ["DRAPE", "SOFT_SHADOW"] => true,
+        ["IDENTITIES"] | ["TOON"] | ["DRAPE"] => true,
         _ => {
             defines.contains(&"STYLED")
                 && defines.iter().all(|define| ["FOLIAGE", "STYLED", "OWN_NORMALS", "DRAPE"].contains(define))
@@ -265,7 +264,7 @@ fn gpu_structs_are_what_the_shaders_think() {
         }
     );
     twin!(layouts, "Cascade", CascadeUniform { map_from_relative, texel, radius });
-    twin!(layouts, "Shadow", ShadowUniform { cascades, ground, cascade_count, inverse_map_size, softness });
+    twin!(layouts, "Shadow", ShadowUniform { cascades, ground, cascade_count, inverse_map_size });
     twin!(layouts, "Drape", DrapeUniform { origin, inverse_size, edge, texel, brightness, mirrored });
     twin!(layouts, "CascadeView", CascadeViewUniform { clip_from_anchor, direction });
     twin!(

@@ -7,10 +7,6 @@
 #import canopy::output::finish
 #import canopy::stand::{ground_light, stand_light}
 #import canopy::sun_visibility::{GroundSample, sample_ground, terrain_visibility, cascaded_visibility}
-#ifdef SOFT_SHADOW
-#import canopy::soft_shadow::soft_visibility
-#import canopy::sun_visibility::{CascadeSample, cascade_at, cascade_weight}
-#endif
 #ifdef STYLED
 #import canopy::constants::{GROUND_LAYER, FIRST_FOLIAGE_LAYER}
 #import canopy::style_surface::{StyledSurface, styled_surface}
@@ -229,13 +225,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let stand = ground_light(shade_cover);
     var visibility = select(terrain_visibility(seen.ground, 0.0), 1.0, seen.outside);
     if visibility > 0.0 {
-#ifdef SOFT_SHADOW
-        let distance = length(in.relative);
-        let soft = soft_visibility(cascade_at(distance, in.clip.xy), in.relative, seen.normal, shadow.softness);
-        let cascades = CascadeSample(soft, cascade_weight(distance));
-#else
         let cascades = cascaded_visibility(in.relative, seen.normal, 1.0, in.clip.xy);
-#endif
         // Beyond the maps: the fraction of light that passes between the crowns.
         let passed = mix(stand.key_transmittance, cascades.visibility, cascades.weight);
         // A canopy is rough: in low light its crowns shade each other near their tops, as those of drawn trees do.

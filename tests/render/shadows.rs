@@ -40,14 +40,7 @@ fn lit(renderer: &mut Renderer, view: &Viewpoint, light: Daylight, shadow: SunSh
 }
 
 fn settings(cascades: usize) -> SunShadowSettings {
-    SunShadowSettings {
-        map_size: 1024,
-        cascades,
-        finest_radius: 100.0,
-        distance: 100.0,
-        proxy_distance: 0.0,
-        softness: 0.0,
-    }
+    SunShadowSettings { map_size: 1024, cascades, finest_radius: 100.0, distance: 100.0, proxy_distance: 0.0 }
 }
 
 #[track_caller]

@@ -217,7 +217,7 @@ fn ground(shader: Handle<Shader>, draped: bool) -> RenderPipelineDescriptor {
         RenderPipelineDescriptor {
             layout: vec![frame_layout(), terrain_layout(draped)],
             primitive: PrimitiveState { cull_mode: Some(Face::Back), ..Default::default() },
-            ..format.pipeline(&shader, terrain_defs(draped, false), opaque_depth())
+            ..format.pipeline(&shader, terrain_defs(draped), opaque_depth())
         },
         false,
     )

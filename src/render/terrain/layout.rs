@@ -14,8 +14,6 @@ use super::drape::DrapeUniform;
 
 /// Shader definition of ground with a photograph over it.
 pub const DRAPE: &str = "DRAPE";
-/// Shader definition of ground whose shadows have soft edges.
-const SOFT_SHADOW: &str = "SOFT_SHADOW";
 
 /// Group 1: vertices, tiles; with a photograph over them also its place, its texture and how it is sampled.
 pub fn terrain_layout(draped: bool) -> BindGroupLayoutDescriptor {
@@ -35,7 +33,6 @@ pub fn terrain_layout(draped: bool) -> BindGroupLayoutDescriptor {
 }
 
 /// The shader definitions of ground.
-pub fn terrain_defs(draped: bool, soft_shadow: bool) -> Vec<ShaderDefVal> {
-    let defs = [(DRAPE, draped), (SOFT_SHADOW, soft_shadow)];
-    defs.into_iter().filter(|(_, wanted)| *wanted).map(|(name, _)| name.into()).collect()
+pub fn terrain_defs(draped: bool) -> Vec<ShaderDefVal> {
+    if draped { vec![DRAPE.into()] } else { Vec::new() }
 }

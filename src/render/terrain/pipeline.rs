@@ -21,7 +21,6 @@ use super::{
 
 use crate::render::{
     bindings::frame_layout,
-    extract::ExtractedScene,
     gpu::opaque_depth,
     shaders::{CanopyShaders, ShaderFile},
     view::{PreparedFrame, ViewFormat},
@@ -34,8 +33,6 @@ pub struct GroundLook {
     pub format: ViewFormat,
     /// Whether a photograph lies over it.
     pub draped: bool,
-    /// Whether shadows on it have soft edges.
-    pub soft_shadow: bool,
 }
 
 /// The pipeline of the ground.
@@ -58,7 +55,7 @@ impl SpecializedRenderPipeline for TerrainPipeline {
             label: Some("canopy_terrain".into()),
             layout: vec![frame_layout(), terrain_layout(look.draped)],
             primitive: PrimitiveState { cull_mode: Some(Face::Back), ..Default::default() },
-            ..look.format.pipeline(&self.shader, terrain_defs(look.draped, look.soft_shadow), opaque_depth())
+            ..look.format.pipeline(&self.shader, terrain_defs(look.draped), opaque_depth())
         }
     }
 }
@@ -69,7 +66,6 @@ pub struct CurrentTerrainPipeline(pub Option<CachedRenderPipelineId>);
 
 /// Requests the pipeline that the view needs.
 pub fn prepare_pipeline(
-    scene: Res<ExtractedScene>,
     frame: Res<PreparedFrame>,
     pipeline: Res<TerrainPipeline>,
     terrain: Res<GpuTerrain>,
@@ -79,8 +75,7 @@ pub fn prepare_pipeline(
 ) {
     let photographed = frame.view.as_ref().filter(|view| !view.styled);
     current.0 = photographed.map(|view| {
-        let soft_shadow = scene.shadow.soft_edge() > 0.0 && scene.shadow.cascades > 0;
-        let look = GroundLook { format: view.attachment, draped: terrain.is_draped(), soft_shadow };
+        let look = GroundLook { format: view.attachment, draped: terrain.is_draped() };
         pipelines.specialize(&cache, &pipeline, look)
     });
 }
