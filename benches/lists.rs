@@ -59,15 +59,8 @@ fn main() -> anyhow::Result<()> {
     let arguments = Arguments::parse();
     let look = Look {
         size: (arguments.size[0], arguments.size.get(1).copied().unwrap_or(arguments.size[0])),
-        near: 30.0,
-        band: 10.0,
         cascades: arguments.cascades,
-        shadow_distance: 800.0,
-        shadow_size: 2048,
-        ground: true,
-        trees: true,
-        samples: 1,
-        depth_first: true,
+        ..Look::default()
     };
     let plant = field::plant(arguments.plant.as_deref())?;
     let fields = arguments.trees.iter().map(|trees| Field::new(&plant, *trees, look)).collect::<Result<Vec<_>, _>>()?;

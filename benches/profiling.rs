@@ -42,19 +42,7 @@ struct Arguments {
 
 fn main() -> anyhow::Result<()> {
     let arguments = Arguments::parse();
-    let look = Look {
-        size: (640, 360),
-        near: 30.0,
-        band: 10.0,
-        cascades: 4,
-        shadow_distance: 800.0,
-        shadow_size: 2048,
-        ground: true,
-        trees: true,
-        samples: 1,
-        depth_first: true,
-    };
-    let field = Field::new(&field::plant(None)?, arguments.trees, look)?;
+    let field = Field::new(&field::plant(None)?, arguments.trees, Look::default())?;
     let mut plain = Ours::new(&field)?;
     let mut measured = Ours::new(&field)?;
     measured.measure();

@@ -115,19 +115,28 @@ fn fuzz(name: &str, inputs: &[Vec<u8>], read: impl Fn(&[u8])) {
     }
 }
 
-fn geotiff() -> Vec<u8> {
+/// A GeoTIFF of 9 × 7 pixels of 10 m in UTM.
+fn geotiff_of<C>(missing: &str, samples: &[C::Inner]) -> Vec<u8>
+where
+    C: colortype::ColorType,
+    [C::Inner]: tiff::encoder::TiffValue,
+{
     let mut bytes = std::io::Cursor::new(Vec::new());
     let mut write = || -> tiff::TiffResult<()> {
         let mut encoder = TiffEncoder::new(&mut bytes)?;
-        let mut image = encoder.new_image::<colortype::Gray32Float>(9, 7)?;
+        let mut image = encoder.new_image::<C>(9, 7)?;
         image.encoder().write_tag(Tag::ModelPixelScaleTag, &[10.0, 10.0, 0.0][..])?;
         image.encoder().write_tag(Tag::ModelTiepointTag, &[0.0, 0.0, 0.0, 500_000.0, 4_000_000.0, 0.0][..])?;
         image.encoder().write_tag(Tag::GeoKeyDirectoryTag, &[1u16, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 32617][..])?;
-        image.encoder().write_tag(Tag::GdalNodata, "-9999")?;
-        image.write_data(&(0..63u8).map(f32::from).collect::<Vec<_>>())
+        image.encoder().write_tag(Tag::GdalNodata, missing)?;
+        image.write_data(samples)
     };
     write().expect("a GeoTIFF");
     bytes.into_inner()
+}
+
+fn geotiff() -> Vec<u8> {
+    geotiff_of::<colortype::Gray32Float>("-9999", &(0..63u8).map(f32::from).collect::<Vec<_>>())
 }
 
 fn png() -> Vec<u8> {
@@ -159,22 +168,12 @@ fn damaged_photographs_are_answered() {
         image.write_to(&mut bytes, format).expect("a photograph");
         bytes.into_inner()
     };
-    let mut tiff = std::io::Cursor::new(Vec::new());
-    let mut write = || -> tiff::TiffResult<()> {
-        let mut encoder = TiffEncoder::new(&mut tiff)?;
-        let mut image = encoder.new_image::<colortype::RGBA8>(9, 7)?;
-        image.encoder().write_tag(Tag::ModelPixelScaleTag, &[10.0, 10.0, 0.0][..])?;
-        image.encoder().write_tag(Tag::ModelTiepointTag, &[0.0, 0.0, 0.0, 500_000.0, 4_000_000.0, 0.0][..])?;
-        image.encoder().write_tag(Tag::GeoKeyDirectoryTag, &[1u16, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 32617][..])?;
-        image.encoder().write_tag(Tag::GdalNodata, "0")?;
-        image.write_data(&(0..252u8).collect::<Vec<_>>())
-    };
-    write().expect("a GeoTIFF");
+    let tiff = geotiff_of::<colortype::RGBA8>("0", &(0..252u8).collect::<Vec<_>>());
     let (terrain, _) =
         read_terrain_bytes(&geotiff(), Path::new("terrain"), &ReadOptions::default()).expect("a terrain");
     let bare = HeightField::new(2, 2, glam::DVec2::splat(50.0), vec![0.0; 4]).expect("a plane");
     let bare = Terrain::new(bare, None, Surroundings::Mirror);
-    let files = [tiff.into_inner(), photo(image::ImageFormat::Png), photo(image::ImageFormat::Jpeg)];
+    let files = [tiff, photo(image::ImageFormat::Png), photo(image::ImageFormat::Jpeg)];
     for terrain in [&terrain, &bare] {
         assert!(read_drape_bytes(files[0].clone(), Path::new("photo"), None, terrain).is_ok(), "a control");
     }

@@ -7,6 +7,8 @@ use canopy::scatter::{Coordinates, Inventory, InventoryOptions, ScatterError, pa
 use rusqlite::{Connection, MAIN_DB, params};
 use tempfile::TempDir;
 
+use crate::support::inventory::listed;
+
 const UTM_32: &str = "PROJCS[\"ETRS89 / UTM zone 32N\",GEOGCS[\"ETRS89\",DATUM[\"ETRS_1989\",SPHEROID[\"GRS 1980\",6378137,\
                       298.257222101]]],PROJECTION[\"Transverse_Mercator\"],PARAMETER[\"central_meridian\",9],PARAMETER[\
                       \"scale_factor\",0.9996],PARAMETER[\"false_easting\",500000],UNIT[\"metre\",1]]";
@@ -145,17 +147,12 @@ fn a_geopackage_is_an_inventory_with_its_columns_and_its_system() {
     let folder = tempfile::tempdir().unwrap();
     let path = written(&folder, trees());
     let inventory = read_inventory(&path, InventoryOptions::default()).unwrap();
-    let found: Vec<_> = inventory
-        .rows
-        .iter()
-        .map(|tree| (tree.x, tree.y, tree.dbh_m, tree.height_m, tree.species.as_deref(), tree.line))
-        .collect();
     let expected = [
         (500_010.5, 5_400_020.25, Some(0.325), Some(18.0), Some("Quercus robur"), 1),
         (500_030.0, 5_400_040.0, Some(0.12), None, Some("Stiel-Eiche, südlich"), 2),
         (500_050.0, 5_400_060.0, None, None, None, 3),
     ];
-    assert_eq!(found, expected);
+    assert_eq!(listed(&inventory), expected);
     assert_eq!((inventory.coordinates, inventory.epsg), (Coordinates::Planar, Some(25832)));
     assert_eq!(inventory.wkt.as_deref(), Some(UTM_32));
     let blobs = "blobs are not used, as in the column(s) `photo`";

@@ -34,7 +34,7 @@ use naga::{
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 
 /// All that the pipelines switch on or off.
-const DEFINES: [&str; 15] = [
+const DEFINES: [&str; 16] = [
     "FOLIAGE",
     "ALPHA_TO_COVERAGE",
     "NORMAL_MAP",
@@ -50,6 +50,7 @@ const DEFINES: [&str; 15] = [
     "IDENTITIES",
     "TOON",
     "DRAPE",
+    "FOREST_SURFACE",
 ];
 
 /// All combinations of [`DEFINES`]; some mean something with transfer only, and crosses have no others with their depth
@@ -61,12 +62,14 @@ fn variants() -> impl Iterator<Item = Vec<&'static str>> {
     let needs = ["TRANSFER_COLOR", "SUN_HARMONICS", "PLAIN_TOO"];
     let never_of_crosses = ["NORMAL_MAP", "LAYERED", "TRANSFER_COLOR", "SUN_HARMONICS", "SUN_DETAIL"];
     // Of the styles, only foliage and the ground have variants, and only without light; the ground has no others.
-    let styles = ["STYLED", "OWN_NORMALS", "IDENTITIES", "TOON", "DRAPE"];
+    let styles = ["STYLED", "OWN_NORMALS", "IDENTITIES", "TOON", "DRAPE", "FOREST_SURFACE"];
     let style_variant = |defines: &[&str]| match defines {
-        ["IDENTITIES"] | ["TOON"] | ["DRAPE"] => true,
+        ["IDENTITIES"] | ["TOON"] | ["DRAPE"] | ["FOREST_SURFACE"] | ["DRAPE", "FOREST_SURFACE"] => true,
         _ => {
             defines.contains(&"STYLED")
-                && defines.iter().all(|define| ["FOLIAGE", "STYLED", "OWN_NORMALS", "DRAPE"].contains(define))
+                && defines
+                    .iter()
+                    .all(|define| ["FOLIAGE", "STYLED", "OWN_NORMALS", "DRAPE", "FOREST_SURFACE"].contains(define))
         }
     };
     let any_of = |defines: &[&str], some: &[&str]| some.iter().any(|define| defines.contains(define));

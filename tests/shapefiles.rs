@@ -8,6 +8,8 @@ use shapefile::dbase::{Record, TableWriterBuilder, encoding::Unicode};
 use shapefile::{Point, PointZ, Polyline, Writer};
 use tempfile::TempDir;
 
+use crate::support::inventory::listed;
+
 const UTM_32: &str = "PROJCS[\"ETRS_1989_UTM_Zone_32N\",GEOGCS[\"GCS_ETRS_1989\",DATUM[\"D_ETRS_1989\",SPHEROID[\"GRS_1980\",\
                       6378137.0,298.257222101]],PRIMEM[\"Greenwich\",0.0],UNIT[\"Degree\",0.0174532925199433]],PROJECTION[\
                       \"Transverse_Mercator\"],PARAMETER[\"False_Easting\",500000.0],PARAMETER[\"False_Northing\",0.0],\
@@ -53,17 +55,12 @@ fn a_shapefile_is_an_inventory_with_its_columns_its_encoding_and_its_system() {
     let folder = tempfile::tempdir().unwrap();
     let path = trees(&folder);
     let inventory = read_inventory(&path, InventoryOptions::default()).unwrap();
-    let found: Vec<_> = inventory
-        .rows
-        .iter()
-        .map(|tree| (tree.x, tree.y, tree.dbh_m, tree.height_m, tree.species.as_deref(), tree.line))
-        .collect();
     let expected = [
         (500_010.5, 5_400_020.25, Some(0.325), Some(18.25), Some("Quercus robur"), 1),
         (500_030.0, 5_400_040.0, Some(0.12), None, Some("Stiel-Eiche, südlich"), 2),
         (500_050.0, 5_400_060.0, None, None, None, 3),
     ];
-    assert_eq!(found, expected);
+    assert_eq!(listed(&inventory), expected);
     assert_eq!(inventory.coordinates, Coordinates::Planar);
     assert!(inventory.wkt.is_some_and(|text| text.contains("UTM_Zone_32N")));
 

@@ -65,6 +65,24 @@ pub struct Look {
     pub depth_first: bool,
 }
 
+impl Default for Look {
+    /// That of the benchmark `peer` where its arguments say nothing else, on our side alone.
+    fn default() -> Self {
+        Self {
+            size: (640, 360),
+            near: 30.0,
+            band: 10.0,
+            cascades: 4,
+            shadow_distance: 800.0,
+            shadow_size: 2048,
+            ground: true,
+            trees: true,
+            samples: 1,
+            depth_first: true,
+        }
+    }
+}
+
 impl Look {
     /// The same with every tree as its full model.
     pub fn full(self) -> Self {

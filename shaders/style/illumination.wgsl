@@ -1,8 +1,7 @@
 // The light on the surfaces that are seen [Luft 2006, 3.2 and 3.3]: the lighting map, and the shadow by the blurred depth test.
-#import canopy::frame::{frame, light, shadow}
-#import canopy::soft_shadow::soft_visibility
+#import canopy::frame::{frame, light, shadow, shadow_map}
 #import canopy::style::{style, full_screen, FullScreen, landscape_depth}
-#import canopy::sun_visibility::{sample_ground, terrain_visibility, cascade_weight}
+#import canopy::sun_visibility::{sample_ground, terrain_visibility, map_position, cascade_weight}
 #import canopy::constants::MAX_CASCADES
 
 @group(1) @binding(1) var depths: texture_depth_2d;
@@ -32,11 +31,33 @@ fn cascade_of(distance: f32) -> i32 {
     return index;
 }
 
-// Light of the key light that is left by what casts near it.
+// Light by the blurred depth test [Luft 2006, eq. 5]: the map's depths under a Gaussian of 5 x 5 points, then the smooth step over
+// the band of +-`style.shadow_softness` metres.
 fn soft_light(relative: vec3<f32>, normal: vec3<f32>) -> f32 {
-    let distance = length(relative);
-    let lit = soft_visibility(cascade_of(distance), relative, normal, style.shadow_softness);
-    return mix(1.0, lit, cascade_weight(distance));
+    let index = cascade_of(length(relative));
+    let cascade = shadow.cascades[index];
+    let map = map_position(index, relative, normal, 2.0);
+    let size = textureDimensions(shadow_map);
+    let center = map.xy * vec2<f32>(size);
+    // A quarter of the band, as wide as the softness is deep.
+    let step = max(0.5 * style.shadow_softness / max(cascade.texel, 1e-4), 1.0) * 0.5;
+    var sum = 0.0;
+    var weights = 0.0;
+    for (var y = -2; y <= 2; y += 1) {
+        for (var x = -2; x <= 2; x += 1) {
+            let at = center + vec2(f32(x), f32(y)) * step;
+            let texel = clamp(vec2<i32>(at), vec2(0), vec2<i32>(size) - 1);
+            let weight = exp2(-0.4 * f32(x * x + y * y));
+            sum += weight * textureLoad(shadow_map, texel, index, 0);
+            weights += weight;
+        }
+    }
+    let m = cascade.map_from_relative;
+    let per_metre = length(vec3(m[0].z, m[1].z, m[2].z));
+    let delta = max(style.shadow_softness * per_metre, 1e-6);
+    // The map's depth is reversed: nearer to the light is greater. Half the band keeps lit surfaces lit.
+    let lit = smoothstep(-delta, delta, map.z - sum / weights + 0.5 * delta);
+    return mix(1.0, lit, cascade_weight(length(relative)));
 }
 
 // Light (0..1), pigment of the shadow (0..1), depth (0..1), and the length of the normal.

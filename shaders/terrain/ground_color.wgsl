@@ -4,7 +4,7 @@
 
 #import canopy::constants::LEAF_OCTAVE
 #import canopy::frame::frame
-#import canopy::ground_noise::{noise_band, noise_step, scattered_leaves, visible_part}
+#import canopy::ground_noise::{joined_bands, noise_band, noise_step, scattered_leaves, visible_part}
 
 // Slope of the relief of crowns that are seen as a surface: with it the picture has the local contrast of the trees that end there.
 const CROWN_RELIEF: f32 = 0.6;
@@ -22,7 +22,9 @@ struct GroundColor {
 // ground, metres.
 fn ground_color(xz: vec2<f32>, steepness: f32, cover: f32, far: f32, footprint: f32) -> GroundColor {
     let wide = noise_band(xz, 0, 4, footprint);
-    let middle = noise_band(xz, 4, 4, footprint);
+    // Octaves of 8 to 16 m, as wide as crowns.
+    let crown_sized = noise_band(xz, 6, 2, footprint);
+    let middle = joined_bands(noise_band(xz, 4, 2, footprint), crown_sized);
     let fine = noise_band(xz, 8, 3, footprint);
     let grain = noise_band(xz, 11, 4, footprint);
 
@@ -61,9 +63,8 @@ fn ground_color(xz: vec2<f32>, steepness: f32, cover: f32, far: f32, footprint: 
 
     var color: GroundColor;
     color.albedo = albedo;
-    // Crowns stand beside each other as hills do: a relief of 8 to 16 m.
-    let crown_relief = noise_band(xz, 6, 2, footprint).value;
-    color.tilt = 0.06 * fine.value + 0.13 * grain.value + CROWN_RELIEF * wooded * far * crown_relief;
+    // Crowns stand beside each other as hills do.
+    color.tilt = 0.06 * fine.value + 0.13 * grain.value + CROWN_RELIEF * wooded * far * crown_sized.value;
     color.ambient_visibility = clamp(0.9 + 0.05 * grain.value.x + 0.08 * leaf, 0.6, 1.0);
     return color;
 }

@@ -93,6 +93,14 @@ fn noise_band(xz: vec2<f32>, first: i32, count: i32, footprint: f32) -> NoiseBan
     return NoiseBand(sum * inverseSqrt(all), max(1.0 - kept / all, 0.0));
 }
 
+// Two bands of two octaves each, the second of which goes on where the first ends, as one of four.
+fn joined_bands(first: NoiseBand, second: NoiseBand) -> NoiseBand {
+    let weight = NOISE_WEIGHT_RATIO * NOISE_WEIGHT_RATIO;
+    let square = weight * weight;
+    let value = (first.value + weight * second.value) * inverseSqrt(1.0 + square);
+    return NoiseBand(value, (first.lost + square * second.lost) / (1.0 + square));
+}
+
 // A smooth step of a noise at `center`. The wider it is, the more of the noise's variance, `lost`, is missing: so the
 // mean over many pixels stays the same.
 fn noise_step(center: f32, half_width: f32, value: f32, lost: f32) -> f32 {

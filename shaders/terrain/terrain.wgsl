@@ -65,6 +65,13 @@ struct Varying {
     @location(1) normal: vec3<f32>,
 }
 
+// Whether a position lies outside of the ground map.
+fn is_outside(relative: vec3<f32>) -> bool {
+    let uv = (relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;
+    return max(max(-uv.x, uv.x - 1.0), max(-uv.y, uv.y - 1.0)) > 0.0;
+}
+
+#ifdef FOREST_SURFACE
 // How much of the forest at a position is drawn as a surface, 0..1. It is whole before the first trees vanish, which do so up to
 // 19 % earlier than their mean (src/lod/level_distance.rs).
 fn surface_share(relative: vec3<f32>) -> f32 {
@@ -73,18 +80,13 @@ fn surface_share(relative: vec3<f32>) -> f32 {
     return smoothstep(begin, max(0.84 * middle, begin + 1e-3), length(relative));
 }
 
-// Whether a position lies outside of the ground map.
-fn is_outside(relative: vec3<f32>) -> bool {
-    let uv = (relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;
-    return max(max(-uv.x, uv.x - 1.0), max(-uv.y, uv.y - 1.0)) > 0.0;
-}
-
 // How closed the canopy over a position is, 0..1: the surface of a forest lies at its height there, and on the ground in the open.
 fn closed_canopy(relative: vec3<f32>) -> f32 {
     let ground = sample_ground(relative);
     let cover = select(ground.cover + ground.undrawn_cover, frame.mean_cover, is_outside(relative));
     return smoothstep(0.1, 0.6, cover);
 }
+#endif
 
 // Height of a tile's skirt. It covers gaps that are narrower than a pixel.
 const SKIRT_PIXELS: f32 = 1.5;
@@ -103,7 +105,9 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     let height = mix(v.height, v.parent_height, k);
     var out: Varying;
     out.relative = vec3(xz.x, height - tile.camera_height, xz.y);
+#ifdef FOREST_SURFACE
     out.relative.y += frame.forest_surface.z * closed_canopy(out.relative) * surface_share(out.relative);
+#endif
     out.relative.y -= select(0.0, SKIRT_PIXELS * length(out.relative) / frame.focal_length_pixels, in_skirt);
     out.clip = frame.clip_from_relative * vec4(out.relative, 1.0);
     out.normal = mix(decode_octahedral_y(v.normal), decode_octahedral_y(v.parent_normal), k);
@@ -127,18 +131,33 @@ struct Seen {
     color: GroundColor,
 }
 
+// A pixel on the ground. Seen at a flat angle it is long and narrow: one lookup as wide as it is long would smear what lies side
+// by side.
+struct GroundPixel {
+    // Its width and its length, metres.
+    across: f32,
+    along: f32,
+    // Unit vector along it (x, z).
+    direction: vec2<f32>,
+}
+
+// `flattest` is the sine of the least angle at which its length still grows.
+fn ground_pixel(relative: vec3<f32>, normal: vec3<f32>, flattest: f32) -> GroundPixel {
+    let distance = max(length(relative), 1e-3);
+    let across = distance / frame.focal_length_pixels;
+    let along = across / max(abs(dot(normal, relative)) / distance, flattest);
+    return GroundPixel(across, along, relative.xz / max(length(relative.xz), 1e-3));
+}
+
 // The most places along a pixel on the ground at which its colour is looked up.
 const MOST_PLACES: f32 = 2.0;
 
-// The colour of the ground in a pixel. Seen at a flat angle the pixel is long and narrow on the ground: one lookup as wide
-// as it is long would smear what lies side by side.
+// The colour of the ground in a pixel.
 fn color_of_pixel(in: Varying, normal: vec3<f32>, cover: f32, far: f32) -> GroundColor {
-    let distance = max(length(in.relative), 1e-3);
-    let across = distance / frame.focal_length_pixels;
-    let along = across / max(abs(dot(normal, in.relative)) / distance, 0.05);
-    let places = clamp(ceil(0.7 * along / across), 1.0, MOST_PLACES);
-    let footprint = max(across, along / places);
-    let stride = in.relative.xz / max(length(in.relative.xz), 1e-3) * (along / places);
+    let pixel = ground_pixel(in.relative, normal, 0.05);
+    let places = clamp(ceil(0.7 * pixel.along / pixel.across), 1.0, MOST_PLACES);
+    let footprint = max(pixel.across, pixel.along / places);
+    let stride = pixel.direction * (pixel.along / places);
     let first = frame.camera.xz + in.relative.xz - 0.5 * (places - 1.0) * stride;
     var sum = GroundColor(vec3(0.0), vec2(0.0), 0.0);
     for (var place = 0.0; place < places; place += 1.0) {
@@ -158,14 +177,12 @@ const MOST_LOOKUPS: f32 = 6.0;
 // from the ground's own colour. The twin is Soil::albedo in src/reference/soil.rs.
 fn draped(in: Varying, normal: vec3<f32>, cover: f32, far: f32, own: vec3<f32>) -> vec3<f32> {
     let uv = (in.relative.xz - drape.origin) * drape.inverse_size;
-    // Several lookups along a pixel that is long and narrow on the ground: colour times opacity, and opacity.
-    let distance = max(length(in.relative), 1e-3);
-    let across = distance / frame.focal_length_pixels;
-    let along = across / max(abs(dot(normal, in.relative)) / distance, 0.02);
-    let places = clamp(ceil(along / across), 1.0, MOST_LOOKUPS);
-    let lod = log2(max(max(across, along / places) / drape.texel, 1.0));
-    let stride = in.relative.xz / max(length(in.relative.xz), 1e-3) * (along / places) * drape.inverse_size;
+    let pixel = ground_pixel(in.relative, normal, 0.02);
+    let places = clamp(ceil(pixel.along / pixel.across), 1.0, MOST_LOOKUPS);
+    let lod = log2(max(max(pixel.across, pixel.along / places) / drape.texel, 1.0));
+    let stride = pixel.direction * (pixel.along / places) * drape.inverse_size;
     let first = uv - 0.5 * (places - 1.0) * stride;
+    // Colour times opacity, and opacity.
     var photo = vec4(0.0);
     for (var place = 0.0; place < places; place += 1.0) {
         photo += textureSampleLevel(drape_texture, drape_sampler, first + place * stride, lod);
@@ -176,7 +193,7 @@ fn draped(in: Varying, normal: vec3<f32>, cover: f32, far: f32, own: vec3<f32>) 
     let shown = photo * inside;
 
     var detail = 1.0;
-    if across < DETAIL_TEXELS * drape.texel {
+    if pixel.across < DETAIL_TEXELS * drape.texel {
         let place = frame.camera.xz + in.relative.xz;
         let mean = ground_color(place, 1.0 - normal.y, cover, far, DETAIL_TEXELS * drape.texel).albedo;
         detail = clamp(dot(own, LUMINANCE) / max(dot(mean, LUMINANCE), 1e-4), LEAST_DETAIL, MOST_DETAIL);
@@ -192,7 +209,10 @@ fn seen_at(in: Varying) -> Seen {
     // Forest too far away for its trees to be drawn is coloured as crowns.
     let beyond = select(ground.undrawn_cover, frame.mean_cover, outside);
     let planted = select(ground.cover, 0.0, outside);
-    let undrawn = beyond + planted * surface_share(in.relative);
+    var undrawn = beyond;
+#ifdef FOREST_SURFACE
+    undrawn += planted * surface_share(in.relative);
+#endif
     let cover = beyond + planted;
     let far = undrawn / max(cover, 1e-3);
     var color = color_of_pixel(in, normal, cover, far);

@@ -162,9 +162,10 @@ impl Truth {
     pub fn build(written: &Scene, model: Model, progress: &mut dyn Progress) -> Result<Self, AppError> {
         let stage = Stage::build(written, progress).map_err(interrupt::building)?;
         progress.begin("Building ray tracing structures", 0);
-        let scene = scene(&stage)?.with_leaves(model.leaf);
+        let totals = StandTotals::of(&stage.stand, &stage.plants);
+        let scene = scene(&stage, totals)?.with_leaves(model.leaf);
         progress.end();
-        Ok(Self { totals: StandTotals::of(&stage.stand, &stage.plants), stage, scene, model })
+        Ok(Self { totals, stage, scene, model })
     }
 
     /// Traces one image and writes it.
@@ -272,10 +273,10 @@ fn interrupted(samples: u32, total: u32, checkpoint: &Path) -> AppError {
     })
 }
 
-fn scene(stage: &Stage) -> Result<ReferenceScene, AppError> {
+fn scene(stage: &Stage, totals: StandTotals) -> Result<ReferenceScene, AppError> {
     let plants: Vec<_> = stage.plants.iter().map(|baked| baked.plant.clone()).collect();
-    let crowns = StandTotals::of(&stage.stand, &stage.plants).crown_albedo();
-    let mut soil = Soil::new(&stage.terrain, stage.cover.clone(), stage.surroundings).with_crowns(crowns);
+    let mut soil =
+        Soil::new(&stage.terrain, stage.cover.clone(), stage.surroundings).with_crowns(totals.crown_albedo());
     if let Some(GroundDrape { drape, brightness }) = &stage.drape {
         soil = soil.with_drape(drape.clone(), *brightness);
     }

@@ -1,6 +1,6 @@
 //! The ground of a scene: from a file, an image, noise, or flat.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use glam::DVec2;
@@ -40,8 +40,7 @@ pub fn build_terrain(ground: &scene::Ground, progress: &mut dyn Progress) -> Res
             let terrain = if file.tiles.is_empty() {
                 read(&file.path, options, progress)?
             } else {
-                let paths: Vec<PathBuf> = std::iter::once(&file.path).chain(&file.tiles).cloned().collect();
-                let (terrain, warnings) = read_terrain_tiles(&paths, &options)?;
+                let (terrain, warnings) = read_terrain_tiles(&file.files(), &options)?;
                 for warning in warnings {
                     progress.warn(&format!("{} and {} tiles: {warning}", file.path.display(), file.tiles.len()));
                 }

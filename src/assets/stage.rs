@@ -16,12 +16,10 @@ use crate::{
     progress::Progress,
     render::{
         components::{CanopyStyle, Forest, ForestSurface, Ground, GroundDrape, SunShadowSettings},
+        exposure::StandTotals,
         forest::most_trees,
     },
-    scatter::{
-        CoverMap, PackedStand, PackedTree, PlantSize, ScatterError, Surveys, bounded_cover_map,
-        packed::DEFAULT_CELL_SIZE,
-    },
+    scatter::{CoverMap, PackedStand, PlantSize, ScatterError, Surveys, bounded_cover_map, packed::DEFAULT_CELL_SIZE},
     scene::{self, Lighting, Quality, Scene},
     terrain::Terrain,
 };
@@ -216,7 +214,7 @@ impl Stage {
     /// The surface of the forest, where its trees are drawn together.
     fn forest_surface(&self) -> Option<ForestSurface> {
         let fade = self.scene.quality.lod_levels().surface()?;
-        let tree_height = mean_tree_height(&self.stand, &self.plants);
+        let tree_height = StandTotals::of(&self.stand, &self.plants).height();
         (tree_height > 0.0).then_some(ForestSurface { fade, tree_height })
     }
 
@@ -278,15 +276,6 @@ pub(crate) fn observer(scene: &Scene, terrain: &Terrain) -> Result<Observer, Sta
     };
     let height = terrain.height(0.0, 0.0).clamp(-500.0, 9000.0);
     Ok(Observer::new(latitude, longitude, height)?)
-}
-
-/// Mean height in metres of the trees of a stand of `plants`; 0 without trees.
-pub(crate) fn mean_tree_height(stand: &PackedStand, plants: &[BakedPlant]) -> f32 {
-    let heights: Vec<f32> = plants.iter().map(|plant| plant.plant.height()).collect();
-    let height =
-        |tree: &PackedTree| f64::from(heights.get(usize::from(tree.variant())).copied().unwrap_or(0.0) * tree.scale());
-    let sum: f64 = stand.trees.iter().map(height).sum();
-    (sum / stand.trees.len().max(1) as f64) as f32
 }
 
 /// The canopy cover of a stand of `plants`.

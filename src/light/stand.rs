@@ -74,7 +74,8 @@ impl StandTrees {
         Self { reflectance: Vec3::ZERO, transmittance: Vec3::ZERO, crown_width: 0.5, crown_length: 0.7 };
 
     /// Albedo of their closed crowns, seen from far above: that of a deep layer of isotropic scatterers, `(1 − γ) / (1 + γ)` with
-    /// `γ² = 1 − R − T` [Hapke 1981, "Bidirectional reflectance spectroscopy", eq. 12], times [`CROWN_SHADE`].
+    /// `γ² = 1 − R − T` [Hapke 1981, "Bidirectional reflectance spectroscopy", eq. 12], times what crowns that shade
+    /// each other leave of it.
     pub fn crown_albedo(&self) -> Vec3 {
         let scattered = (self.reflectance + self.transmittance).clamp(Vec3::ZERO, Vec3::ONE);
         let layer = |scattered: f32| {

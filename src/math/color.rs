@@ -1,5 +1,7 @@
 //! Colours: the sRGB transfer function, luminance, 8-bit codes.
 
+use std::sync::LazyLock;
+
 use glam::Vec3;
 
 /// Weights of linear Rec. 709 red, green and blue in luminance (ITU-R BT.709-6).
@@ -21,6 +23,10 @@ pub fn linear_to_srgb(linear: f32) -> f32 {
     let linear = linear.clamp(0.0, 1.0);
     if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
+
+/// Linear light (0..1) of each 8-bit sRGB code.
+pub static LINEAR_OF_CODE: LazyLock<[f32; 256]> =
+    LazyLock::new(|| std::array::from_fn(|code| srgb_to_linear(code as f32 / 255.0)));
 
 /// The 8-bit code of a value in 0..1, rounded to nearest. Values below 0 and NaN give 0, values above 1 give 255.
 pub fn unorm8(value: f32) -> u8 {

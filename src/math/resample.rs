@@ -7,7 +7,7 @@
 use image::{Rgba, RgbaImage};
 use rayon::prelude::*;
 
-use super::color::{srgb_to_linear, srgb8, unorm8};
+use super::color::{LINEAR_OF_CODE, srgb8, unorm8};
 
 /// An image of straight-alpha texels in linear light, row by row.
 #[derive(Clone, Debug)]
@@ -27,8 +27,7 @@ const INVISIBLE: f32 = 0.5 / 255.0 / 4_194_304.0;
 impl Layer {
     /// Decodes an sRGB image with straight linear alpha.
     pub fn from_srgb(image: &RgbaImage) -> Self {
-        let decode: Vec<f32> = (0..=255u8).map(|byte| srgb_to_linear(f32::from(byte) / 255.0)).collect();
-        let channel = |byte: u8| decode[usize::from(byte)];
+        let channel = |byte: u8| LINEAR_OF_CODE[usize::from(byte)];
         let texels = image
             .as_raw()
             .par_chunks_exact(4)

@@ -3,7 +3,10 @@
 use glam::Vec3;
 
 use super::MeasureError;
-use crate::math::{color::srgb8, luminance, srgb_to_linear};
+use crate::math::{
+    color::{LINEAR_OF_CODE, srgb8},
+    luminance,
+};
 
 /// What the light of a picture is in proportion to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,8 +54,7 @@ impl Picture {
     /// # Errors
     /// Those of [`Picture::new`].
     pub fn from_srgb8(width: usize, height: usize, bytes: &[u8]) -> Result<Self, MeasureError> {
-        let linear: Vec<f32> = (0..=u8::MAX).map(|code| srgb_to_linear(f32::from(code) / 255.0)).collect();
-        let decode = |rgb: &[u8]| Vec3::from_array([0, 1, 2].map(|channel| linear[usize::from(rgb[channel])]));
+        let decode = |rgb: &[u8]| Vec3::from_array([0, 1, 2].map(|channel| LINEAR_OF_CODE[usize::from(rgb[channel])]));
         if !bytes.len().is_multiple_of(3) {
             return Err(MeasureError::Length { width, height, pixels: bytes.len() / 3 });
         }

@@ -67,7 +67,7 @@ impl StandTotals {
     }
 
     /// Mean height of the trees, metres; 0 without any.
-    fn height(&self) -> f32 {
+    pub fn height(&self) -> f32 {
         if self.trees > 0.0 { (self.heights / self.trees) as f32 } else { 0.0 }
     }
 }

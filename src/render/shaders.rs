@@ -63,7 +63,6 @@ shader_files! {
     Stand = "common/stand.wgsl",
     Output = "common/output.wgsl",
     SunVisibility = "common/sun_visibility.wgsl",
-    SoftShadow = "common/soft_shadow.wgsl",
     Lighting = "common/lighting.wgsl",
     Tissue = "common/tissue.wgsl",
     ForestInstance = "forest/instance.wgsl",

@@ -133,6 +133,11 @@ impl GroundFile {
             exaggeration: one(),
         }
     }
+
+    /// All files, in the order of preference.
+    pub fn files(&self) -> Vec<PathBuf> {
+        std::iter::once(&self.path).chain(&self.tiles).cloned().collect()
+    }
 }
 
 impl GroundImage {

@@ -4,5 +4,6 @@ pub mod data;
 pub mod glb;
 pub mod gpu;
 pub mod image;
+pub mod inventory;
 pub mod program;
 pub mod stage;

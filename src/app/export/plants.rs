@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::glb::Glb;
 use crate::{
     app::AppError,
-    math::{color::srgb8, srgb_to_linear},
+    math::color::{LINEAR_OF_CODE, srgb8},
     plant::{PartKind, Plant, PlantMaterial},
 };
 
@@ -45,9 +45,9 @@ impl Images {
 /// `image` with linear colours times `factor`.
 fn scaled(image: &RgbaImage, factor: Vec3) -> RgbaImage {
     let mut scaled = image.clone();
-    let table = factor.to_array().map(|factor| -> Vec<u8> {
-        (0..=255u8).map(|code| srgb8(factor * srgb_to_linear(f32::from(code) / 255.0))).collect()
-    });
+    let table = factor
+        .to_array()
+        .map(|factor| -> Vec<u8> { LINEAR_OF_CODE.iter().map(|linear| srgb8(factor * linear)).collect() });
     for pixel in scaled.pixels_mut() {
         for (channel, table) in table.iter().enumerate() {
             pixel.0[channel] = table[usize::from(pixel.0[channel])];
@@ -62,7 +62,7 @@ fn colors(material: &PlantMaterial) -> (Vec3, Vec3) {
     let cutoff = material.alpha_cutoff * 255.0;
     let (mut sum, mut most, mut count) = (Vec3::ZERO, Vec3::ZERO, 0.0);
     for pixel in image.pixels().filter(|pixel| f32::from(pixel.0[3]) >= cutoff) {
-        let [r, g, b, _] = pixel.0.map(|code| srgb_to_linear(f32::from(code) / 255.0));
+        let [r, g, b, _] = pixel.0.map(|code| LINEAR_OF_CODE[usize::from(code)]);
         let color = Vec3::new(r, g, b) * material.base_color;
         (sum, most, count) = (sum + color, most.max(color), count + 1.0);
     }

@@ -8,11 +8,12 @@ use crate::{
         PlantAsset, StageError,
         background::Wanted,
         plants::PlantPlan,
-        stage::{cover, mean_tree_height},
+        stage::cover,
         trees::{StandPlan, WoodBeyond},
     },
     bake::{BakedPlant, lighting::SunLight},
     progress::Progress,
+    render::exposure::StandTotals,
     scatter::{
         CoverMap, PackedStand, PlantSize, Stand,
         packed::{DEFAULT_CELL_SIZE, MAX_VARIANTS},
@@ -126,7 +127,7 @@ impl Ingredients {
         if stand.trees.is_empty() {
             listener.warn("the forest has no trees: its rules, area or positions leave no place for any");
         }
-        let tree_height = mean_tree_height(&packed, &plants);
+        let tree_height = StandTotals::of(&packed, &plants).height();
         Ok(Built {
             tree_height,
             stand: Arc::new(packed),

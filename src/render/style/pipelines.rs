@@ -33,7 +33,7 @@ use crate::{
         },
         gpu::opaque_depth,
         shaders::{CanopyShaders, ShaderFile},
-        terrain::{DRAPE, GpuTerrain, terrain_defs, terrain_layout},
+        terrain::{DRAPE, FOREST_SURFACE, GpuTerrain, GroundFeatures, terrain_layout},
         view::{PreparedFrame, ViewFormat},
     },
     style::{LineNormals, Style},
@@ -52,7 +52,7 @@ pub const LEVEL_TARGET: LevelTarget = LevelTarget::View(ViewFormat::ANY);
 pub struct StylePipelines {
     shaders: CanopyShaders,
     levels: HashMap<(Representation, u32, bool), CachedRenderPipelineId>,
-    ground: [Option<CachedRenderPipelineId>; 2],
+    ground: HashMap<GroundFeatures, CachedRenderPipelineId>,
     illumination: Option<CachedRenderPipelineId>,
     blurs: Option<[CachedRenderPipelineId; 3]>,
     particles: Option<CachedRenderPipelineId>,
@@ -66,7 +66,7 @@ impl FromWorld for StylePipelines {
         Self {
             shaders: world.resource::<CanopyShaders>().clone(),
             levels: HashMap::default(),
-            ground: [None; 2],
+            ground: HashMap::default(),
             illumination: None,
             blurs: None,
             particles: None,
@@ -82,9 +82,9 @@ impl StylePipelines {
         self.levels.get(&(level.renderer.representation(), features, self.own_normals)).copied()
     }
 
-    /// That of the ground, with a photograph over it or without.
-    pub fn ground(&self, draped: bool) -> Option<CachedRenderPipelineId> {
-        self.ground[usize::from(draped)]
+    /// That of the ground.
+    pub fn ground(&self, features: GroundFeatures) -> Option<CachedRenderPipelineId> {
+        self.ground.get(&features).copied()
     }
 
     /// That of the light.
@@ -112,7 +112,7 @@ impl StylePipelines {
         drawn: &DrawnStyle,
         format: TextureFormat,
         forests: &GpuForests,
-        draped: bool,
+        ground_features: GroundFeatures,
         cache: &PipelineCache,
     ) {
         let Some(picture) = Picture::of(&drawn.style) else { return };
@@ -137,8 +137,9 @@ impl StylePipelines {
             }
         }
         let shaders = &self.shaders;
-        self.ground[usize::from(draped)]
-            .get_or_insert_with(|| cache.queue_render_pipeline(ground(shaders.get(ShaderFile::Terrain), draped)));
+        self.ground
+            .entry(ground_features)
+            .or_insert_with(|| cache.queue_render_pipeline(ground(shaders.get(ShaderFile::Terrain), ground_features)));
         self.illumination.get_or_insert_with(|| {
             let shader = shaders.get(ShaderFile::StyleIllumination);
             let layout = vec![frame_layout(), illumination_layout()];
@@ -193,7 +194,9 @@ fn surface_targets() -> Vec<Option<ColorTargetState>> {
 /// of what is defined for light alone.
 fn styled(mut pipeline: RenderPipelineDescriptor, own_normals: bool) -> RenderPipelineDescriptor {
     let restyle = |defs: &mut Vec<ShaderDefVal>| {
-        let kept = |def: &ShaderDefVal| ["FOLIAGE", DRAPE].iter().any(|name| *def == ShaderDefVal::from(*name));
+        let kept = |def: &ShaderDefVal| {
+            ["FOLIAGE", DRAPE, FOREST_SURFACE].iter().any(|name| *def == ShaderDefVal::from(*name))
+        };
         defs.retain(kept);
         defs.push(STYLED.into());
         if own_normals {
@@ -211,13 +214,13 @@ fn styled(mut pipeline: RenderPipelineDescriptor, own_normals: bool) -> RenderPi
     pipeline
 }
 
-fn ground(shader: Handle<Shader>, draped: bool) -> RenderPipelineDescriptor {
+fn ground(shader: Handle<Shader>, features: GroundFeatures) -> RenderPipelineDescriptor {
     let format = ViewFormat { color: MAP_FORMAT, samples: 1 };
     styled(
         RenderPipelineDescriptor {
-            layout: vec![frame_layout(), terrain_layout(draped)],
+            layout: vec![frame_layout(), terrain_layout(features.draped)],
             primitive: PrimitiveState { cull_mode: Some(Face::Back), ..Default::default() },
-            ..format.pipeline(&shader, terrain_defs(draped), opaque_depth())
+            ..format.pipeline(&shader, features.defs(), opaque_depth())
         },
         false,
     )
@@ -234,6 +237,6 @@ pub fn prepare_pipelines(
 ) {
     let Some(view) = &frame.view else { return };
     if let Ok(drawn) = views.get(view.entity) {
-        pipelines.request(drawn, view.attachment.color, &forests, terrain.is_draped(), &cache);
+        pipelines.request(drawn, view.attachment.color, &forests, terrain.features, &cache);
     }
 }

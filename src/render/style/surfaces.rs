@@ -73,7 +73,7 @@ pub fn surfaces_pass(
             }
         }
     }
-    let ground = pipelines.ground(terrain.is_draped()).and_then(|id| cache.get_render_pipeline(id));
+    let ground = pipelines.ground(terrain.features).and_then(|id| cache.get_render_pipeline(id));
     if let (Some(pipeline), Some(tiles)) = (ground, &terrain.bind_group)
         && terrain.count > 0
     {

@@ -14,6 +14,8 @@ use super::drape::DrapeUniform;
 
 /// Shader definition of ground with a photograph over it.
 pub const DRAPE: &str = "DRAPE";
+/// Shader definition of ground with far forest as a surface over it.
+pub const FOREST_SURFACE: &str = "FOREST_SURFACE";
 
 /// Group 1: vertices, tiles; with a photograph over them also its place, its texture and how it is sampled.
 pub fn terrain_layout(draped: bool) -> BindGroupLayoutDescriptor {
@@ -32,7 +34,19 @@ pub fn terrain_layout(draped: bool) -> BindGroupLayoutDescriptor {
     BindGroupLayoutDescriptor::new("canopy_draped_terrain", &entries)
 }
 
-/// The shader definitions of ground.
-pub fn terrain_defs(draped: bool) -> Vec<ShaderDefVal> {
-    if draped { vec![DRAPE.into()] } else { Vec::new() }
+/// What the ground has beyond itself: what its layout and its shader definitions depend on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct GroundFeatures {
+    /// A photograph lies over it.
+    pub draped: bool,
+    /// Far forest is drawn as a surface over it.
+    pub forest_surface: bool,
+}
+
+impl GroundFeatures {
+    /// The shader definitions.
+    pub fn defs(self) -> Vec<ShaderDefVal> {
+        let defs = [(DRAPE, self.draped), (FOREST_SURFACE, self.forest_surface)];
+        defs.into_iter().filter(|(_, wanted)| *wanted).map(|(name, _)| name.into()).collect()
+    }
 }

@@ -28,7 +28,7 @@ use bevy::{
 use super::sets::{CanopyPasses, CanopyRenderSystems};
 pub use drape::DrapeUniform;
 pub use ground_map::GroundMap;
-pub(super) use layout::{DRAPE, terrain_defs, terrain_layout};
+pub(super) use layout::{DRAPE, FOREST_SURFACE, GroundFeatures, terrain_layout};
 pub(super) use tiles::GpuTerrain;
 pub use tiles::TerrainStatistics;
 pub use vertex::{GpuTile, GpuTileVertex};

@@ -15,7 +15,7 @@ use bevy::{
 };
 
 use super::{
-    layout::{terrain_defs, terrain_layout},
+    layout::{GroundFeatures, terrain_layout},
     tiles::GpuTerrain,
 };
 
@@ -25,15 +25,6 @@ use crate::render::{
     shaders::{CanopyShaders, ShaderFile},
     view::{PreparedFrame, ViewFormat},
 };
-
-/// What the pipeline of the ground depends on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct GroundLook {
-    /// The camera's attachment.
-    pub format: ViewFormat,
-    /// Whether a photograph lies over it.
-    pub draped: bool,
-}
 
 /// The pipeline of the ground.
 #[derive(Resource)]
@@ -48,14 +39,14 @@ impl FromWorld for TerrainPipeline {
 }
 
 impl SpecializedRenderPipeline for TerrainPipeline {
-    type Key = GroundLook;
+    type Key = (ViewFormat, GroundFeatures);
 
-    fn specialize(&self, look: GroundLook) -> RenderPipelineDescriptor {
+    fn specialize(&self, (format, features): Self::Key) -> RenderPipelineDescriptor {
         RenderPipelineDescriptor {
             label: Some("canopy_terrain".into()),
-            layout: vec![frame_layout(), terrain_layout(look.draped)],
+            layout: vec![frame_layout(), terrain_layout(features.draped)],
             primitive: PrimitiveState { cull_mode: Some(Face::Back), ..Default::default() },
-            ..look.format.pipeline(&self.shader, terrain_defs(look.draped), opaque_depth())
+            ..format.pipeline(&self.shader, features.defs(), opaque_depth())
         }
     }
 }
@@ -74,8 +65,5 @@ pub fn prepare_pipeline(
     mut current: ResMut<CurrentTerrainPipeline>,
 ) {
     let photographed = frame.view.as_ref().filter(|view| !view.styled);
-    current.0 = photographed.map(|view| {
-        let look = GroundLook { format: view.attachment, draped: terrain.is_draped() };
-        pipelines.specialize(&cache, &pipeline, look)
-    });
+    current.0 = photographed.map(|view| pipelines.specialize(&cache, &pipeline, (view.attachment, terrain.features)));
 }

@@ -16,7 +16,7 @@ use glam::DVec3;
 
 use super::{
     drape::GpuDrape,
-    layout::terrain_layout,
+    layout::{GroundFeatures, terrain_layout},
     tile_cache::{TILE_VERTICES, TileCache},
     vertex::GpuTile,
 };
@@ -46,6 +46,8 @@ pub struct GpuTerrain {
     pub count: u32,
     /// Group 1.
     pub bind_group: Option<BindGroup>,
+    /// What lies over it.
+    pub features: GroundFeatures,
     /// The photograph over it.
     drape: Option<GpuDrape>,
     frame: u64,
@@ -62,16 +64,10 @@ impl FromWorld for GpuTerrain {
             index_count: indices.len() as u32,
             count: 0,
             bind_group: None,
+            features: GroundFeatures::default(),
             drape: None,
             frame: 0,
         }
-    }
-}
-
-impl GpuTerrain {
-    /// Whether a photograph lies over it.
-    pub fn is_draped(&self) -> bool {
-        self.drape.is_some()
     }
 }
 
@@ -188,13 +184,14 @@ pub fn prepare_tiles(
     if let (Some(known), Some(drape)) = (&gpu.drape, &ground.drape) {
         known.place(&queue, camera, drape.brightness);
     }
+    gpu.features = GroundFeatures { draped: gpu.drape.is_some(), forest_surface: ground.forest_surface.is_some() };
     let tiles =
         BindGroupEntries::sequential((cache.vertices.as_entire_binding(), gpu.tiles.buffer().as_entire_binding()));
     let mut entries = tiles.to_vec();
     entries.extend(gpu.drape.iter().flat_map(|drape| drape.entries(2)));
     gpu.bind_group = Some(device.create_bind_group(
         "canopy_terrain",
-        &pipelines.get_bind_group_layout(&terrain_layout(gpu.drape.is_some())),
+        &pipelines.get_bind_group_layout(&terrain_layout(gpu.features.draped)),
         &entries,
     ));
 }

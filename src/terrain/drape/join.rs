@@ -6,7 +6,8 @@ use glam::{DVec2, Vec4};
 use rayon::prelude::*;
 
 use super::{Drape, MOST_SIDE, encode};
-use crate::terrain::read::photo::{LINEAR, Photo, Pixels};
+use crate::math::color::LINEAR_OF_CODE;
+use crate::terrain::read::photo::{Photo, Pixels};
 use crate::terrain::{CoordinateSystem, GeoReference, Surroundings, SystemMap, Terrain, TerrainError, Warning};
 
 /// Texels between the nodes at which coordinates are computed; between them they are interpolated.
@@ -60,7 +61,8 @@ fn join(photos: Vec<Photo>, terrain: &Terrain) -> Result<(Drape, Vec<Warning>), 
         }
     }
     let Some(first) = placed.first() else {
-        return Err(outside.unwrap_or(TerrainError::TooSmall { columns: 0, rows: 0 }));
+        let none = TerrainError::BadParameter { name: "the number of photographs", value: 0.0, range: "at least 1" };
+        return Err(outside.unwrap_or(none));
     };
     let target = Target::new(first, &placed);
     let finest = placed.iter().map(|photo| photo.pixel).fold(DVec2::INFINITY, DVec2::min);
@@ -134,8 +136,7 @@ impl Way {
     fn pixel_of(&self, photo: &Photo, local: DVec2) -> Option<DVec2> {
         let point = match self {
             Self::Whole { extent } => {
-                let size = DVec2::new(photo.description.columns as f64, photo.description.rows as f64);
-                return Some((local / *extent + 0.5) * size);
+                return Some((local / *extent + 0.5) * photo.size());
             }
             Self::Direct(reference) => reference.to_file(local.x, local.y),
             Self::Across { reference, terrain, photo } => {
@@ -148,8 +149,7 @@ impl Way {
 
     fn local_of(&self, photo: &Photo, pixel: DVec2) -> Option<DVec2> {
         if let Self::Whole { extent } = self {
-            let size = DVec2::new(photo.description.columns as f64, photo.description.rows as f64);
-            return Some((pixel / size - 0.5) * *extent);
+            return Some((pixel / photo.size() - 0.5) * *extent);
         }
         let point = photo.point_of(pixel)?;
         match self {
@@ -199,7 +199,7 @@ impl Placed {
     ) -> Result<Result<Self, TerrainError>, TerrainError> {
         let half = 0.5 * terrain.extent();
         let way = way(&photo, terrain, warnings)?;
-        let size = DVec2::new(photo.description.columns as f64, photo.description.rows as f64);
+        let size = photo.size();
         let on_photo = bounds(points(-half, half).filter_map(|local| way.pixel_of(&photo, local)));
         let window = on_photo.map(|(low, high)| (low.max(DVec2::ZERO), high.min(size)));
         let Some((low, high)) = window.filter(|(low, high)| (*high - *low).min_element() > 1e-3) else {
@@ -229,7 +229,7 @@ impl Placed {
             return Ok(());
         }
         let nodes = Nodes::new(self, target, [left, top], [right, bottom]);
-        let size = DVec2::new(self.photo.description.columns as f64, self.photo.description.rows as f64);
+        let size = self.photo.size();
         let Some((low, high)) = bounds(nodes.pixels.iter().copied().filter(|pixel| pixel.is_finite())) else {
             return Ok(());
         };
@@ -308,7 +308,8 @@ fn under(texel: &mut [u8], pixels: &Pixels, at: DVec2) {
     let color = |dx: f64, dy: f64| {
         let [r, g, b, a] = code(corner + DVec2::new(dx, dy));
         let opacity = f32::from(a) / 255.0;
-        Vec4::new(LINEAR[usize::from(r)], LINEAR[usize::from(g)], LINEAR[usize::from(b)], 1.0) * opacity
+        Vec4::new(LINEAR_OF_CODE[usize::from(r)], LINEAR_OF_CODE[usize::from(g)], LINEAR_OF_CODE[usize::from(b)], 1.0)
+            * opacity
     };
     let north = color(0.0, 0.0).lerp(color(1.0, 0.0), f.x);
     let found = north.lerp(color(0.0, 1.0).lerp(color(1.0, 1.0), f.x), f.y);
@@ -350,9 +351,8 @@ fn way(photo: &Photo, terrain: &Terrain, warnings: &mut Vec<Warning>) -> Result<
 
 /// The error of a photograph that does not reach the terrain.
 fn outside(photo: &Photo, way: &Way) -> TerrainError {
-    let size = DVec2::new(photo.description.columns as f64, photo.description.rows as f64);
     let point = |pixel: DVec2| photo.point_of(pixel).unwrap_or(DVec2::NAN);
-    let (north_west, south_east) = (point(DVec2::ZERO), point(size));
+    let (north_west, south_east) = (point(DVec2::ZERO), point(photo.size()));
     let centre = way.pixel_of(photo, DVec2::ZERO).map_or(DVec2::NAN, point);
     TerrainError::PhotoOutside {
         path: photo.path.clone(),

@@ -13,8 +13,11 @@ use rayon::prelude::*;
 
 pub use join::{read_drape, read_drape_bytes};
 
-use super::read::photo::LINEAR;
-use crate::math::{MipChain, color::srgb8, smoothstep};
+use crate::math::{
+    MipChain,
+    color::{LINEAR_OF_CODE, srgb8, unorm8},
+    smoothstep,
+};
 
 /// The most texels along a side of a drape: 256 MiB and their mip levels.
 pub const MOST_SIDE: u32 = 8192;
@@ -132,13 +135,13 @@ impl Drape {
 /// The linear colour and the opacity of four bytes.
 fn linear(bytes: &[u8]) -> Vec4 {
     let [r, g, b, a] = [0, 1, 2, 3].map(|channel| bytes.get(channel).copied().unwrap_or(0));
-    let [r, g, b] = [r, g, b].map(|code| LINEAR[usize::from(code)]);
+    let [r, g, b] = [r, g, b].map(|code| LINEAR_OF_CODE[usize::from(code)]);
     Vec4::new(r, g, b, f32::from(a) / 255.0)
 }
 
 /// The code of a colour (times opacity) and opacity.
 fn encode(color: Vec3, opacity: f32) -> [u8; 4] {
-    [srgb8(color.x), srgb8(color.y), srgb8(color.z), (255.0 * opacity).round() as u8]
+    [srgb8(color.x), srgb8(color.y), srgb8(color.z), unorm8(opacity)]
 }
 
 /// The mip levels of texels: means of 2 × 2 in linear light.

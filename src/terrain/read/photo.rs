@@ -2,13 +2,12 @@
 
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
-use std::sync::LazyLock;
 
 use glam::DVec2;
 use image::{DynamicImage, GenericImageView, ImageFormat, ImageReader, Limits, Rgba};
 
 use super::{Grid, ReadOptions, Source, Window, geotiff, mosaic, open, side_files};
-use crate::math::{color::srgb8, srgb_to_linear};
+use crate::math::color::{LINEAR_OF_CODE, srgb8};
 use crate::terrain::{CoordinateSystem, TerrainError};
 
 /// The most pixels of a file that is decoded as a whole. Of a GeoTIFF only the window is.
@@ -17,10 +16,6 @@ const MOST_PIXELS: u64 = 1 << 28;
 const MOST_WINDOW: u64 = 1 << 32;
 /// The most bytes that decoding such a file may take.
 const MOST_BYTES: u64 = 3 << 30;
-
-/// Linear light of the codes of sRGB.
-pub(in crate::terrain) static LINEAR: LazyLock<[f32; 256]> =
-    LazyLock::new(|| std::array::from_fn(|code| srgb_to_linear(code as f32 / 255.0)));
 
 /// What a file says of a photograph, short of its pixels.
 #[derive(Clone, Copy, Debug)]
@@ -107,6 +102,11 @@ impl Photo {
         let Grid { first, step, .. } = self.description.grid?;
         let offset = (pixel - 0.5) * step;
         Some(DVec2::new(first.x + offset.x, first.y - offset.y))
+    }
+
+    /// Its size in pixels.
+    pub fn size(&self) -> DVec2 {
+        DVec2::new(self.description.columns as f64, self.description.rows as f64)
     }
 
     /// Whether the file says where the photograph lies.
@@ -243,7 +243,7 @@ impl Reducer {
         let opacity = f32::from(color[3]) / 255.0;
         let sum = &mut self.sums[at];
         for (sum, code) in sum.iter_mut().zip(&color[..3]) {
-            *sum += opacity * LINEAR[usize::from(*code)];
+            *sum += opacity * LINEAR_OF_CODE[usize::from(*code)];
         }
         sum[3] += opacity;
         sum[4] += 1.0;
