@@ -88,7 +88,7 @@ pub mod prelude {
         progress::{Progress, Silent},
         render::components::{
             CanopyCamera, CanopyOrigin, CanopyStyle, CastsCanopyShadow, Daylight, Forest, ForestUpdates, Ground,
-            LightUpdates, SunShadowSettings, ViewOptions,
+            GroundDrape, LightUpdates, SunShadowSettings, ViewOptions,
         },
         render::diagnostics::CanopyDiagnosticsPlugin,
         scene::{Overrides, Scene, SceneSource},
