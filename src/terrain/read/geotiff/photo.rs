@@ -55,6 +55,11 @@ pub fn pixels(source: &Source, window: &Window, factor: usize) -> Result<Pixels,
     let images: Vec<usize> = std::iter::once(0).chain(mask).collect();
     let overlay = Overlay::new(source, &directory, &images)?;
     let (mut decoder, columns, rows, kind) = decoder_of(source, overlay)?;
+    let samples = usize::from(kind.num_samples());
+    if samples != count {
+        let problem = format!("{count} samples of a pixel by their tag, {samples} by their kind");
+        return Err(source.malformed("TIFF directory", problem, FETCH));
+    }
     let plane = Plane { columns, rows, window: *window, bands: Bands { count, ..Bands::default() } };
     let colors = Colors::new(source, &mut decoder, kind, &extra, interpretation == Some(WHITE_IS_ZERO))?;
     let mut shown = Vec::new();
