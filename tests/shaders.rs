@@ -34,7 +34,7 @@ use naga::{
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 
 /// All that the pipelines switch on or off.
-const DEFINES: [&str; 16] = [
+const DEFINES: [&str; 17] = [
     "FOLIAGE",
     "ALPHA_TO_COVERAGE",
     "NORMAL_MAP",
@@ -51,6 +51,7 @@ const DEFINES: [&str; 16] = [
     "TOON",
     "DRAPE",
     "FOREST_SURFACE",
+    "SOFT_SHADOW",
 ];
 
 /// All combinations of [`DEFINES`]; some mean something with transfer only, and crosses have no others with their depth
@@ -62,9 +63,10 @@ fn variants() -> impl Iterator<Item = Vec<&'static str>> {
     let needs = ["TRANSFER_COLOR", "SUN_HARMONICS", "PLAIN_TOO"];
     let never_of_crosses = ["NORMAL_MAP", "LAYERED", "TRANSFER_COLOR", "SUN_HARMONICS", "SUN_DETAIL"];
     // Of the styles, only foliage and the ground have variants, and only without light; the ground has no others.
-    let styles = ["STYLED", "OWN_NORMALS", "IDENTITIES", "TOON", "DRAPE", "FOREST_SURFACE"];
+    let styles = ["STYLED", "OWN_NORMALS", "IDENTITIES", "TOON", "DRAPE", "FOREST_SURFACE", "SOFT_SHADOW"];
     let style_variant = |defines: &[&str]| match defines {
-        ["IDENTITIES"] | ["TOON"] | ["DRAPE"] | ["FOREST_SURFACE"] | ["DRAPE", "FOREST_SURFACE"] => true,
+        ["IDENTITIES"] | ["TOON"] => true,
+        _ if defines.iter().all(|define| ["DRAPE", "FOREST_SURFACE", "SOFT_SHADOW"].contains(define)) => true,
         _ => {
             defines.contains(&"STYLED")
                 && defines
@@ -106,12 +108,34 @@ pub(crate) fn compose(path: &str, source: &str, defines: &[&str]) -> Result<Modu
         .map_err(|error| format!("{path} {defines:?}: {}", error.emit_to_string(&composer)))
 }
 
+/// The definitions on which a shader depends, by itself and by what it imports: others do not change it.
+fn conditions(source: &str) -> BTreeSet<&str> {
+    let mut conditions = BTreeSet::new();
+    let (mut open, mut seen) = (vec![source], BTreeSet::new());
+    while let Some(source) = open.pop() {
+        for line in source.lines().map(str::trim) {
+            if let Some(name) = line.strip_prefix("#ifdef ").or_else(|| line.strip_prefix("#ifndef ")) {
+                conditions.insert(name.trim());
+            }
+            let Some(module) = line.strip_prefix("#import canopy::").and_then(|rest| rest.split("::").next()) else {
+                continue;
+            };
+            let path = format!("#define_import_path canopy::{}", module.trim());
+            let imported = ShaderFile::ALL.into_iter().map(ShaderFile::source);
+            let imported = imported.filter(|source| source.lines().any(|line| line.trim() == path));
+            open.extend(imported.filter(|_| seen.insert(path.clone())));
+        }
+    }
+    conditions
+}
+
 /// Every shader with entry points in every variant.
 fn modules() -> Vec<(String, Module)> {
     let mut modules = Vec::new();
     for file in ShaderFile::ALL.into_iter().filter(|file| !is_library(file.source())) {
         let path = file.path();
-        for defines in variants() {
+        let known = conditions(file.source());
+        for defines in variants().filter(|defines| defines.iter().all(|define| known.contains(define))) {
             match compose(path, file.source(), &defines) {
                 Ok(module) => modules.push((format!("{path} {defines:?}"), module)),
                 Err(message) => panic!("{message}"),
@@ -267,7 +291,7 @@ fn gpu_structs_are_what_the_shaders_think() {
         }
     );
     twin!(layouts, "Cascade", CascadeUniform { map_from_relative, texel, radius });
-    twin!(layouts, "Shadow", ShadowUniform { cascades, ground, cascade_count, inverse_map_size });
+    twin!(layouts, "Shadow", ShadowUniform { cascades, ground, cascade_count, inverse_map_size, softness });
     twin!(layouts, "Drape", DrapeUniform { origin, inverse_size, edge, texel, brightness, mirrored });
     twin!(layouts, "CascadeView", CascadeViewUniform { clip_from_anchor, direction });
     twin!(
@@ -368,6 +392,7 @@ fn gpu_structs_are_what_the_shaders_think() {
             tones,
             scaled_normals,
             scene,
+            noise_anchor,
         }
     );
     twin!(layouts, "Layer", LayerUniform { threshold, softness, edge, foliage });

@@ -83,6 +83,8 @@ struct Shadow {
     cascade_count: i32,
     // One over the map's size in texels.
     inverse_map_size: f32,
+    // Half width in metres of the soft edge of shadows on the ground.
+    softness: f32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

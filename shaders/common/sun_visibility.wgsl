@@ -98,6 +98,33 @@ fn cascaded_visibility(relative: vec3<f32>, normal: vec3<f32>, bias: f32, pixel:
     return CascadeSample(cascade_visibility(index, relative, normal, bias), cascade_weight(distance));
 }
 
+// Comparisons of a soft shadow, and the widest disc in texels that they cover without gaps: each reads two texels along an axis.
+const SOFT_COMPARISONS: i32 = 16;
+const WIDEST_DISC: f32 = 5.0;
+
+// The same with an edge of +-`shadow.softness` metres: the mean of comparisons over a disc. Where the map is finer than the
+// comparisons are dense, the next coarser one is read.
+fn soft_cascaded_visibility(relative: vec3<f32>, normal: vec3<f32>, pixel: vec2<f32>) -> CascadeSample {
+    let distance = length(relative);
+    var index = cascade_at(distance, pixel);
+    for (var i = 0; i < MAX_CASCADES - 1; i += 1) {
+        let too_fine = shadow.softness > WIDEST_DISC * shadow.cascades[i].texel;
+        index += i32((i == index) & (i + 1 < shadow.cascade_count) & too_fine);
+    }
+    let map = map_position(index, relative, normal, 1.0);
+    let radius = max(shadow.softness / shadow.cascades[index].texel, 1.0) * shadow.inverse_map_size;
+    // A spiral of equal areas [Vogel 1979]: each point turned by the golden angle against the one before.
+    let turn = mat2x2(-0.7373688, 0.6754903, -0.6754903, -0.7373688);
+    var direction = vec2(1.0, 0.0);
+    var sum = 0.0;
+    for (var i = 0; i < SOFT_COMPARISONS; i += 1) {
+        let offset = direction * (radius * sqrt((f32(i) + 0.5) / f32(SOFT_COMPARISONS)));
+        sum += textureSampleCompareLevel(shadow_map, shadow_sampler, map.xy + offset, index, map.z);
+        direction = turn * direction;
+    }
+    return CascadeSample(sum / f32(SOFT_COMPARISONS), cascade_weight(distance));
+}
+
 // Metres: what is smaller than this between the leaves is detail that a plant's transfer does not have.
 const DETAIL_RADIUS: f32 = 0.6;
 

@@ -52,6 +52,10 @@ struct Part {
 @group(2) @binding(5) var transmission_texture: texture_2d<f32>;
 #endif
 
+#ifdef STYLED
+@group(2) @binding(6) var strokes_texture: texture_2d<f32>;
+#endif
+
 struct Vertex {
     @location(0) position: vec3<f32>,
     // The normal, scaled by the ambient occlusion: src/bake/lighting/implicit/packing.rs.
@@ -365,6 +369,10 @@ fn styled(in: Varying) -> StyledSurface {
     let texel = textureSample(color_texture, part_sampler, in.uv);
     var normal = normalize(in.normal);
 #ifdef FOLIAGE
+    let strokes = textureSample(strokes_texture, part_sampler, in.uv).xy;
+    // Strokes vanish where their leaf is seen from its edge.
+    let leaf_normal = normalize(cross(dpdx(in.relative), dpdy(in.relative)) + vec3(0.0, 1e-12, 0.0));
+    let facing = smoothstep(0.0, 0.5, abs(dot(leaf_normal, normalize(in.relative))));
     if texel.a < in.threshold {
         discard;
     }
@@ -372,7 +380,10 @@ fn styled(in: Varying) -> StyledSurface {
     normal = select(normal, -normal, (part.realigned < 0.5) & (dot(normal, in.relative) > 0.0));
 #endif
     let albedo = tint_foliage(texel.rgb * part.base_color, look.tint);
-    return styled_surface(normal, look.ambient_visibility, look.height, in.identity, albedo);
+    var surface = styled_surface(normal, look.ambient_visibility, look.height, in.identity, albedo);
+    surface.identity.z = u32(round(255.0 * facing * strokes.x));
+    surface.identity.w = u32(round(255.0 * facing * strokes.y));
+    return surface;
 #else
     let keep = hash(vec3(in.uv * 97.0, look.height * 31.0));
     if WHOLE + (1.0 - WHOLE) * keep < in.threshold - 1e-4 {

@@ -31,7 +31,8 @@ fn contour(normals: texture_2d<f32>, lights: texture_2d<f32>, linear_sampler: sa
     // Steps from leaf to leaf inside a near crown do not count; of farther crowns, steps from one to the next do.
     let metres = log(FARTHEST / NEAREST) * NEAREST * exp(z * log(FARTHEST / NEAREST));
     let least = max(0.0005, mix(LEAF_STEP, CROWN_STEP, smoothstep(0.32, 0.46, z)) / metres);
-    let strong = smoothstep(0.01, 0.03, style.detail * step) * (1.0 - near);
+    // Beyond some 8 to 28 km, level ground ends in a straight horizon, which nobody draws.
+    let strong = smoothstep(0.01, 0.03, style.detail * step) * (1.0 - near) * (1.0 - smoothstep(0.84, 0.95, z));
     let silhouettes = smoothstep(least, 4.0 * least, style.detail * step) * mix(0.25, 1.0, near) + strong;
     return saturate(max(0.8 * creases, silhouettes));
 }

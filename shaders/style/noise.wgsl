@@ -3,7 +3,9 @@
 #define_import_path canopy::style_noise
 
 #import canopy::constants::NOISE_SPAN
+#import canopy::frame::frame
 #import canopy::hash::mix32
+#import canopy::style::style
 
 fn lattice(cell: vec3<i32>, seed: u32) -> f32 {
     let c = vec3<u32>(cell);
@@ -30,6 +32,28 @@ fn value_noise(p: vec3<f32>, wrap: i32, seed: u32) -> f32 {
         t.y,
     );
     return mix(bottom, top, t.z);
+}
+
+// Where noise is looked up, and the length there that is a pixel of a picture of 720 lines.
+struct NoisePlace {
+    position: vec3<f32>,
+    pixel: f32,
+}
+
+// Metres a pixel of noise that has one size in metres: that of a tree some 20 m away.
+const SOLID_PIXEL: f32 = 0.03;
+
+// The place of noise for `page` (pixels of a picture of 720 lines), where what lies `relative` metres from the camera is seen. The sky
+// turns with the view and does not move with the camera.
+fn noise_place(page: vec2<f32>, relative: vec3<f32>, sky: bool) -> NoisePlace {
+    let on_page = style.noise_anchor == 1u;
+    let solid = style.noise_anchor == 2u;
+    let position = relative + select(style.anchor, vec3(0.0), sky);
+    let footprint = length(relative) / frame.focal_length_pixels * style.unit;
+    return NoisePlace(
+        select(position, vec3(page, 0.0), on_page),
+        select(select(footprint, SOLID_PIXEL, solid), 1.0, on_page),
+    );
 }
 
 // Noise at `position` (metres, modulo NOISE_SPAN) whose features are `size` metres, -1..1: two octaves that trade places as

@@ -34,6 +34,8 @@ struct Style {
     scaled_normals: f32,
     // How far foliage takes on the colour of the scene's own leaves.
     scene: f32,
+    // What noise is fixed to: 0 the scene, 1 the page, 2 the scene with one size in metres.
+    noise_anchor: u32,
 }
 
 @group(1) @binding(0) var<uniform> style: Style;

@@ -6,8 +6,8 @@
 struct StyledSurface {
     // Unit normal in world axes times the ambient visibility, and metres above the ground.
     @location(0) surface: vec4<f32>,
-    // Layer, and a random number of the tree, 0..255.
-    @location(1) identity: vec2<u32>,
+    // Layer, and a random number of the tree, 0..255; strokes that are always seen, and strokes in shade, 0..255.
+    @location(1) identity: vec4<u32>,
     // Linear albedo.
     @location(2) color: vec4<f32>,
 }
@@ -17,7 +17,7 @@ const LEAST_LENGTH: f32 = 0.05;
 
 fn styled_surface(normal: vec3<f32>, ambient: f32, height: f32, identity: vec2<u32>, albedo: vec3<f32>) -> StyledSurface {
     let scaled = normalize(normal) * mix(LEAST_LENGTH, 1.0, saturate(ambient));
-    return StyledSurface(vec4(scaled, height), identity, vec4(saturate(albedo), 1.0));
+    return StyledSurface(vec4(scaled, height), vec4(identity, 0u, 0u), vec4(saturate(albedo), 1.0));
 }
 
 // A number of the tree that does not change, 0..255.

@@ -3,7 +3,8 @@
 #import canopy::frame::frame
 #import canopy::style::{style, full_screen, FullScreen, airiness}
 #import canopy::style_edges::contour
-#import canopy::style_noise::anchored_noise
+#import canopy::style_noise::{anchored_noise, noise_place}
+#import canopy::style_strokes::stroke_ink
 
 struct Layer {
     // Threshold of the shape, and half the width of its edge.
@@ -91,10 +92,11 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let ndc = vec2(in.uv.x * 2.0 - 1.0, 1.0 - in.uv.y * 2.0);
     let far = frame.relative_from_clip * vec4(ndc, select(seen, 0.5, sky), 1.0);
     let direction = normalize(far.xyz);
-    // The sky turns with the view and does not move with the camera: a sphere of 4 km.
+    // The sky is a sphere of 4 km.
     let relative = select(far.xyz / far.w, direction * 4000.0, sky);
-    let position = relative + select(style.anchor, vec3(0.0), sky);
-    let footprint = length(relative) / frame.focal_length_pixels * style.unit;
+    let place = noise_place(page, relative, sky);
+    let position = place.position;
+    let footprint = place.pixel;
     let broad = anchored_noise(position, footprint * 70.0, 1u);
     let middle = anchored_noise(position, footprint * 22.0, 2u);
     let fine = anchored_noise(position, footprint * 6.0, 3u);
@@ -183,7 +185,10 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let sketched = contour(soft_normals, soft_lights, linear_sampler, in.uv + tremble, style.line_width);
     let grain = smoothstep(0.25, 0.55, height + 0.16 * finer);
     let pencil = 1.6 * sketched * grain * style.sketch * (0.9 + 0.5 * broad) * (1.0 - 0.7 * air);
-    color = mix(color, style.ink * style.paper, saturate(pencil) * 0.85);
+    let stroke_uv = in.uv + 0.3 * vec2(middle, fine) * style.unit / style.size;
+    let strokes = stroke_ink(stroke_uv, length(relative), soft.z, max(1.0 - form, soft.y), identities) * f32(!sky);
+    let brushed = strokes * mix(0.75, 1.0, grain) * (1.0 - 0.7 * air);
+    color = mix(color, style.ink * style.paper, saturate(max(pencil, brushed)) * 0.85);
 
     // The margin: the brush does not end in a straight line.
     let from_edge = min(min(page.x, page.y), min(style.size.x / style.unit - page.x, style.size.y / style.unit - page.y));

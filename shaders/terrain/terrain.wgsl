@@ -7,6 +7,9 @@
 #import canopy::output::finish
 #import canopy::stand::{ground_light, stand_light}
 #import canopy::sun_visibility::{GroundSample, sample_ground, terrain_visibility, cascaded_visibility}
+#ifdef SOFT_SHADOW
+#import canopy::sun_visibility::soft_cascaded_visibility
+#endif
 #ifdef STYLED
 #import canopy::constants::{GROUND_LAYER, FIRST_FOLIAGE_LAYER}
 #import canopy::style_surface::{StyledSurface, styled_surface}
@@ -245,7 +248,11 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let stand = ground_light(shade_cover);
     var visibility = select(terrain_visibility(seen.ground, 0.0), 1.0, seen.outside);
     if visibility > 0.0 {
+#ifdef SOFT_SHADOW
+        let cascades = soft_cascaded_visibility(in.relative, seen.normal, in.clip.xy);
+#else
         let cascades = cascaded_visibility(in.relative, seen.normal, 1.0, in.clip.xy);
+#endif
         // Beyond the maps: the fraction of light that passes between the crowns.
         let passed = mix(stand.key_transmittance, cascades.visibility, cascades.weight);
         // A canopy is rough: in low light its crowns shade each other near their tops, as those of drawn trees do.

@@ -25,6 +25,9 @@ pub enum StageError {
         /// What is wrong.
         source: crate::plant::grow::GrowError,
     },
+    /// Strokes on leaves.
+    #[error(transparent)]
+    Strokes(#[from] crate::plant::strokes::StrokesError),
     /// The stand.
     #[error(transparent)]
     Stand(#[from] crate::scatter::ScatterError),

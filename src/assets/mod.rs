@@ -23,6 +23,7 @@ mod plugin;
 mod read;
 mod scene_asset;
 pub(crate) mod stage;
+mod strokes;
 mod terrain_map;
 pub(crate) mod threads;
 mod together;

@@ -3,9 +3,13 @@
 use std::{
     ops::Range,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
-use super::StageError;
+use super::{
+    StageError,
+    strokes::{StrokeFiles, draw_on},
+};
 use crate::{
     bake::{
         BakeSettings,
@@ -14,7 +18,7 @@ use crate::{
     },
     lod::Representation,
     plant::{
-        Gloss, LeafTissue, Plant,
+        Gloss, LeafStrokes, LeafTissue, Plant,
         gltf::{GltfOptions, load_plant, trees_of},
         grow::{GrowParameters, LeafPainting, Rules},
     },
@@ -80,6 +84,8 @@ pub struct Individual {
     pub gloss: Gloss,
     /// The tissue of its leaves; `None` leaves it as the source has it.
     pub tissue: Option<LeafTissue>,
+    /// Strokes on its leaves, with the names of their files.
+    pub strokes: StrokeFiles,
     /// How its foliage is lit.
     pub lighting: LightingSettings,
 }
@@ -90,13 +96,20 @@ impl Individual {
     /// # Errors
     /// Those of [`IndividualSource::build`].
     pub fn build(&self) -> Result<(Plant, Vec<String>), StageError> {
-        let (mut plant, warnings) = self.source.build()?;
+        let (mut plant, mut warnings) = self.source.build()?;
         plant.set_leaf_gloss(self.gloss);
         if let Some(tissue) = self.tissue {
             plant.set_leaf_tissue(tissue);
         }
+        warnings.extend(draw_on(&mut plant, &self.strokes));
         Ok((plant, warnings))
     }
+}
+
+/// The strokes of a species.
+fn strokes(species: &Species) -> Result<StrokeFiles, StageError> {
+    let read = |file: &PathBuf| Ok((file.clone(), Arc::new(LeafStrokes::read(file)?)));
+    species.strokes.iter().map(read).collect()
 }
 
 /// All individuals of a scene, and the species that they belong to.
@@ -119,7 +132,8 @@ pub fn plan(scene: &Scene) -> Result<PlantPlan, StageError> {
         let lighting = species.lighting.as_ref().map_or_else(LightingSettings::default, Lighting::settings);
         let gloss = species.gloss.sanitized();
         let tissue = species.tissue;
-        let individual = |source| Individual { source, gloss, tissue, lighting };
+        let strokes = strokes(species)?;
+        let individual = |source| Individual { source, gloss, tissue, strokes: strokes.clone(), lighting };
         let individuals = sources(species, gloss)?.into_iter().map(individual);
         plan.individuals.extend(individuals);
         plan.variants.push(first as u16..plan.individuals.len() as u16);

@@ -243,6 +243,7 @@ fn shadow(quality: &Quality) -> SunShadowSettings {
         map_size: quality.shadow_map_size,
         cascades: quality.cascades as usize,
         distance: quality.shadow_distance,
+        softness: quality.shadow_softness,
         // A billboard's horizontal plane would draw a line across the crowns of full models.
         proxy_distance: quality.nearest_level_end(),
         ..SunShadowSettings::default()

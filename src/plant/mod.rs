@@ -12,6 +12,7 @@ mod leaf_kind;
 pub mod leaf_textures;
 mod optics;
 pub mod prospect;
+pub mod strokes;
 pub(crate) mod surface;
 pub mod texture;
 mod tissue;
@@ -28,6 +29,7 @@ use serde::{Deserialize, Serialize};
 pub use gloss::{Gloss, lobe_gain, lobe_peak, lobe_room};
 pub use leaf_kind::LeafKind;
 pub use optics::LeafColors;
+pub use strokes::LeafStrokes;
 pub use tissue::{LeafTextures, LeafTissue, Measured};
 
 /// One individual plant in its own frame: metres, Y up, the trunk's foot at the origin.
@@ -136,6 +138,8 @@ pub struct PlantMaterial {
     /// The leaf's tissue. With one, leaves are drawn and traced by the layers of [Franzke 2005, 3.2]; without, light leaves them
     /// the same at every angle.
     pub tissue: Option<LeafTissue>,
+    /// Strokes that styles draw on each leaf. They change no light and no bake.
+    pub strokes: Option<Arc<LeafStrokes>>,
 }
 
 impl PlantMaterial {
@@ -156,6 +160,7 @@ impl Default for PlantMaterial {
             gloss: Gloss::MATT,
             leaf_textures: LeafTextures::default(),
             tissue: None,
+            strokes: None,
         }
     }
 }
@@ -213,6 +218,16 @@ impl Plant {
     /// Number of triangles of the parts of `kind`.
     pub fn triangle_count(&self, kind: PartKind) -> usize {
         self.parts.iter().filter(|part| part.kind == kind).map(|part| part.mesh.triangles.len()).sum()
+    }
+
+    /// Gives `strokes` to the foliage that they name, and says whether there is any.
+    pub fn set_strokes(&mut self, strokes: &Arc<LeafStrokes>) -> bool {
+        let mut found = false;
+        for part in self.parts.iter_mut().filter(|part| strokes.are_on(part)) {
+            part.material.strokes = Some(strokes.clone());
+            found = true;
+        }
+        found
     }
 
     /// Scales the plant about its foot by `factor` (> 0), in place.

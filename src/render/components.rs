@@ -248,12 +248,23 @@ pub struct SunShadowSettings {
     /// Radius in metres around the camera within which plants cast as shadow proxies instead of billboards.
     #[reflect(@Range::factor(0.0..=1e5).unit("m"), @"Radius around the camera within which plants cast as shadow proxies instead of billboards.")]
     pub proxy_distance: f64,
+    /// Half width in metres of the soft edge of shadows on the ground, 0.05 to 20 [Luft 2006, fig. 6 b]: the mean of comparisons over
+    /// a disc [Reeves et al. 1987], whose size does not depend on the map's texels. 0: an edge of three texels, at less cost.
+    #[reflect(@Range::steps(0.0..=20.0, 0.05, 0.5).unit("m"), @"Half width of the soft edge of shadows on the ground; 0: an edge of three texels.")]
+    pub softness: f64,
+}
+
+impl SunShadowSettings {
+    /// The softness as the shader has it: within its range, or 0.
+    pub(crate) fn soft_edge(&self) -> f32 {
+        if self.softness > 0.0 { self.softness.clamp(0.05, 20.0) as f32 } else { 0.0 }
+    }
 }
 
 impl Default for SunShadowSettings {
     /// The settings of a scene with the default quality.
     fn default() -> Self {
-        Self { map_size: 2048, cascades: 4, finest_radius: 30.0, distance: 800.0, proxy_distance: 80.0 }
+        Self { map_size: 2048, cascades: 4, finest_radius: 30.0, distance: 800.0, proxy_distance: 80.0, softness: 0.0 }
     }
 }
 

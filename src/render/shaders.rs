@@ -70,6 +70,7 @@ shader_files! {
     Style = "style/style.wgsl",
     StyleNoise = "style/noise.wgsl",
     StyleEdges = "style/edges.wgsl",
+    StyleStrokes = "style/strokes.wgsl",
     ForestTransfer = "forest/transfer.wgsl",
     CullVolume = "cull/volume.wgsl",
     ForestCrossVariant = "forest/cross_variant.wgsl",

@@ -43,6 +43,9 @@ pub struct Quality {
     pub cascades: u32,
     /// Distance in metres up to which the sun casts shadows, 10 to 20000. Higher: farther, coarser. Default 800.
     pub shadow_distance: f64,
+    /// Half width in metres of the soft edge of shadows on the ground, 0 to 20. Higher: softer. Default 0: an edge of three texels of
+    /// the map.
+    pub shadow_softness: f64,
     /// Distance in metres up to which trees 20 m high are drawn as full models, 0 to 5000. Higher: truer, slower.
     /// Default 60. Beyond are crosses. It counts for a field of view of 50°; others change at the same size in the
     /// picture ([`level_distance`](crate::lod::level_distance)).
@@ -77,6 +80,7 @@ impl Default for Quality {
             shadow_map_size: 2048,
             cascades: 4,
             shadow_distance: 800.0,
+            shadow_softness: 0.0,
             near_distance: 60.0,
             tolerance: None,
             fade_band: 20.0,
@@ -130,6 +134,7 @@ impl Quality {
         }
         check.count("quality.cascades", self.cascades, 1..=4);
         check.number("quality.shadow_distance", self.shadow_distance, 10.0..=20_000.0, "m");
+        check.number("quality.shadow_softness", self.shadow_softness, 0.0..=20.0, "m");
         check.number("quality.near_distance", self.near_distance, 0.0..=5_000.0, "m");
         check.number("quality.tolerance", self.tolerance.unwrap_or_default(), 0.0..=1_000.0, "");
         check.number("quality.fade_band", self.fade_band, 0.1..=1_000.0, "m");

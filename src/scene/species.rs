@@ -36,6 +36,10 @@ pub struct Species {
     /// `Thin` for a plant from a file.
     #[serde(default)]
     pub leaf: Option<LeafKind>,
+    /// Files of strokes drawn by hand on its leaves, relative to the scene file ([`LeafStrokes`](crate::plant::LeafStrokes)): styles show
+    /// them. Of two files that name the same material the later one counts. Default: none.
+    #[serde(default)]
+    pub strokes: Vec<PathBuf>,
     /// Range of heights in metres, `(lowest, highest)`, each 0.1 to 150. Default (16, 26).
     #[serde(default = "default_height")]
     pub height: (f64, f64),
@@ -172,6 +176,7 @@ impl Species {
             gloss: Gloss::default(),
             tissue: None,
             leaf: None,
+            strokes: Vec::new(),
             height: default_height(),
             elevation: None,
             slope_limit: ninety(),
@@ -209,6 +214,9 @@ impl Species {
         if let Some(tissue) = &self.tissue {
             check_tissue(tissue, &format!("{at}.tissue"), check);
         }
+        for (number, file) in self.strokes.iter().enumerate() {
+            check.path(&format!("{at}.strokes[{number}]"), file);
+        }
         check.number(&format!("{at}.slope_limit"), self.slope_limit, 0.0..=90.0, "degrees");
         if let Some(radius) = self.trunk_radius {
             check.number(&format!("{at}.trunk_radius"), radius, 0.001..=10.0, "m");
@@ -232,6 +240,7 @@ impl Species {
     }
 
     pub(super) fn resolve(&mut self, folder: &Path) {
+        self.strokes.iter_mut().for_each(|file| *file = folder.join(&file));
         match &mut self.plant {
             PlantSource::Grown(GrownPlants { form: GrownForm::File(path), .. }) => *path = folder.join(&path),
             PlantSource::Grown(_) => {}

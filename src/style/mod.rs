@@ -26,4 +26,4 @@ pub mod wash;
 pub use palette::{Palette, PaletteError};
 pub use paper::Paper;
 pub use ramp::Ramp;
-pub use settings::{LineNormals, Lines, Style, Toon, Watercolour};
+pub use settings::{LineNormals, Lines, NoiseAnchor, Style, Toon, Watercolour};

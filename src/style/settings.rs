@@ -63,6 +63,9 @@ pub struct Watercolour {
     /// How much the distance fades, 0 to 1. Default 0.7.
     #[reflect(@Range::fraction(0.0..=1.0), @"How much the distance fades.")]
     pub air: f32,
+    /// To what the unevenness of the paint is fixed. Default `Scene`.
+    #[reflect(@"To what the unevenness of the paint is fixed.")]
+    pub noise: NoiseAnchor,
     /// Width of the unpainted margin as a fraction of the picture's height, 0 to 0.3. Default 0.
     #[reflect(@Range::fraction(0.0..=0.3), @"Unpainted margin.")]
     pub margin: f32,
@@ -83,9 +86,22 @@ impl Default for Watercolour {
             dabs: 1.0,
             sketch: 0.5,
             air: 0.7,
+            noise: NoiseAnchor::default(),
             margin: 0.0,
         }
     }
+}
+
+/// To what noise and the trembling of lines are fixed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Reflect)]
+pub enum NoiseAnchor {
+    /// To the scene, with the same size on paper at every distance [Bénard 2009]: nothing swims when the camera moves.
+    #[default]
+    Scene,
+    /// To the page: for stills. In a film the scene moves behind it as behind the glass of a shower door.
+    Page,
+    /// To the scene, with the same size in metres at every distance: fine far away, coarse near.
+    Solid,
 }
 
 /// Which normals contours are found in [Luft 2007, fig. 7].
@@ -123,6 +139,9 @@ pub struct Lines {
     /// Which normals are used. Default `Scaled`.
     #[reflect(@"Normals in which contours are found.")]
     pub normals: LineNormals,
+    /// To what the trembling of the pen is fixed. Default `Scene`.
+    #[reflect(@"To what the trembling of the pen is fixed.")]
+    pub noise: NoiseAnchor,
     /// Hatching of what lies in shade, 0 to 1. Default 0.5.
     #[reflect(@Range::fraction(0.0..=1.0), @"Hatching of what lies in shade.")]
     pub hatching: f32,
@@ -137,6 +156,7 @@ impl Default for Lines {
             detail: 1.0,
             simplification: 1.6,
             normals: LineNormals::default(),
+            noise: NoiseAnchor::default(),
             hatching: 0.5,
         }
     }

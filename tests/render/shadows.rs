@@ -40,7 +40,14 @@ fn lit(renderer: &mut Renderer, view: &Viewpoint, light: Daylight, shadow: SunSh
 }
 
 fn settings(cascades: usize) -> SunShadowSettings {
-    SunShadowSettings { map_size: 1024, cascades, finest_radius: 100.0, distance: 100.0, proxy_distance: 0.0 }
+    SunShadowSettings {
+        map_size: 1024,
+        cascades,
+        finest_radius: 100.0,
+        distance: 100.0,
+        proxy_distance: 0.0,
+        softness: 0.0,
+    }
 }
 
 #[track_caller]
@@ -133,4 +140,46 @@ fn a_kept_shadow_is_the_one_that_would_be_drawn() {
     // A sun that moved is seen.
     draw(&mut kept, stage, &aside, "2026-06-21T12:40+01:00");
     assert_eq!(ran(&kept.explain()), 2, "{:?}", kept.explain());
+}
+
+#[test]
+fn a_soft_shadow_keeps_its_light_and_has_the_edge_that_it_was_given() {
+    let gpu = gpu();
+    let built = trees_at(&[DVec2::ZERO], 1);
+    let from = from_above(&built.stage);
+    let mut renderer = Renderer::new((480, 270), None, 1).expect("a renderer");
+    let unseen = Forest { view_distance: -1.0, ..built.stage.forest().expect("a forest") };
+    renderer.app().world_mut().spawn(unseen);
+    renderer.app().world_mut().spawn(canopy::render::components::Ground { cover: None, ..built.stage.ground() });
+    let light = daylight(180.0, 40.0);
+    let without = lit(&mut renderer, &from, light.clone(), settings(0));
+    let mut shadow = |softness: f64, cascades: usize| -> Vec<f64> {
+        let with = lit(&mut renderer, &from, light.clone(), SunShadowSettings { softness, ..settings(cascades) });
+        keep(&with, &format!("shadow-soft-{softness}-{cascades}"));
+        let lost = |(with, without): (&[u8], &[u8])| {
+            1.0 - (luminance(linear(with)) / luminance(linear(without)).max(1e-6)).min(1.0)
+        };
+        with.pixels.chunks(3).zip(without.pixels.chunks(3)).map(lost).collect()
+    };
+    // The greatest step between neighbours of a row, and the sum.
+    let of = |lost: &[f64]| {
+        let step =
+            lost.chunks(480).flat_map(|row| row.windows(2)).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
+        (step, lost.iter().sum::<f64>())
+    };
+    let (sharp, whole) = of(&shadow(0.0, 1));
+    for cascades in [1, 2] {
+        let mut last = sharp;
+        for softness in [0.5, 1.5] {
+            let (step, sum) = of(&shadow(softness, cascades));
+            println!(
+                "{softness} m, {cascades} maps: greatest step {step:.3} of {sharp:.3}, light lost {:.3}",
+                sum / whole
+            );
+            assert!(step < 0.8 * last, "{softness} m: {step} after {last}");
+            assert!((sum / whole - 1.0).abs() < 0.05, "{softness} m: {sum} of {whole}");
+            last = step;
+        }
+    }
+    assert_eq!(gpu.messages(), Vec::<String>::new());
 }

@@ -258,3 +258,52 @@ fn an_orbit_is_as_calm_in_watercolour_as_in_the_photograph() {
     assert!(restless > 0.5 * painted, "{restless} is no control");
     assert_eq!(gpu.messages(), Vec::<String>::new());
 }
+
+/// A leaf half a metre high in front of the camera, with a file of strokes or without.
+fn leaf(strokes: Option<&str>) -> crate::support::stage::Built {
+    let quality = quality(1);
+    let named = strokes.map_or("", |_| "strokes: [\"leaf.strokes.ron\"],");
+    build(
+        &format!(
+            "(seed: 36183, terrain: Flat(size: 200), species: [(name: \"leaf\", plant: Grown(form: House(Leaf), individuals: 1), \
+             {named} height: (0.48, 0.48))], trees: Inventory(path: \"trees.csv\"), {PLACE}, {quality})"
+        ),
+        &[("trees.csv", b"x,y\n0,0\n"), ("leaf.strokes.ron", strokes.unwrap_or("(strokes: [])").as_bytes())],
+    )
+}
+
+#[test]
+fn strokes_on_a_leaf_are_seen_near_in_all_styles_and_in_no_photograph() {
+    let gpu = gpu();
+    let cross = "(materials: [\"Leaf\"], strokes: [(points: [(0.5, 0.1), (0.5, 0.9)], width: (0.04, 0.04)), \
+                 (points: [(0.2, 0.5), (0.8, 0.5)], width: (0.04, 0.04)), (points: [(0.5, 1.5)])])";
+    let (plain, drawn) = (leaf(None), leaf(Some(cross)));
+    assert!(drawn.warnings.iter().any(|what| what.contains("1 of 5 points")), "{:?}", drawn.warnings);
+    let misnamed = leaf(Some("(materials: [\"petal\"], strokes: [])"));
+    assert!(misnamed.warnings.iter().any(|what| what.contains("called `petal`") && what.contains("`leaf`")));
+    let (mut without, mut with) = (showing(&plain.stage), showing(&drawn.stage));
+    let mut darker = |style: CanopyStyle, distance: f64, name: &str| {
+        let mut seen =
+            [(&mut without, &plain.stage), (&mut with, &drawn.stage)].into_iter().map(|(renderer, stage)| {
+                renderer.set_style(style.clone());
+                let picture = draw(renderer, stage, &view(stage, (0.0, 0.35, distance), 0.0, -10.0), NOON);
+                keep(&picture, &format!("strokes-{name}-{distance}-{}", std::ptr::eq(stage, &drawn.stage)));
+                picture
+            });
+        let (Some(without), Some(with)) = (seen.next(), seen.next()) else { unreachable!() };
+        let darker = |(without, with): (&u8, &u8)| i16::from(*without) - i16::from(*with) > 40;
+        without.pixels.iter().zip(&with.pixels).filter(|pair| darker(*pair)).count() / 3
+    };
+    for (name, style) in [
+        ("watercolour", watercolour(|_| ())),
+        ("lines", styled(Style::Lines(Lines::default()))),
+        ("toon", styled(Style::Toon(Toon::default()))),
+    ] {
+        let (near, far) = (darker(style.clone(), 0.45, name), darker(style, 30.0, name));
+        println!("{name}: {near} pixels darker near, {far} far");
+        assert!(near > 100, "{name}: only {near} pixels are darker");
+        assert_eq!(far, 0, "{name}");
+    }
+    assert_eq!(darker(CanopyStyle::default(), 0.45, "photograph"), 0);
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}

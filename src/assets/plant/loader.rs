@@ -3,6 +3,7 @@
 use std::{
     io,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use bevy::{
@@ -16,8 +17,9 @@ use super::{
     recipe::{Individual, Recipe},
 };
 use crate::{
-    assets::{background, read},
+    assets::{background, read, strokes::StrokeFiles},
     plant::{
+        LeafStrokes,
         gltf::{ExternalFiles, GltfOptions, external_files},
         grow::{GrowParameters, LeafPainting, Rules},
     },
@@ -117,7 +119,13 @@ async fn species(
             individuals
         }
     };
-    Ok(Recipe::species(&species, individuals, settings))
+    let mut strokes = StrokeFiles::new();
+    for file in &species.strokes {
+        let bytes = read::beside(context, file).await.map_err(|source| unreadable(file, source))?;
+        let read = LeafStrokes::parse(&text(&bytes, file)?, &file.display().to_string())?;
+        strokes.push((file.clone(), Arc::new(read)));
+    }
+    Ok(Recipe::species(&species, individuals, strokes, settings))
 }
 
 /// The files that the glTF file `path` names. An unreadable file is not an error yet: it may be a texture.

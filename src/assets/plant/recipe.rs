@@ -4,7 +4,10 @@ use std::path::{Path, PathBuf};
 
 use super::{Growth, PlantAsset, PlantSettings, StageError};
 use crate::{
-    assets::background::Wanted,
+    assets::{
+        background::Wanted,
+        strokes::{StrokeFiles, draw_on},
+    },
     plant::{
         Plant,
         gltf::{ExternalFiles, GltfOptions, load_plant_bytes},
@@ -20,6 +23,8 @@ pub struct Recipe {
     pub individuals: Vec<Individual>,
     pub settings: PlantSettings,
     pub growth: Growth,
+    /// Strokes on its leaves.
+    pub strokes: StrokeFiles,
     pub warnings: Vec<String>,
 }
 
@@ -71,12 +76,18 @@ impl Recipe {
             }],
             settings: settings.clone(),
             growth: Growth::default(),
+            strokes: StrokeFiles::new(),
             warnings: Vec::new(),
         }
     }
 
     /// The plants of a species, `individuals`, whose own lighting and gloss replace those of `settings`.
-    pub fn species(species: &Species, individuals: Vec<Individual>, settings: &PlantSettings) -> Self {
+    pub fn species(
+        species: &Species,
+        individuals: Vec<Individual>,
+        strokes: StrokeFiles,
+        settings: &PlantSettings,
+    ) -> Self {
         let mut settings = PlantSettings { gloss: species.gloss.sanitized(), ..settings.clone() };
         settings.tissue = species.tissue.or(settings.tissue);
         if let Some(lighting) = &species.lighting {
@@ -95,12 +106,17 @@ impl Recipe {
             slope_limit: species.slope_limit,
             trunk_radius: species.trunk_radius,
         };
-        Self { name: species.name.clone(), individuals, settings, growth, warnings }
+        Self { name: species.name.clone(), individuals, settings, growth, strokes, warnings }
     }
 
     /// Builds and bakes the plant.
     pub fn bake(self, wanted: &Wanted) -> Result<PlantAsset, StageError> {
-        let plants = self.individuals.iter().map(Individual::make).collect::<Result<_, _>>()?;
+        let make = |individual: &Individual| {
+            let (mut plant, mut warnings) = individual.make()?;
+            warnings.extend(draw_on(&mut plant, &self.strokes));
+            Ok::<_, StageError>((plant, warnings))
+        };
+        let plants = self.individuals.iter().map(make).collect::<Result<_, _>>()?;
         let mut asset = PlantAsset::baked(self.name, plants, &self.settings, &|| wanted.is_wanted());
         if asset.individuals.len() < self.individuals.len() {
             return Err(StageError::Cancelled);

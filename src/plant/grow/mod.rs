@@ -158,6 +158,7 @@ pub fn grow_painted(
     let bark = textures::bark(species.bark.kind);
     let cluster = textures::cluster(species.leaves.shape);
     let mut leaf = PlantMaterial {
+        name: "leaf".into(),
         base_color: individual_tint(species, &mut random.split(3)),
         base_color_texture: Some(cluster),
         alpha_cutoff: 0.5,
@@ -175,6 +176,7 @@ pub fn grow_painted(
                 kind: PartKind::Wood,
                 mesh: wood,
                 material: PlantMaterial {
+                    name: "bark".into(),
                     base_color: Vec3::from(species.bark.tint),
                     base_color_texture: Some(bark.color),
                     normal_texture: Some(bark.normal),

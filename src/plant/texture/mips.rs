@@ -88,6 +88,17 @@ pub fn normal_mips(image: &RgbaImage) -> MipChain {
     chain
 }
 
+/// Mips of an image whose channels are linear values without a meaning to each other, such as coverages: each averaged alone.
+pub fn linear_mips(image: &RgbaImage) -> MipChain {
+    let values =
+        image.as_raw().par_chunks_exact(4).map(|t| [t[0], t[1], t[2], t[3]].map(|byte| f32::from(byte) / 255.0));
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    build(image, Layer { width, height, texels: values.collect() }, |layer| {
+        let encoded: Vec<[u8; 4]> = layer.texels.par_iter().map(|texel| texel.map(unorm8)).collect();
+        encoded.into_flattened()
+    })
+}
+
 /// Halves `layer` down to 1x1; level 0 keeps the bytes of `image`, the others come from `encode`.
 fn build(image: &RgbaImage, mut layer: Layer, encode: impl Fn(&Layer) -> Vec<u8>) -> MipChain {
     let mut chain = MipChain { width: image.width(), height: image.height(), levels: vec![image.as_raw().clone()] };

@@ -27,4 +27,4 @@ mod mips;
 pub use dilate::dilate_colors;
 pub use distance::{NearestSites, nearest_sites};
 pub use fade::{AlphaFade, fade_alpha};
-pub use mips::{alpha_tested_mips, color_mips, leaf_mips, normal_mips};
+pub use mips::{alpha_tested_mips, color_mips, leaf_mips, linear_mips, normal_mips};

@@ -233,7 +233,8 @@ fn prepare_bind_group(
         ground: placement.ground,
         cascade_count: placement.cascade_count as i32,
         inverse_map_size: 1.0 / placement.shadow_map_size.max(1) as f32,
-        padding: [0.0; 2],
+        softness: scene.shadow.soft_edge(),
+        padding: 0.0,
     };
     queue.write_buffer(&buffers.frame, 0, bytemuck::bytes_of(&frame_uniform));
     queue.write_buffer(&buffers.light, 0, bytemuck::bytes_of(&light_uniform));

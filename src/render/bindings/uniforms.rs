@@ -106,8 +106,10 @@ pub struct ShadowUniform {
     pub cascade_count: i32,
     /// One over the map's size in texels.
     pub inverse_map_size: f32,
+    /// Half width in metres of the soft edge of shadows on the ground.
+    pub softness: f32,
     /// WGSL rounds the size up to 16 bytes.
-    pub padding: [f32; 2],
+    pub padding: f32,
 }
 
 /// `CascadeView` of `shaders/sun_shadow/caster.wgsl`.

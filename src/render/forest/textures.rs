@@ -10,7 +10,7 @@ use bevy::{
 use crate::{
     bake::textures::{FilteredTexture, PartTextures},
     math::{MipView, color::srgb8},
-    plant::{PartKind, PlantMaterial},
+    plant::{LeafStrokes, PartKind, PlantMaterial},
     render::{
         forest::upload::ForestUpload,
         gpu::{self, Gpu},
@@ -22,8 +22,12 @@ use crate::{
 pub struct TextureCache {
     /// By address; one texture has one use.
     views: HashMap<*const FilteredTexture, TextureView>,
+    /// Strokes by address.
+    strokes: HashMap<*const LeafStrokes, TextureView>,
     /// Bound if a material has no normal map, and never sampled.
     no_normals: Option<TextureView>,
+    /// Bound if a material has no strokes.
+    no_strokes: Option<TextureView>,
 }
 
 impl TextureCache {
@@ -70,6 +74,24 @@ impl TextureCache {
             None => {
                 let flat = || plain("canopy_flat", format, [128, 128, 255, 255], upload.gpu);
                 self.no_normals.get_or_insert_with(flat).clone()
+            }
+        }
+    }
+
+    /// Strokes on leaves. Without any: an empty texel that all materials share.
+    pub fn strokes(&mut self, material: &PlantMaterial, upload: &mut ForestUpload) -> TextureView {
+        let (format, gpu) = (TextureFormat::Rgba8Unorm, upload.gpu);
+        match &material.strokes {
+            Some(strokes) => {
+                let new = || {
+                    let mips = strokes.texture();
+                    gpu::texture(&gpu.device, &gpu.queue, "canopy_leaf_strokes", format, mips.view(), 1)
+                };
+                self.strokes.entry(Arc::as_ptr(strokes)).or_insert_with(new).clone()
+            }
+            None => {
+                let empty = || plain("canopy_no_strokes", format, [0, 0, 0, 255], gpu);
+                self.no_strokes.get_or_insert_with(empty).clone()
             }
         }
     }

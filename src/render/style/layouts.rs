@@ -107,7 +107,19 @@ pub fn picture_layout(picture: Picture) -> BindGroupLayoutDescriptor {
         .to_vec(),
         Picture::Lines | Picture::Toon => BindGroupLayoutEntries::sequential(
             ShaderStages::FRAGMENT,
-            (uniform, depth, map(), map(), map(), map(), map(), map(), filtering(), filtering()),
+            (
+                uniform,
+                depth,
+                map(),
+                map(),
+                map(),
+                map(),
+                map(),
+                map(),
+                filtering(),
+                filtering(),
+                texture_2d(TextureSampleType::Uint),
+            ),
         )
         .to_vec(),
     };

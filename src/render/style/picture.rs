@@ -75,6 +75,7 @@ pub fn picture_pass(
                 &of.ramps,
                 &inputs.linear,
                 &inputs.repeating,
+                &maps.identities,
             )),
         ),
     };

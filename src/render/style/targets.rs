@@ -27,8 +27,8 @@ use crate::style::{Style, Watercolour, layers};
 
 /// Format of normals, of light and of what is blurred of both.
 pub const MAP_FORMAT: TextureFormat = TextureFormat::Rgba16Float;
-/// Format of identifiers.
-pub const IDENTITY_FORMAT: TextureFormat = TextureFormat::Rg8Uint;
+/// Format of identifiers, with the strokes on leaves.
+pub const IDENTITY_FORMAT: TextureFormat = TextureFormat::Rgba8Uint;
 /// Format of albedo.
 pub const COLOR_FORMAT: TextureFormat = TextureFormat::Rgba8UnormSrgb;
 /// Format of four layers' intensities.
@@ -66,7 +66,7 @@ pub struct StyleMaps {
     pub depth: TextureView,
     /// Normal times ambient visibility, height above the ground.
     pub surfaces: TextureView,
-    /// Layer, number of the tree.
+    /// Layer, number of the tree, strokes.
     pub identities: TextureView,
     /// Albedo.
     pub colors: TextureView,

@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use crate::{
     render::{components::DrawnStyle, view::PreparedView},
-    style::{LineNormals, Style, Watercolour, anchor::anchor},
+    style::{LineNormals, NoiseAnchor, Style, Watercolour, anchor::anchor},
 };
 
 /// `Style` of `shaders/style/style.wgsl`.
@@ -60,6 +60,10 @@ pub struct StyleUniform {
     pub scaled_normals: f32,
     /// How far foliage takes on the colour of the scene's own leaves.
     pub scene: f32,
+    /// As [`NoiseAnchor`], in its order.
+    pub noise_anchor: u32,
+    /// WGSL rounds the size up to 16 bytes.
+    pub padding: [u32; 3],
 }
 
 /// `Layer` of `shaders/style/watercolor.wgsl`.
@@ -166,12 +170,14 @@ impl StyleUniform {
                     dabs,
                     shadow,
                     shadow_softness,
+                    noise_anchor: number(w.noise),
                     ..uniform
                 };
             }
             Style::Lines(l) => {
                 lines(l.width, l.detail, l.normals);
                 uniform.hatching = l.hatching;
+                uniform.noise_anchor = number(l.noise);
                 uniform.shadow_softness = 2.0;
             }
             Style::Toon(t) => {
@@ -181,6 +187,14 @@ impl StyleUniform {
             }
         }
         uniform
+    }
+}
+
+fn number(anchor: NoiseAnchor) -> u32 {
+    match anchor {
+        NoiseAnchor::Scene => 0,
+        NoiseAnchor::Page => 1,
+        NoiseAnchor::Solid => 2,
     }
 }
 

@@ -16,6 +16,8 @@ use super::drape::DrapeUniform;
 pub const DRAPE: &str = "DRAPE";
 /// Shader definition of ground with far forest as a surface over it.
 pub const FOREST_SURFACE: &str = "FOREST_SURFACE";
+/// Shader definition of ground whose shadows have soft edges.
+const SOFT_SHADOW: &str = "SOFT_SHADOW";
 
 /// Group 1: vertices, tiles; with a photograph over them also its place, its texture and how it is sampled.
 pub fn terrain_layout(draped: bool) -> BindGroupLayoutDescriptor {
@@ -41,12 +43,14 @@ pub struct GroundFeatures {
     pub draped: bool,
     /// Far forest is drawn as a surface over it.
     pub forest_surface: bool,
+    /// Shadows on it have soft edges; not in styles, which have their own.
+    pub soft_shadow: bool,
 }
 
 impl GroundFeatures {
     /// The shader definitions.
     pub fn defs(self) -> Vec<ShaderDefVal> {
-        let defs = [(DRAPE, self.draped), (FOREST_SURFACE, self.forest_surface)];
+        let defs = [(DRAPE, self.draped), (FOREST_SURFACE, self.forest_surface), (SOFT_SHADOW, self.soft_shadow)];
         defs.into_iter().filter(|(_, wanted)| *wanted).map(|(name, _)| name.into()).collect()
     }
 }

@@ -21,6 +21,7 @@ use super::{
 
 use crate::render::{
     bindings::frame_layout,
+    extract::ExtractedScene,
     gpu::opaque_depth,
     shaders::{CanopyShaders, ShaderFile},
     view::{PreparedFrame, ViewFormat},
@@ -57,6 +58,7 @@ pub struct CurrentTerrainPipeline(pub Option<CachedRenderPipelineId>);
 
 /// Requests the pipeline that the view needs.
 pub fn prepare_pipeline(
+    scene: Res<ExtractedScene>,
     frame: Res<PreparedFrame>,
     pipeline: Res<TerrainPipeline>,
     terrain: Res<GpuTerrain>,
@@ -65,5 +67,7 @@ pub fn prepare_pipeline(
     mut current: ResMut<CurrentTerrainPipeline>,
 ) {
     let photographed = frame.view.as_ref().filter(|view| !view.styled);
-    current.0 = photographed.map(|view| pipelines.specialize(&cache, &pipeline, (view.attachment, terrain.features)));
+    let soft_shadow = scene.shadow.soft_edge() > 0.0 && scene.shadow.cascades > 0;
+    let features = GroundFeatures { soft_shadow, ..terrain.features };
+    current.0 = photographed.map(|view| pipelines.specialize(&cache, &pipeline, (view.attachment, features)));
 }

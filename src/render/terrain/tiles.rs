@@ -184,7 +184,11 @@ pub fn prepare_tiles(
     if let (Some(known), Some(drape)) = (&gpu.drape, &ground.drape) {
         known.place(&queue, camera, drape.brightness);
     }
-    gpu.features = GroundFeatures { draped: gpu.drape.is_some(), forest_surface: ground.forest_surface.is_some() };
+    gpu.features = GroundFeatures {
+        draped: gpu.drape.is_some(),
+        forest_surface: ground.forest_surface.is_some(),
+        soft_shadow: false,
+    };
     let tiles =
         BindGroupEntries::sequential((cache.vertices.as_entire_binding(), gpu.tiles.buffer().as_entire_binding()));
     let mut entries = tiles.to_vec();

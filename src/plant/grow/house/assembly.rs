@@ -87,6 +87,7 @@ impl Blade {
         let measured = if stamped { Measured::Leaf } else { Measured::Texel };
         let through = layers.transmission.clone();
         let mut material = PlantMaterial {
+            name: "leaf".into(),
             base_color_texture: Some(front),
             normal_texture: Some(normal),
             gloss,
@@ -107,12 +108,20 @@ impl Matter {
             Self::Stone(stone) => {
                 let repeats = 1.0 / stone.metres();
                 mesh.uvs.iter_mut().for_each(|uv| *uv *= repeats);
-                let material = PlantMaterial { base_color_texture: Some(masonry(*stone)), ..PlantMaterial::default() };
+                let material = PlantMaterial {
+                    name: "stone".into(),
+                    base_color_texture: Some(masonry(*stone)),
+                    ..PlantMaterial::default()
+                };
                 (PartKind::Wood, material)
             }
-            Self::Stem(color) => (PartKind::Wood, PlantMaterial { base_color: *color, ..PlantMaterial::default() }),
+            Self::Stem(color) => {
+                let material = PlantMaterial { name: "stem".into(), base_color: *color, ..PlantMaterial::default() };
+                (PartKind::Wood, material)
+            }
             Self::Petal(color) => {
                 let material = PlantMaterial {
+                    name: "petal".into(),
                     base_color: *color,
                     transmission: Vec3::splat(0.7),
                     gloss: Gloss { reflectance: 0.02, roughness: 0.6 },

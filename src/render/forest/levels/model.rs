@@ -145,7 +145,8 @@ fn part_of(features: u32) -> (PartSurface, PartLight) {
     (PartSurface::ALL[features / lights % PartSurface::ALL.len()], PartLight::ALL[features % lights])
 }
 
-/// Group 2: colour, normals, sampler, material, and what only leaves with layers sample: back and transmission.
+/// Group 2: colour, normals, sampler, material; what only leaves with layers sample: back and transmission; what only styles sample:
+/// strokes.
 fn part_layout() -> BindGroupLayoutDescriptor {
     let float = TextureSampleType::Float { filterable: true };
     BindGroupLayoutDescriptor::new(
@@ -157,6 +158,7 @@ fn part_layout() -> BindGroupLayoutDescriptor {
                 texture_2d(float),
                 sampler(SamplerBindingType::Filtering),
                 uniform_buffer_sized(false, std::num::NonZeroU64::new(size_of::<PartUniform>() as u64)),
+                texture_2d(float),
                 texture_2d(float),
                 texture_2d(float),
             ),
@@ -443,6 +445,7 @@ fn upload_parts(
         let normal = textures.normal(filtered, upload);
         let back = textures.back(filtered, &color, upload);
         let transmission = textures.transmission(filtered, material, upload);
+        let strokes = textures.strokes(material, upload);
         let bind_group = gpu.bind_group(
             "canopy_plant_part",
             &part_layout(),
@@ -453,6 +456,7 @@ fn upload_parts(
                 uniform.as_entire_binding(),
                 &back,
                 &transmission,
+                &strokes,
             )),
         );
         parts.push(GpuPart {
