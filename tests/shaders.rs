@@ -393,6 +393,7 @@ fn gpu_structs_are_what_the_shaders_think() {
             scaled_normals,
             scene,
             noise_anchor,
+            textures,
         }
     );
     twin!(layouts, "Layer", LayerUniform { threshold, softness, edge, foliage });

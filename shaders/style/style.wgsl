@@ -36,6 +36,8 @@ struct Style {
     scene: f32,
     // What noise is fixed to: 0 the scene, 1 the page, 2 the scene with one size in metres.
     noise_anchor: u32,
+    // How much of the textures of near plants is painted.
+    textures: f32,
 }
 
 @group(1) @binding(0) var<uniform> style: Style;

@@ -34,6 +34,8 @@ struct Layer {
 @group(1) @binding(12) var soft_dabs: texture_2d<f32>;
 // Albedo, and how much of a pixel has one.
 @group(1) @binding(13) var soft_colors: texture_2d<f32>;
+// The same as seen.
+@group(1) @binding(14) var colors: texture_2d<f32>;
 
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> FullScreen {
@@ -77,6 +79,20 @@ fn glaze(under: vec3<f32>, transmittance: vec3<f32>, density: f32, amount: f32) 
     return mix(under, under * pow(max(transmittance, vec3(1e-3)), vec3(density)), saturate(amount));
 }
 
+// Intensities (dark, medium, bright) of a texture whose mean luminance around `uv` is `mean`: its luminance in three steps, as an
+// intensity texture that is made of a plant's colours [Luft 2006, 4.3].
+fn texture_intensities(uv: vec2<f32>, mean: f32) -> vec3<f32> {
+    let reach = 0.7 * style.unit / style.size;
+    var luminance = 0.0;
+    for (var i = 0; i < 4; i += 1) {
+        let corner = vec2(f32(i & 1), f32(i >> 1u)) * 2.0 - 1.0;
+        luminance += 0.25 * dot(textureSampleLevel(colors, linear_sampler, uv + corner * reach, 0.0).rgb, LUMINANCE);
+    }
+    let share = luminance / max(mean, 1e-3);
+    let dark = 1.0 - smoothstep(0.40, 0.55, share);
+    return vec3(dark, (1.0 - smoothstep(0.70, 0.85, share)) * (1.0 - dark), smoothstep(1.25, 1.5, share));
+}
+
 @fragment
 fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     // The page, in pixels of a picture of 720 lines.
@@ -116,7 +132,12 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     // something farther [Luft, Colditz, Deussen 2006, unsharp masking of the depth].
     let form = saturate((mix(soft.x, wide.x, 0.25) + 0.5 * (soft.x - wide.x) - 0.20) / 0.62);
     let drawn = contour(soft_normals, soft_lights, linear_sampler, uv, style.line_width);
-    let particles = textureSampleLevel(soft_dabs, linear_sampler, uv, 0.0).rgb;
+    let seen_color = textureSampleLevel(soft_colors, linear_sampler, uv, 0.0);
+    let albedo = seen_color.rgb / max(seen_color.a, 1e-3);
+    // Textures are painted where a leaf is larger than a dab of the brush.
+    let close = style.textures * (1.0 - smoothstep(0.18, 0.32, soft.z)) * f32(!sky);
+    let intensities = close * texture_intensities(uv, dot(albedo, LUMINANCE));
+    let particles = saturate(textureSampleLevel(soft_dabs, linear_sampler, uv, 0.0).rgb + intensities);
     // Bright dabs are left out of the washes, as paper that masking fluid has kept.
     let kept = smoothstep(0.30, 0.62, particles.z + 0.25 * (height - 0.5) - 0.5 * soft.y) * saturate(style.dabs);
     let step = wide.z - soft.z;
@@ -124,8 +145,6 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let behind = smoothstep(0.002, 0.03, -step);
 
     // The hue of the scene's own leaves and petals.
-    let seen_color = textureSampleLevel(soft_colors, linear_sampler, uv, 0.0);
-    let albedo = seen_color.rgb / max(seen_color.a, 1e-3);
     let hue = albedo / max(dot(albedo, LUMINANCE), 1e-4);
 
     var color = style.paper * (1.0 + 0.10 * relief);

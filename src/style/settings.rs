@@ -57,6 +57,9 @@ pub struct Watercolour {
     /// Strength of the dabs of foliage, 0 to 2. Default 1.
     #[reflect(@Range::steps(0.0..=2.0, 0.1, 0.02), @"Dabs of foliage over the washes.")]
     pub dabs: f32,
+    /// How much of the textures of near plants is painted, in three intensities [Luft 2006, 4.3], 0 to 1. Default 0.7.
+    #[reflect(@Range::fraction(0.0..=1.0), @"Textures of near plants, in three intensities.")]
+    pub textures: f32,
     /// Strength of the pencil drawing under the paint, 0 to 2. Default 0.5.
     #[reflect(@Range::steps(0.0..=2.0, 0.1, 0.02), @"The pencil drawing under the paint.")]
     pub sketch: f32,
@@ -84,6 +87,7 @@ impl Default for Watercolour {
             shadow: 1.0,
             shadow_softness: 2.0,
             dabs: 1.0,
+            textures: 0.7,
             sketch: 0.5,
             air: 0.7,
             noise: NoiseAnchor::default(),
@@ -266,6 +270,7 @@ impl Style {
                 ("shadow", w.shadow, 0.0..=2.0),
                 ("shadow_softness", w.shadow_softness, 0.0..=20.0),
                 ("dabs", w.dabs, 0.0..=2.0),
+                ("textures", w.textures, 0.0..=1.0),
                 ("sketch", w.sketch, 0.0..=2.0),
                 ("air", w.air, 0.0..=1.0),
                 ("margin", w.margin, 0.0..=0.3),

@@ -102,6 +102,7 @@ pub fn picture_layout(picture: Picture) -> BindGroupLayoutDescriptor {
                 filtering(),
                 map(),
                 map(),
+                map(),
             ),
         )
         .to_vec(),

@@ -59,6 +59,7 @@ pub fn picture_pass(
                 &inputs.repeating,
                 &maps.soft_dabs,
                 &maps.soft_colors,
+                &maps.colors,
             )),
         ),
         Picture::Lines | Picture::Toon => device.create_bind_group(

@@ -62,8 +62,10 @@ pub struct StyleUniform {
     pub scene: f32,
     /// As [`NoiseAnchor`], in its order.
     pub noise_anchor: u32,
+    /// As [`Watercolour::textures`].
+    pub textures: f32,
     /// WGSL rounds the size up to 16 bytes.
-    pub padding: [u32; 3],
+    pub padding: [u32; 2],
 }
 
 /// `Layer` of `shaders/style/watercolor.wgsl`.
@@ -171,6 +173,7 @@ impl StyleUniform {
                     shadow,
                     shadow_softness,
                     noise_anchor: number(w.noise),
+                    textures: w.textures,
                     ..uniform
                 };
             }
