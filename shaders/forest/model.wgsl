@@ -167,7 +167,7 @@ fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index
     out.identity.x = variants[tree.variant].foliage_layer;
 #ifndef OWN_NORMALS
     let crown = crown_surface(position.relative, crown_of(tree));
-    let realigned = variants[tree.variant].realigned > 0.5;
+    let realigned = part.realigned > 0.5;
     out.normal = select(crown.xyz, out.normal, realigned);
     out.look.x = select(crown.w, ambient, realigned);
 #endif

@@ -210,16 +210,21 @@ fn individuals(path: &Path, options: &GltfOptions) -> Vec<IndividualSource> {
 /// representations only for a scene that draws them.
 pub fn bake_settings(quality: &Quality, lighting: LightingSettings) -> BakeSettings {
     const MODEL: Representation = Representation::MODEL;
-    const THINNED: Representation = Representation::THINNED;
-    const CLOUD: Representation = Representation::CLOUD;
     const CROSS: Representation = Representation::CROSS;
+    const THINNED: Representation = Representation::THINNED;
+    const SURFACE: Representation = Representation::SURFACE;
+    const CLOUD: Representation = Representation::CLOUD;
     let drawn = quality.lod_levels();
     let draws = |representation| drawn.representations().contains(&representation);
-    let representations: &'static [Representation] = match (draws(THINNED), draws(CLOUD)) {
-        (false, false) => levels::DEFAULT,
-        (true, false) => &[MODEL, CROSS, THINNED],
-        (false, true) => &[MODEL, CROSS, CLOUD],
-        (true, true) => &[MODEL, CROSS, THINNED, CLOUD],
+    let representations: &'static [Representation] = match (draws(THINNED), draws(SURFACE), draws(CLOUD)) {
+        (false, false, false) => levels::DEFAULT,
+        (true, false, false) => &[MODEL, CROSS, THINNED],
+        (false, true, false) => &[MODEL, CROSS, SURFACE],
+        (false, false, true) => &[MODEL, CROSS, CLOUD],
+        (true, true, false) => &[MODEL, CROSS, THINNED, SURFACE],
+        (true, false, true) => &[MODEL, CROSS, THINNED, CLOUD],
+        (false, true, true) => &[MODEL, CROSS, SURFACE, CLOUD],
+        (true, true, true) => &[MODEL, CROSS, THINNED, SURFACE, CLOUD],
     };
     BakeSettings {
         representations,

@@ -8,6 +8,7 @@ use super::levels::{
     self, BakedLevel,
     cloud::{Cloud, CloudSettings},
     cross::{Cross, CrossSettings},
+    crown_surface::{CrownSurface, CrownSurfaceSettings},
     reduced::ReducedPlant,
     thinned::ThinnedSettings,
 };
@@ -65,6 +66,14 @@ impl BakedPlant {
         })
     }
 
+    /// The implicit surface of its foliage, if it was baked.
+    pub fn crown_surface(&self) -> Option<&Arc<CrownSurface>> {
+        self.levels.iter().find_map(|level| match level {
+            BakedLevel::Surface(surface) => Some(surface),
+            _ => None,
+        })
+    }
+
     /// Replaces the level of the same representation by `level`, or adds it if there is none.
     pub fn set_level(&mut self, level: BakedLevel) {
         match self.levels.iter_mut().find(|known| known.representation() == level.representation()) {
@@ -105,6 +114,8 @@ pub struct BakeSettings {
     pub cloud: CloudSettings,
     /// Settings of the simplified model.
     pub thinned: ThinnedSettings,
+    /// Settings of the crown's surface.
+    pub surface: CrownSurfaceSettings,
     /// Triangles of the shadow proxy as a fraction of the plant's, 0..=1. Smaller: faster and coarser shadows.
     pub shadow_share: f32,
 }
@@ -121,6 +132,7 @@ impl Default for BakeSettings {
             cross: CrossSettings::default(),
             cloud: CloudSettings::default(),
             thinned: ThinnedSettings::default(),
+            surface: CrownSurfaceSettings::default(),
             shadow_share: 0.2,
         }
     }
@@ -136,6 +148,7 @@ impl BakeSettings {
             cross: self.cross.sanitized(),
             cloud: self.cloud.sanitized(),
             thinned: self.thinned.sanitized(),
+            surface: self.surface.sanitized(),
             shadow_share: share.clamp(0.0, 1.0),
         }
     }

@@ -10,6 +10,7 @@
 //! | [`levels::cross`] | crossed billboards with colour, normal, ambient term | [Franzke 2005, 4.3] |
 //! | [`levels::cloud`] | billboard cloud: a hundred planes, and a trunk of few sides | [Franzke 2005, 4.3.1] |
 //! | [`levels::thinned`] | a model with fewer and larger leaves | [Cook et al. 2007] |
+//! | [`levels::crown_surface`] | wood, and the implicit surface of the foliage | [Luft 2006, 4.1] |
 //! | [`levels::shadow_proxy`] | a lighter model with the same projected area | [Cook et al. 2007] |
 //! | [`textures`] | mip levels of the full model's textures | [Castaño 2010] |
 //! | [`cache`] | files on disk, keyed by the content that they were made from | |

@@ -22,6 +22,8 @@ impl Representation {
     pub const MODEL: Self = Self("model");
     /// The full model with fewer and larger leaves [Cook et al. 2007].
     pub const THINNED: Self = Self("thinned");
+    /// The implicit surface of the foliage [Luft 2006, 4.1], with the full model's wood: for styles.
+    pub const SURFACE: Self = Self("surface");
     /// A billboard cloud [Franzke 2005, 4.3.1].
     pub const CLOUD: Self = Self("cloud");
     /// Crossed billboards [Franzke 2005, 4.3].

@@ -7,14 +7,19 @@ use super::check::Check;
 use crate::lod::{FadeBand, Levels, MAX_LEVELS, Representation};
 
 /// The representations that a scene file can name.
-const REPRESENTATIONS: [Representation; 4] =
-    [Representation::MODEL, Representation::THINNED, Representation::CLOUD, Representation::CROSS];
+const REPRESENTATIONS: [Representation; 5] = [
+    Representation::MODEL,
+    Representation::THINNED,
+    Representation::SURFACE,
+    Representation::CLOUD,
+    Representation::CROSS,
+];
 
 /// One level of detail in a scene file: `(draw: "model", until: 60, fade: 20)`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Reflect)]
 #[serde(deny_unknown_fields)]
 pub struct QualityLevel {
-    /// Name of the representation: `"model"`, `"thinned"`, `"cloud"` or `"cross"`.
+    /// Name of the representation: `"model"`, `"thinned"`, `"surface"`, `"cloud"` or `"cross"`.
     pub draw: String,
     /// Distance in metres at which it begins to give way to the next level, 0 to 200000. Without effect in the last
     /// level.

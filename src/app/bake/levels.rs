@@ -6,7 +6,7 @@ use crate::{
     bake::{BakedPlant, levels::cross::Cross},
     lod::Representation,
     math::digits::grouped,
-    plant::{Plant, PlantMesh},
+    plant::{PartKind, Plant, PlantMesh},
 };
 
 /// Facts of a level that need no image.
@@ -59,6 +59,17 @@ pub fn facts(plant: &BakedPlant) -> Vec<LevelFacts> {
             bytes: reduced_bytes(thinned),
             deviation: None,
             notes: vec!["fewer and larger leaves".to_owned()],
+        });
+    }
+    if let Some(surface) = plant.crown_surface() {
+        let wood: usize = plant.plant.triangle_count(PartKind::Wood);
+        all.push(LevelFacts {
+            representation: Representation::SURFACE,
+            title: "Crown surface",
+            triangles: wood + surface.mesh.triangles.len(),
+            bytes: mesh_bytes(&surface.mesh),
+            deviation: None,
+            notes: vec![format!("{} triangles of foliage, for styles", grouped(surface.mesh.triangles.len()))],
         });
     }
     if let Some(cloud) = plant.cloud() {

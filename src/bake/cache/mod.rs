@@ -181,7 +181,7 @@ mod tests {
             change(&mut settings);
             BakeSettings { lighting: LightingSettings::Expressive(settings), ..base }
         };
-        let mut changed = [base; 13];
+        let mut changed = [base; 14];
         changed[0].lighting = LightingSettings::Local;
         changed[1] = expressive(&|settings| settings.radius = Some(0.1));
         changed[2] = expressive(&|settings| settings.radius = Some(0.1f32.next_up()));
@@ -195,10 +195,11 @@ mod tests {
         changed[10].cloud.planes = 99;
         changed[11].cloud.turn = 0.25;
         changed[12].thinned.share = 0.5;
+        changed[13].surface.share = 0.5;
         let mut keys: Vec<String> =
             changed.iter().chain([&base]).map(|settings| CacheKey::new(&plant, settings).to_hex()).collect();
         keys.sort();
         keys.dedup();
-        assert_eq!(keys.len(), 14);
+        assert_eq!(keys.len(), 15);
     }
 }

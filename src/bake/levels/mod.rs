@@ -5,6 +5,7 @@
 //! | [`cross`] | crossed billboards with colour, normal, ambient term | [Franzke 2005, 4.3] |
 //! | [`cloud`] | a hundred textured planes and a trunk of few sides | [Franzke 2005, 4.3.1] |
 //! | [`thinned`] | a model with fewer and larger leaves | [Cook et al. 2007] |
+//! | [`crown_surface`] | wood, and the implicit surface of the foliage | [Luft 2006, 4.1] |
 //! | [`shadow_proxy`] | a lighter model with the same projected area, for shadows | [Cook et al. 2007] |
 //! | [`reduced`] | meshes in the light of the plant that they stand for | |
 //! | [`rasterize`] | which triangle each sample of an image shows | |
@@ -14,6 +15,7 @@
 
 pub mod cloud;
 pub mod cross;
+pub mod crown_surface;
 pub mod rasterize;
 pub mod reduced;
 pub mod shadow_proxy;
@@ -24,7 +26,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use self::{cloud::Cloud, cross::Cross, reduced::ReducedPlant};
+use self::{cloud::Cloud, cross::Cross, crown_surface::CrownSurface, reduced::ReducedPlant};
 use super::{BakeSettings, lighting::BakedLighting};
 use crate::lod::Representation;
 use crate::plant::{Plant, PlantMesh};
@@ -41,6 +43,8 @@ pub enum BakedLevel {
     Cloud(#[serde(with = "shared")] Arc<Cloud>),
     /// For [`Representation::THINNED`]: a model with fewer and larger leaves.
     Thinned(#[serde(with = "shared")] Arc<ReducedPlant>),
+    /// For [`Representation::SURFACE`]: the implicit surface of the foliage.
+    Surface(#[serde(with = "shared")] Arc<CrownSurface>),
 }
 
 impl BakedLevel {
@@ -51,6 +55,7 @@ impl BakedLevel {
             Self::Cross(_) => Representation::CROSS,
             Self::Cloud(_) => Representation::CLOUD,
             Self::Thinned(_) => Representation::THINNED,
+            Self::Surface(_) => Representation::SURFACE,
         }
     }
 
@@ -61,6 +66,7 @@ impl BakedLevel {
             Self::Cross(cross) => cross.is_whole(matches!(lighting, BakedLighting::Transfer(_))),
             Self::Cloud(cloud) => cloud.fits(plant, matches!(lighting, BakedLighting::Transfer(_))),
             Self::Thinned(reduced) => reduced.fits(plant),
+            Self::Surface(surface) => surface.is_whole(),
         }
     }
 }
@@ -83,11 +89,12 @@ mod shared {
 type Bake = fn(&Arc<Plant>, &BakedLighting, &BakeSettings) -> BakedLevel;
 
 /// The representations that need a bake, and the functions that bake them.
-const BAKERS: [(Representation, Bake); 4] = [
+const BAKERS: [(Representation, Bake); 5] = [
     (Representation::MODEL, bake_proxy),
     (Representation::CROSS, bake_crosses),
     (Representation::CLOUD, bake_cloud),
     (Representation::THINNED, bake_thinned),
+    (Representation::SURFACE, bake_surface),
 ];
 
 /// The representations that are drawn by default.
@@ -95,7 +102,8 @@ pub const DEFAULT: &[Representation] = &[Representation::MODEL, Representation::
 
 /// Whether a representation is drawn with the filtered textures of the full model.
 pub fn needs_textures(representation: Representation) -> bool {
-    [Representation::MODEL, Representation::CLOUD, Representation::THINNED].contains(&representation)
+    [Representation::MODEL, Representation::CLOUD, Representation::THINNED, Representation::SURFACE]
+        .contains(&representation)
 }
 
 /// The representations that [`bake_levels`] knows.
@@ -131,6 +139,10 @@ fn bake_cloud(plant: &Arc<Plant>, lighting: &BakedLighting, settings: &BakeSetti
 
 fn bake_thinned(plant: &Arc<Plant>, _: &BakedLighting, settings: &BakeSettings) -> BakedLevel {
     BakedLevel::Thinned(Arc::new(thinned::bake_thinned(plant, &settings.thinned)))
+}
+
+fn bake_surface(plant: &Arc<Plant>, _: &BakedLighting, settings: &BakeSettings) -> BakedLevel {
+    BakedLevel::Surface(Arc::new(crown_surface::bake_crown_surface(plant, &settings.surface)))
 }
 
 #[cfg(test)]

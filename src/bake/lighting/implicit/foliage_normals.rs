@@ -67,12 +67,18 @@ impl Nearest {
 /// For each of `points` (metres) the normal of the nearest vertex of `surface`; `None` where the point is not finite
 /// or the surface is empty.
 pub fn nearest_vertex_normals(points: &[Vec3], surface: &SurfaceMesh) -> Vec<Option<Vec3>> {
+    let normal = |vertex: Option<u32>| surface.normals.get(vertex? as usize).copied();
+    nearest_vertices(points, &surface.positions).into_iter().map(normal).collect()
+}
+
+/// For each of `points` (metres) the index of the nearest of `vertices`; `None` where the point is not finite or there are none.
+pub fn nearest_vertices(points: &[Vec3], vertices: &[Vec3]) -> Vec<Option<u32>> {
     /// Neighbours that are searched for in turn, each starting from the last one's result.
     const RUN: usize = 256;
-    let mut normals = vec![None; points.len()];
-    let nearest = Nearest::new(&surface.positions);
+    let mut all = vec![None; points.len()];
+    let nearest = Nearest::new(vertices);
     if nearest.order.is_empty() {
-        return normals;
+        return all;
     }
     let order = partition::compact_order(points, GROUP);
     let found: Vec<u32> = order
@@ -81,7 +87,7 @@ pub fn nearest_vertex_normals(points: &[Vec3], surface: &SurfaceMesh) -> Vec<Opt
             let mut last = nearest.order[0].1;
             run.iter()
                 .map(|(point, _)| {
-                    let guess = surface.positions[last as usize].distance_squared(*point);
+                    let guess = vertices[last as usize].distance_squared(*point);
                     last = nearest.find(*point, (guess, last)).1;
                     last
                 })
@@ -89,9 +95,9 @@ pub fn nearest_vertex_normals(points: &[Vec3], surface: &SurfaceMesh) -> Vec<Opt
         })
         .collect();
     for ((_, index), vertex) in order.iter().zip(found) {
-        normals[*index as usize] = surface.normals.get(vertex as usize).copied();
+        all[*index as usize] = Some(vertex);
     }
-    normals
+    all
 }
 
 /// For each of `points` (metres), at which `field` has the `samples`, the outward direction of the smooth variant;

@@ -64,7 +64,7 @@ impl CloudRenderer {
     }
 }
 
-const WOOD: Reduced = |plant| plant.cloud().map(|cloud| &cloud.wood);
+const WOOD: Reduced = |plant| plant.cloud().map(|cloud| cloud.wood.baked(plant));
 
 /// How the sky's light reaches the planes of a forest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

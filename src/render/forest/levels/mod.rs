@@ -2,6 +2,7 @@
 
 mod cloud;
 mod cross;
+mod crown_surface;
 mod model;
 mod reduced;
 mod thinned;
@@ -12,10 +13,11 @@ use super::representation::LevelRenderer;
 use crate::render::shaders::CanopyShaders;
 
 /// All built-in representations.
-pub fn built_in(shaders: &CanopyShaders) -> [Arc<dyn LevelRenderer>; 4] {
+pub fn built_in(shaders: &CanopyShaders) -> [Arc<dyn LevelRenderer>; 5] {
     [
         Arc::new(model::ModelRenderer::new(shaders)),
         Arc::new(thinned::ThinnedRenderer::new(shaders)),
+        Arc::new(crown_surface::CrownSurfaceRenderer::new(shaders)),
         Arc::new(cloud::CloudRenderer::new(shaders)),
         Arc::new(cross::CrossRenderer::new(shaders)),
     ]

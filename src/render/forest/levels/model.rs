@@ -157,7 +157,9 @@ fn part_layout() -> BindGroupLayoutDescriptor {
                 texture_2d(float),
                 texture_2d(float),
                 sampler(SamplerBindingType::Filtering),
-                uniform_buffer_sized(false, std::num::NonZeroU64::new(size_of::<PartUniform>() as u64)),
+                // The vertex shader of styles asks whose normals they are.
+                uniform_buffer_sized(false, std::num::NonZeroU64::new(size_of::<PartUniform>() as u64))
+                    .visibility(ShaderStages::VERTEX_FRAGMENT),
                 texture_2d(float),
                 texture_2d(float),
                 texture_2d(float),

@@ -1,4 +1,4 @@
-//! Reduced plants, drawn as full models: what simplified models and the wood of billboard clouds have in common.
+//! Reduced plants, drawn as full models: what simplified models, crown surfaces and the wood of billboard clouds have in common.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use bevy::render::render_phase::TrackedRenderPass;
 
 use super::model::ModelRenderer;
 use crate::{
-    bake::{BakedLevel, BakedPlant, levels::reduced::ReducedPlant, lighting::BakedLighting},
+    bake::{BakedLevel, BakedPlant, lighting::BakedLighting},
     plant::Plant,
     render::{
         components::Forest,
@@ -14,8 +14,8 @@ use crate::{
     },
 };
 
-/// The reduced plant of a baked one, if it has one.
-pub type Reduced = fn(&BakedPlant) -> Option<&ReducedPlant>;
+/// The plant that is drawn for a baked one, if there is one.
+pub type Reduced = fn(&BakedPlant) -> Option<BakedPlant>;
 
 /// Reduced plants of a forest on the device.
 pub struct GpuReduced {
@@ -39,7 +39,7 @@ fn reduced(plants: &[BakedPlant], of: Reduced) -> Vec<BakedPlant> {
         levels: vec![BakedLevel::ShadowProxy(Arc::default())],
         textures: Arc::default(),
     };
-    plants.iter().map(|plant| of(plant).map_or_else(empty, |reduced| reduced.baked(plant))).collect()
+    plants.iter().map(|plant| of(plant).unwrap_or_else(empty)).collect()
 }
 
 impl GpuLevel for GpuReduced {

@@ -1,8 +1,6 @@
 //! Simplified models [Cook et al. 2007]: drawn as full models, with their shaders and in the light of their bake. They
 //! cast their own shadow.
 
-use std::sync::Arc;
-
 use bevy::{log::error_once, render::render_resource::RenderPipelineDescriptor};
 use glam::Vec3;
 
@@ -31,7 +29,7 @@ impl ThinnedRenderer {
     }
 }
 
-const OF: Reduced = |plant| plant.thinned().map(Arc::as_ref);
+const OF: Reduced = |plant| plant.thinned().map(|reduced| reduced.baked(plant));
 
 impl LevelRenderer for ThinnedRenderer {
     fn representation(&self) -> Representation {
