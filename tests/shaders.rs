@@ -109,7 +109,7 @@ pub(crate) fn compose(path: &str, source: &str, defines: &[&str]) -> Result<Modu
 }
 
 /// The definitions on which a shader depends, by itself and by what it imports: others do not change it.
-fn conditions(source: &str) -> BTreeSet<&str> {
+fn conditions(source: &'static str) -> BTreeSet<&'static str> {
     let mut conditions = BTreeSet::new();
     let (mut open, mut seen) = (vec![source], BTreeSet::new());
     while let Some(source) = open.pop() {

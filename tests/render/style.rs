@@ -283,14 +283,13 @@ fn strokes_on_a_leaf_are_seen_near_in_all_styles_and_in_no_photograph() {
     assert!(misnamed.warnings.iter().any(|what| what.contains("called `petal`") && what.contains("`leaf`")));
     let (mut without, mut with) = (showing(&plain.stage), showing(&drawn.stage));
     let mut darker = |style: CanopyStyle, distance: f64, name: &str| {
-        let mut seen =
-            [(&mut without, &plain.stage), (&mut with, &drawn.stage)].into_iter().map(|(renderer, stage)| {
-                renderer.set_style(style.clone());
-                let picture = draw(renderer, stage, &view(stage, (0.0, 0.35, distance), 0.0, -10.0), NOON);
-                keep(&picture, &format!("strokes-{name}-{distance}-{}", std::ptr::eq(stage, &drawn.stage)));
-                picture
-            });
-        let (Some(without), Some(with)) = (seen.next(), seen.next()) else { unreachable!() };
+        let seen = |renderer: &mut Renderer, stage: &Stage, kind: &str| {
+            renderer.set_style(style.clone());
+            let picture = draw(renderer, stage, &view(stage, (0.0, 0.35, distance), 0.0, -10.0), NOON);
+            keep(&picture, &format!("strokes-{name}-{distance}-{kind}"));
+            picture
+        };
+        let (without, with) = (seen(&mut without, &plain.stage, "without"), seen(&mut with, &drawn.stage, "with"));
         let darker = |(without, with): (&u8, &u8)| i16::from(*without) - i16::from(*with) > 40;
         without.pixels.iter().zip(&with.pixels).filter(|pair| darker(*pair)).count() / 3
     };
@@ -305,5 +304,46 @@ fn strokes_on_a_leaf_are_seen_near_in_all_styles_and_in_no_photograph() {
         assert_eq!(far, 0, "{name}");
     }
     assert_eq!(darker(CanopyStyle::default(), 0.45, "photograph"), 0);
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+#[test]
+fn a_crown_surface_has_the_outline_of_its_leaves_and_fewer_lines_inside() {
+    let gpu = gpu();
+    let tree = |level: &str| {
+        let quality = format!("quality: (levels: [(draw: \"{level}\")], msaa: 1)");
+        build(
+            &format!(
+                "(seed: 7, terrain: Flat(size: 200), species: [(name: \"broadleaf\", plant: Grown(form: Broadleaf, individuals: 1, \
+                 triangles: 5000, seed: 1), height: (9, 12), lighting: Local)], trees: Inventory(path: \"trees.csv\"), {PLACE}, \
+                 {quality})"
+            ),
+            &[("trees.csv", b"x,y\n0,0\n")],
+        )
+        .stage
+    };
+    let lines = styled(Style::Lines(Lines { normals: LineNormals::Own, hatching: 0.0, ..Lines::default() }));
+    let drawn = |level: &str| {
+        let stage = tree(level);
+        let mut renderer = showing(&stage);
+        let photograph = portrait(&mut renderer, &stage, CanopyStyle::default(), &format!("crown-{level}"));
+        let lines = portrait(&mut renderer, &stage, lines.clone(), &format!("crown-{level}-lines"));
+        portrait(&mut renderer, &stage, watercolour(|_| ()), &format!("crown-{level}-watercolour"));
+        (photograph, lines)
+    };
+    let ((leaves, cluttered), (surface, clear)) = (drawn("model"), drawn("surface"));
+    // What is darker than the sky behind it.
+    let area = |picture: &RenderedImage| {
+        let rows = 0..picture.height / 2;
+        rows.flat_map(|row| (0..picture.width).map(move |column| (column, row)))
+            .filter(|&(column, row)| brightness(picture, column..column + 1, row..row + 1) < 90.0)
+            .count() as f64
+    };
+    let ratio = area(&surface) / area(&leaves);
+    println!("the surface covers {ratio:.3} of the leaves");
+    assert!((0.8..1.5).contains(&ratio), "the surface covers {ratio} of the leaves");
+    let dark = |picture: &RenderedImage| picture.pixels.iter().filter(|value| **value < 100).count();
+    println!("{} and {} dark values", dark(&cluttered), dark(&clear));
+    assert!(2 * dark(&clear) < dark(&cluttered), "{} and {} dark values", dark(&cluttered), dark(&clear));
     assert_eq!(gpu.messages(), Vec::<String>::new());
 }
