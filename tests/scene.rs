@@ -590,7 +590,7 @@ fn the_levels_of_detail_are_a_list() -> Outcome {
     let wrong = listed(r#"[(draw: "modle", until: 90), (draw: "model", until: 50), (draw: "cross")]"#);
     let message = parse(&wrong).err().ok_or("accepted")?.to_string();
     for word in [
-        "`quality.levels[0].draw` is \"modle\"; write \"model\", \"thinned\", \"cloud\" or \"cross\"",
+        "`quality.levels[0].draw` is \"modle\"; write \"model\", \"thinned\", \"surface\", \"cloud\" or \"cross\"",
         "`quality.levels[1].until` is 50 m, where the level before it ends at 110 m",
     ] {
         assert!(message.contains(word), "no `{word}` in {message}");

