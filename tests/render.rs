@@ -1,6 +1,7 @@
 //! Images: small scenes drawn without a window, on whatever graphics driver there is (a software one will do).
 
 mod arrival;
+mod coherence;
 mod device;
 mod drape;
 mod exposure;
