@@ -212,7 +212,7 @@ impl Stroke {
                     let distance = texel.distance(from.at + t * along);
                     let half = from.half + t * (to.half - from.half);
                     // A line narrower than a texel is fainter, not wider.
-                    let covered = (half + 0.5 - distance).clamp(0.0, 1.0) * (2.0 * half).min(1.0);
+                    let covered = (half + 0.5 - distance).clamp(0.0, (2.0 * half).clamp(0.0, 1.0));
                     let texel = &mut image.get_pixel_mut(x, y).0[channel];
                     *texel = (*texel).max(unorm8(covered * self.strength));
                 }

@@ -86,7 +86,7 @@ fn forest_in_code_draws_its_trees() {
     assert!(trees > 1000, "{trees} trees on nine hectares");
     let map = world.query::<&Terrain3d>().single(world).expect("a terrain").0.clone();
     let ground = world.resource::<Assets<TerrainMap>>().get(&map).expect("a map").terrain.height(0.0, 0.0);
-    let view = Pose { position: (0.0, 500.0, 0.0), yaw: 0.0, pitch: -90.0 }.viewpoint(ground, 60.0);
+    let view = Pose { position: (0.0, 250.0, 0.0), yaw: 0.0, pitch: -90.0 }.viewpoint(ground, 60.0);
     assert!(drawn(&mut renderer, &view) > 1000);
     assert_eq!(gpu.messages(), Vec::<String>::new());
 }
@@ -96,7 +96,7 @@ fn two_forests_are_both_drawn() {
     let gpu = gpu();
     let mut renderer = run(two_forests::plugin, 2);
     let ready = renderer.app().world().resource::<Heard>().ready.clone();
-    let view = Pose { position: (0.0, 500.0, 0.0), yaw: 0.0, pitch: -90.0 }.viewpoint(0.0, 60.0);
+    let view = Pose { position: (0.0, 250.0, 0.0), yaw: 0.0, pitch: -90.0 }.viewpoint(0.0, 60.0);
     let both = drawn(&mut renderer, &view);
     let on_device = renderer.app().sub_app(RenderApp).world().resource::<GpuForests>().iter().count();
     assert_eq!(on_device, 2);
