@@ -573,19 +573,21 @@ fn a_scene_in_code_lists_what_is_out_of_range_by_name() -> Outcome {
 #[test]
 fn the_levels_of_detail_are_a_list() -> Outcome {
     let listed = |list: &str| FULL.replace("near_distance: 40,", &format!("near_distance: 40, levels: {list},"));
+    // By default trees below two pixels are the surface of the forest.
+    let surface = |levels: Levels| levels.to_size(2.0);
     // Without a list, models give way to crosses behind the near distance.
     let levels = parse(FULL)?.quality.lod_levels();
-    assert_eq!(levels, Levels::model_and_cross(FadeBand::new(40.0, 10.0)));
+    assert_eq!(levels, surface(Levels::model_and_cross(FadeBand::new(40.0, 10.0))));
     // With a tolerance, where crosses are that much worse.
     let tolerant = |text: &str| parse(&FULL.replace("near_distance: 40,", &format!("tolerance: {text},")));
-    assert_eq!(tolerant("0.1")?.quality.lod_levels(), Levels::by_error(0.1));
+    assert_eq!(tolerant("0.1")?.quality.lod_levels(), surface(Levels::by_error(0.1)));
     let message = tolerant("-1").err().ok_or("accepted")?.to_string();
     assert!(message.contains("quality.tolerance"), "{message}");
     let quality = parse(&listed(r#"[(draw: "model", until: 90, fade: 5), (draw: "cross")]"#))?.quality;
-    assert_eq!(quality.lod_levels(), Levels::model_and_cross(FadeBand::new(90.0, 5.0)));
+    assert_eq!(quality.lod_levels(), surface(Levels::model_and_cross(FadeBand::new(90.0, 5.0))));
     assert_eq!(quality.nearest_level_end(), 95.0);
     let only = parse(&listed(r#"[(draw: "cross")]"#))?.quality.lod_levels();
-    assert_eq!(only, Levels::only(Representation::CROSS));
+    assert_eq!(only, surface(Levels::only(Representation::CROSS)));
 
     let wrong = listed(r#"[(draw: "modle", until: 90), (draw: "model", until: 50), (draw: "cross")]"#);
     let message = parse(&wrong).err().ok_or("accepted")?.to_string();
