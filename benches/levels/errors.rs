@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use canopy::app::{Side, Studio};
 use canopy::bake::cache::Cache;
-use canopy::bake::levels::BAKED;
+use canopy::bake::levels::LevelSet;
 use canopy::bake::{BakeSettings, BakedPlant, bake_plant};
 use canopy::components::Sun;
 use canopy::lod::Representation;
@@ -24,7 +24,7 @@ const SUNS: [(&str, &str); 3] =
 
 /// The plant with all of its levels.
 pub fn baked(plant: canopy::plant::Plant) -> BakedPlant {
-    let settings = BakeSettings { representations: BAKED, ..BakeSettings::default() };
+    let settings = BakeSettings { representations: LevelSet::all(), ..BakeSettings::default() };
     bake_plant(Arc::new(plant), &settings, Cache::of_user().as_ref()).0
 }
 

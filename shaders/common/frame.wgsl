@@ -96,3 +96,10 @@ struct Shadow {
 @group(0) @binding(6) var shadow_sampler: sampler_comparison;
 @group(0) @binding(7) var ground_texture: texture_2d<f32>;
 @group(0) @binding(8) var stand_texture: texture_2d<f32>;
+
+// Camera-relative position, metres, of what is seen at `uv` (0..1, v down) with a reversed `depth`; for the sky (0), a point on its ray.
+fn relative_position(uv: vec2<f32>, depth: f32) -> vec3<f32> {
+    let ndc = vec2(uv.x * 2.0 - 1.0, 1.0 - uv.y * 2.0);
+    let position = frame.relative_from_clip * vec4(ndc, select(0.5, depth, depth > 0.0), 1.0);
+    return position.xyz / position.w;
+}

@@ -1,5 +1,5 @@
 // The light on the surfaces that are seen [Luft 2006, 3.2 and 3.3]: the lighting map, and the shadow by the blurred depth test.
-#import canopy::frame::{frame, light, shadow, shadow_map}
+#import canopy::frame::{frame, light, shadow, shadow_map, relative_position}
 #import canopy::style::{style, full_screen, FullScreen, landscape_depth}
 #import canopy::sun_visibility::{sample_ground, terrain_visibility, map_position, cascade_weight}
 #import canopy::constants::MAX_CASCADES
@@ -65,10 +65,8 @@ fn soft_light(relative: vec3<f32>, normal: vec3<f32>) -> f32 {
 fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let texel = vec2<i32>(in.clip.xy);
     let depth = textureLoad(depths, texel, 0);
-    let ndc = vec2(in.uv.x * 2.0 - 1.0, 1.0 - in.uv.y * 2.0);
     let sky = depth <= 0.0;
-    let far = frame.relative_from_clip * vec4(ndc, select(depth, 0.5, sky), 1.0);
-    let relative = far.xyz / far.w;
+    let relative = relative_position(in.uv, depth);
     let direction = normalize(relative);
     // The sky is painted from the horizon to the zenith.
     if sky {

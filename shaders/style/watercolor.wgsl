@@ -1,6 +1,6 @@
 // Watercolour: layers of pigment on paper [Luft 2006]. The equations of a layer are those of src/style/wash.rs.
 #import canopy::constants::PAPER_SIDE
-#import canopy::frame::frame
+#import canopy::frame::relative_position
 #import canopy::style::{style, full_screen, FullScreen, airiness}
 #import canopy::style_edges::contour
 #import canopy::style_noise::{anchored_noise, noise_place}
@@ -105,11 +105,10 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let texel = vec2<i32>(clamp(in.uv * style.map_size, vec2(0.0), style.map_size - 1.0));
     let seen = textureLoad(depths, texel, 0);
     let sky = seen <= 0.0;
-    let ndc = vec2(in.uv.x * 2.0 - 1.0, 1.0 - in.uv.y * 2.0);
-    let far = frame.relative_from_clip * vec4(ndc, select(seen, 0.5, sky), 1.0);
-    let direction = normalize(far.xyz);
+    let along = relative_position(in.uv, seen);
+    let direction = normalize(along);
     // The sky is a sphere of 4 km.
-    let relative = select(far.xyz / far.w, direction * 4000.0, sky);
+    let relative = select(along, direction * 4000.0, sky);
     let place = noise_place(page, relative, sky);
     let position = place.position;
     let footprint = place.pixel;

@@ -13,10 +13,9 @@ use super::{
 use crate::{
     bake::{
         BakeSettings,
-        levels::{self, cross::CrossSettings},
+        levels::{LevelSet, cross::CrossSettings},
         lighting::LightingSettings,
     },
-    lod::Representation,
     plant::{
         Gloss, LeafStrokes, LeafTissue, Plant,
         gltf::{GltfOptions, load_plant, trees_of},
@@ -209,23 +208,8 @@ fn individuals(path: &Path, options: &GltfOptions) -> Vec<IndividualSource> {
 /// Bake settings for a scene's quality and a species' lighting. What is drawn by default is always baked; other
 /// representations only for a scene that draws them.
 pub fn bake_settings(quality: &Quality, lighting: LightingSettings) -> BakeSettings {
-    const MODEL: Representation = Representation::MODEL;
-    const CROSS: Representation = Representation::CROSS;
-    const THINNED: Representation = Representation::THINNED;
-    const SURFACE: Representation = Representation::SURFACE;
-    const CLOUD: Representation = Representation::CLOUD;
-    let drawn = quality.lod_levels();
-    let draws = |representation| drawn.representations().contains(&representation);
-    let representations: &'static [Representation] = match (draws(THINNED), draws(SURFACE), draws(CLOUD)) {
-        (false, false, false) => levels::DEFAULT,
-        (true, false, false) => &[MODEL, CROSS, THINNED],
-        (false, true, false) => &[MODEL, CROSS, SURFACE],
-        (false, false, true) => &[MODEL, CROSS, CLOUD],
-        (true, true, false) => &[MODEL, CROSS, THINNED, SURFACE],
-        (true, false, true) => &[MODEL, CROSS, THINNED, CLOUD],
-        (false, true, true) => &[MODEL, CROSS, SURFACE, CLOUD],
-        (true, true, true) => &[MODEL, CROSS, THINNED, SURFACE, CLOUD],
-    };
+    let drawn = quality.lod_levels().representations().to_vec();
+    let representations = LevelSet::default().iter().chain(drawn).collect();
     BakeSettings {
         representations,
         lighting,

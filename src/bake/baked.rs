@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::levels::{
-    self, BakedLevel,
+    BakedLevel, LevelSet,
     cloud::{Cloud, CloudSettings},
     cross::{Cross, CrossSettings},
     crown_surface::{CrownSurface, CrownSurfaceSettings},
@@ -29,11 +29,16 @@ pub struct BakedPlant {
     /// The baked representations, at most one of each kind.
     pub levels: Vec<BakedLevel>,
     /// The textures of the full model, filtered; empty if no representation was listed that needs
-    /// them ([`levels::needs_textures`]).
+    /// them ([`needs_textures`](super::levels::needs_textures)).
     pub textures: Arc<PlantTextures>,
 }
 
 impl BakedPlant {
+    /// The level of `representation`, if it was baked.
+    pub fn level(&self, representation: Representation) -> Option<&BakedLevel> {
+        self.levels.iter().find(|level| level.representation() == representation)
+    }
+
     /// The shadow proxy, if it was baked: a lighter model that casts the near shadow.
     pub fn shadow_proxy(&self) -> Option<&Arc<Vec<PlantMesh>>> {
         self.levels.iter().find_map(|level| match level {
@@ -103,9 +108,10 @@ pub fn plant_size(plant: &Plant) -> PlantSize {
 /// Settings of a plant's bake. Values out of range are clamped.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BakeSettings {
-    /// The representations to bake. Default: [`levels::DEFAULT`]; a program that draws others lists them. Set in code.
-    #[serde(skip_deserializing, default = "baked_by_default")]
-    pub representations: &'static [Representation],
+    /// The representations to bake. Default: full models and crossed billboards; a program that draws others lists them. Set in
+    /// code.
+    #[serde(skip_deserializing)]
+    pub representations: LevelSet,
     /// Lighting model of the foliage.
     pub lighting: LightingSettings,
     /// Settings of the crossed billboards.
@@ -120,14 +126,10 @@ pub struct BakeSettings {
     pub shadow_share: f32,
 }
 
-fn baked_by_default() -> &'static [Representation] {
-    levels::DEFAULT
-}
-
 impl Default for BakeSettings {
     fn default() -> Self {
         Self {
-            representations: levels::DEFAULT,
+            representations: LevelSet::default(),
             lighting: LightingSettings::default(),
             cross: CrossSettings::default(),
             cloud: CloudSettings::default(),

@@ -70,7 +70,7 @@ fn bake_fresh(plant: Arc<Plant>, settings: &BakeSettings, cache: Option<&Cache>)
     let seen = averaged.as_ref().unwrap_or(&plant);
     let lighting = Arc::new(BakedLighting::bake(seen, &settings.lighting));
     let levels = bake_levels(seen, &lighting, settings);
-    let (textures, not_stored) = if settings.representations.iter().any(|listed| needs_textures(*listed)) {
+    let (textures, not_stored) = if settings.representations.iter().any(needs_textures) {
         PlantTextures::new(&plant, cache)
     } else {
         Default::default()

@@ -33,6 +33,8 @@ const RESOLUTIONS: std::ops::RangeInclusive<u32> = 16..=4096;
 const PIECES: usize = 12;
 /// The most points of a file.
 const MOST_POINTS: usize = 100_000;
+/// The most texels that the strokes of a file visit: some ten seconds of work.
+const MOST_TEXELS: f64 = 2e9;
 
 /// When a stroke is seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
@@ -153,6 +155,14 @@ impl LeafStrokes {
                 return Err(format!("`strokes[{number}].{name}` is {value}; write a value from 0 to 1"));
             }
         }
+        let texels: f64 = self.strokes.iter().map(|stroke| stroke.work(self.resolution)).sum();
+        if texels > MOST_TEXELS {
+            return Err(format!(
+                "the strokes would visit {texels:.1e} texels at `resolution: {}`; {MOST_TEXELS:.0e} at most: write fewer points, \
+                 narrower strokes, or a lower resolution",
+                self.resolution
+            ));
+        }
         Ok(())
     }
 
@@ -191,21 +201,38 @@ struct Sample {
     half: f32,
 }
 
+/// The columns and rows of a texture with `side` texels that a piece of a line reaches.
+fn reached(from: Sample, to: Sample, side: f32) -> [std::ops::Range<u32>; 2] {
+    // Half a texel on either side of the edge.
+    let reach = from.half.max(to.half) + 1.0;
+    let low = (from.at.min(to.at) - reach).clamp(Vec2::ZERO, Vec2::splat(side));
+    let high = (from.at.max(to.at) + reach).clamp(Vec2::ZERO, Vec2::splat(side)).ceil();
+    [low.x as u32..high.x as u32, low.y as u32..high.y as u32]
+}
+
+/// Pairs of samples between which a straight piece is drawn; one sample is a dot.
+fn pieces(samples: &[Sample]) -> impl Iterator<Item = (Sample, Sample)> + '_ {
+    let dot = samples.first().filter(|_| samples.len() == 1).map(|&dot| (dot, dot));
+    dot.into_iter().chain(samples.windows(2).map(|pair| (pair[0], pair[1])))
+}
+
 impl Stroke {
+    /// The texels that [`draw`](Self::draw) visits.
+    fn work(&self, side: u32) -> f64 {
+        let area = |(from, to)| reached(from, to, side as f32).map(|texels| texels.len() as f64).iter().product::<f64>();
+        pieces(&self.samples(side as f32)).map(area).sum()
+    }
+
     fn draw(&self, image: &mut RgbaImage) {
         let side = image.width() as f32;
         let channel = match self.kind {
             StrokeKind::Drawn => 0,
             StrokeKind::Shade => 1,
         };
-        let samples = self.samples(side);
-        let mut segment = |from: Sample, to: Sample| {
-            // Half a texel on either side of the edge.
-            let reach = from.half.max(to.half) + 1.0;
-            let low = (from.at.min(to.at) - reach).max(Vec2::ZERO);
-            let high = (from.at.max(to.at) + reach).min(Vec2::splat(side));
-            for y in low.y as u32..high.y.max(0.0).ceil() as u32 {
-                for x in low.x as u32..high.x.max(0.0).ceil() as u32 {
+        for (from, to) in pieces(&self.samples(side)) {
+            let [columns, rows] = reached(from, to, side);
+            for y in rows {
+                for x in columns.clone() {
                     let texel = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
                     let along = to.at - from.at;
                     let t = ((texel - from.at).dot(along) / along.length_squared().max(1e-12)).clamp(0.0, 1.0);
@@ -217,10 +244,6 @@ impl Stroke {
                     *texel = (*texel).max(unorm8(covered * self.strength));
                 }
             }
-        };
-        match samples.as_slice() {
-            [dot] => segment(*dot, *dot),
-            samples => samples.windows(2).for_each(|pair| segment(pair[0], pair[1])),
         }
     }
 
@@ -317,6 +340,12 @@ mod tests {
             assert!(error.starts_with("a.ron:") && error.contains(part), "{error}");
         }
         assert!(LeafStrokes::read(Path::new("none.strokes.ron")).is_err());
+        // Hours of work are refused before they begin.
+        let points: String = (0..1000).map(|index| format!("(0.5, {}),", 0.001 * f64::from(index))).collect();
+        let wide = |resolution| format!("(resolution: {resolution}, strokes: [(points: [{points}], width: (1.0, 1.0))])");
+        let error = LeafStrokes::parse(&wide(4096), "a.ron").map(|_| ()).expect_err("too much").to_string();
+        assert!(error.contains("`resolution: 4096`") && error.contains("write fewer points"), "{error}");
+        assert!(LeafStrokes::parse(&wide(64), "a.ron").is_ok());
     }
 
     #[test]

@@ -167,13 +167,12 @@ fn more_crosses_than_a_texture_array_holds_are_refused_with_the_number_that_fits
 /// Billboard clouds and simplified models against the full model, isolated, in the same light.
 #[test]
 fn clouds_and_simplified_models_cover_and_shine_about_as_the_full_model_does() {
-    const ALL: &[Representation] = &[Representation::MODEL, Representation::THINNED, Representation::CLOUD];
     let _gpu = gpu();
     let plant = Arc::new(grow(&GrowParameters::broadleaf(), 1, 6000).expect("a shipped species grows"));
     let transfer = LightingSettings::Transfer(TransferSettings { rays: 64, ..TransferSettings::default() });
     for lighting in [LightingSettings::Local, transfer] {
         let settings = BakeSettings {
-            representations: ALL,
+            representations: [Representation::MODEL, Representation::THINNED, Representation::CLOUD].into(),
             lighting,
             cloud: CloudSettings { planes: 60, resolution: 512, supersampling: 2, ..CloudSettings::default() },
             ..BakeSettings::default()

@@ -6,7 +6,7 @@ use canopy::{
     app::{RenderedImage, Renderer},
     assets::Stage,
     light::{Atmosphere, AtmosphereParams, LightSettings, LightState, SunPosition},
-    render::components::{Daylight, Forest, SunShadowSettings},
+    render::components::{Daylight, Forest, Ground, SunShadowSettings},
     scene::Viewpoint,
 };
 use glam::{DVec2, DVec3};
@@ -58,6 +58,23 @@ fn patch(picture: &RenderedImage, view: &Viewpoint, point: DVec3) -> f64 {
     }))
 }
 
+/// Shows trees that cast and are not seen: nothing hides their shadow. Large, so that a shadow's rim is little of it.
+fn shadow_alone(stage: &Stage) -> Renderer {
+    let mut renderer = Renderer::new((480, 270), None, 1).expect("a renderer");
+    let unseen = Forest { view_distance: -1.0, ..stage.forest().expect("a forest") };
+    renderer.app().world_mut().spawn(unseen);
+    renderer.app().world_mut().spawn(Ground { cover: None, ..stage.ground() });
+    renderer
+}
+
+/// The part of the light that each pixel has lost, 0..=1.
+fn lost(with: &RenderedImage, without: &RenderedImage) -> Vec<f64> {
+    let part = |(with, without): (&[u8], &[u8])| {
+        1.0 - (luminance(linear(with)) / luminance(linear(without)).max(1e-6)).min(1.0)
+    };
+    with.pixels.chunks(3).zip(without.pixels.chunks(3)).map(part).collect()
+}
+
 #[test]
 fn a_tree_shades_the_ground_behind_it_and_no_other() {
     let gpu = gpu();
@@ -84,12 +101,7 @@ fn the_shadow_of_a_cross_keeps_its_area_whatever_the_suns_bearing() {
     let _gpu = gpu();
     let built = trees_at(&[DVec2::ZERO], 1);
     let from = from_above(&built.stage);
-    // Large, so that a shadow's rim is little of it.
-    let mut renderer = Renderer::new((480, 270), None, 1).expect("a renderer");
-    // A tree that casts and is not seen: nothing hides its shadow.
-    let unseen = Forest { view_distance: -1.0, ..built.stage.forest().expect("a forest") };
-    renderer.app().world_mut().spawn(unseen);
-    renderer.app().world_mut().spawn(canopy::render::components::Ground { cover: None, ..built.stage.ground() });
+    let mut renderer = shadow_alone(&built.stage);
     for elevation in [25.0, 40.0, 55.0] {
         let areas: Vec<f64> = (0..12)
             .map(|step| {
@@ -97,10 +109,7 @@ fn the_shadow_of_a_cross_keeps_its_area_whatever_the_suns_bearing() {
                 let without = lit(&mut renderer, &from, light.clone(), settings(0));
                 let with = lit(&mut renderer, &from, light, settings(1));
                 keep(&with, &format!("shadow-area-{elevation}-{step:02}"));
-                let lost = |(with, without): (&[u8], &[u8])| {
-                    1.0 - (luminance(linear(with)) / luminance(linear(without)).max(1e-6)).min(1.0)
-                };
-                with.pixels.chunks(3).zip(without.pixels.chunks(3)).map(lost).sum()
+                lost(&with, &without).iter().sum()
             })
             .collect();
         let (low, high) = areas.iter().fold((f64::MAX, 0f64), |(low, high), &area| (low.min(area), high.max(area)));
@@ -147,19 +156,13 @@ fn a_soft_shadow_keeps_its_light_and_has_the_edge_that_it_was_given() {
     let gpu = gpu();
     let built = trees_at(&[DVec2::ZERO], 1);
     let from = from_above(&built.stage);
-    let mut renderer = Renderer::new((480, 270), None, 1).expect("a renderer");
-    let unseen = Forest { view_distance: -1.0, ..built.stage.forest().expect("a forest") };
-    renderer.app().world_mut().spawn(unseen);
-    renderer.app().world_mut().spawn(canopy::render::components::Ground { cover: None, ..built.stage.ground() });
+    let mut renderer = shadow_alone(&built.stage);
     let light = daylight(180.0, 40.0);
     let without = lit(&mut renderer, &from, light.clone(), settings(0));
     let mut shadow = |softness: f64, cascades: usize| -> Vec<f64> {
         let with = lit(&mut renderer, &from, light.clone(), SunShadowSettings { softness, ..settings(cascades) });
         keep(&with, &format!("shadow-soft-{softness}-{cascades}"));
-        let lost = |(with, without): (&[u8], &[u8])| {
-            1.0 - (luminance(linear(with)) / luminance(linear(without)).max(1e-6)).min(1.0)
-        };
-        with.pixels.chunks(3).zip(without.pixels.chunks(3)).map(lost).collect()
+        lost(&with, &without)
     };
     // The greatest step between neighbours of a row, and the sum.
     let of = |lost: &[f64]| {

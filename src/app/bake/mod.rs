@@ -17,7 +17,7 @@ use crate::{
     bake::{
         BakeSettings, BakeSource, BakedPlant, bake_plant,
         cache::Cache,
-        levels::{BAKED, cloud::CloudSettings},
+        levels::{LevelSet, cloud::CloudSettings},
         lighting::LightingSettings,
     },
     components::Sun,
@@ -50,7 +50,7 @@ pub fn bake(options: &BakeOptions, progress: &mut dyn Progress) -> Result<(), Ap
         progress.warn(&format!("{}: {warning}", options.plant.display()));
     }
     let settings = BakeSettings {
-        representations: BAKED,
+        representations: LevelSet::all(),
         lighting: options.lighting.as_ref().map_or_else(LightingSettings::default, Lighting::settings),
         cloud: CloudSettings { planes: options.planes, ..CloudSettings::default() },
         ..BakeSettings::default()

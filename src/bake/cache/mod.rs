@@ -22,7 +22,7 @@ use image::RgbaImage;
 
 use super::baked::{BakeSettings, BakedPlant};
 use super::error::BakeError;
-use super::levels::needs_textures;
+use super::levels::{LevelSet, needs_textures};
 use super::textures::PlantTextures;
 use super::textures::filtered::FilteredTexture;
 use crate::files;
@@ -35,7 +35,7 @@ pub use texture::TextureKey;
 pub struct CacheKey {
     hash: [u8; 32],
     /// The representations that it is baked for.
-    representations: &'static [Representation],
+    representations: LevelSet,
 }
 
 impl CacheKey {
@@ -96,7 +96,7 @@ impl Cache {
     pub fn load(&self, key: &CacheKey, plant: &Arc<Plant>) -> Option<BakedPlant> {
         let bytes = files::read_ordinary(&self.file(key)).ok()?;
         let baked = codec::decode(&bytes, key, plant)?;
-        let textures = if key.representations.iter().any(|listed| needs_textures(*listed)) {
+        let textures = if key.representations.iter().any(needs_textures) {
             PlantTextures::new(plant, Some(self)).0
         } else {
             PlantTextures::default()
@@ -181,7 +181,7 @@ mod tests {
             change(&mut settings);
             BakeSettings { lighting: LightingSettings::Expressive(settings), ..base }
         };
-        let mut changed = [base; 14];
+        let mut changed = [base; 15];
         changed[0].lighting = LightingSettings::Local;
         changed[1] = expressive(&|settings| settings.radius = Some(0.1));
         changed[2] = expressive(&|settings| settings.radius = Some(0.1f32.next_up()));
@@ -191,15 +191,16 @@ mod tests {
         changed[6].cross.supersampling = 2;
         changed[7].cross.normal_smoothing = 0.01;
         changed[8].shadow_share = 0.5;
-        changed[9].representations = &[Representation::MODEL];
+        changed[9].representations = [Representation::MODEL].into();
         changed[10].cloud.planes = 99;
         changed[11].cloud.turn = 0.25;
         changed[12].thinned.share = 0.5;
         changed[13].surface.share = 0.5;
+        changed[14].surface.radius = 0.5;
         let mut keys: Vec<String> =
             changed.iter().chain([&base]).map(|settings| CacheKey::new(&plant, settings).to_hex()).collect();
         keys.sort();
         keys.dedup();
-        assert_eq!(keys.len(), 15);
+        assert_eq!(keys.len(), 16);
     }
 }

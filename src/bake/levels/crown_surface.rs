@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::BakedLevel;
 use crate::bake::BakedPlant;
 use crate::bake::lighting::implicit::foliage_normals::nearest_vertices;
-use crate::bake::lighting::implicit::{AmbientField, COARSE_SHARE, ImplicitSettings, bake_implicit};
+use crate::bake::lighting::implicit::{AmbientField, COARSE_SHARE, ImplicitSettings, bake_implicit, relative_radius};
 use crate::bake::lighting::{BakedLighting, ExpressiveLighting};
 use crate::bake::textures::PlantTextures;
 use crate::plant::{PartKind, Plant, PlantMaterial, PlantMesh, PlantPart};
@@ -24,19 +24,27 @@ pub struct CrownSurfaceSettings {
     /// Triangles as a fraction of the foliage's, 0..=1: [`COARSE_SHARE`] is the coarser tree of [Luft 2006, table 1], `FINE_SHARE`
     /// the finer one.
     pub share: f32,
+    /// Radius of the leaves' density as a fraction of the plant's longest extent, 0..=1. Smaller: gaps between twigs stay open. The
+    /// trees of [Luft 2006, table 1] have 0.05 and 0.075. Where leaves are sparse it is larger: half as much again as the mean
+    /// distance between neighbours.
+    pub radius: f32,
 }
+
+/// The least radius in mean distances between neighbouring leaves: with less, a surface is single leaves.
+const LEAST_SPACINGS: f32 = 1.5;
 
 impl Default for CrownSurfaceSettings {
     fn default() -> Self {
-        Self { share: COARSE_SHARE }
+        Self { share: COARSE_SHARE, radius: 0.05 }
     }
 }
 
 impl CrownSurfaceSettings {
     /// The settings with every value clamped to its range; a value that is not finite becomes the default.
     pub fn sanitized(self) -> Self {
-        let share = if self.share.is_finite() { self.share } else { Self::default().share };
-        Self { share: share.clamp(0.0, 1.0) }
+        let (default, or) = (Self::default(), |value: f32, or: f32| if value.is_finite() { value } else { or });
+        let (share, radius) = (or(self.share, default.share), or(self.radius, default.radius));
+        Self { share: share.clamp(0.0, 1.0), radius: radius.clamp(0.0, 1.0) }
     }
 }
 
@@ -92,10 +100,11 @@ impl CrownSurface {
 
 /// Makes the surface of `plant`. The result does not depend on the number of threads.
 pub fn bake_crown_surface(plant: &Plant, settings: &CrownSurfaceSettings) -> CrownSurface {
-    let share = settings.sanitized().share;
+    let CrownSurfaceSettings { share, radius } = settings.sanitized();
     let colors = plant.leaf_colors();
     let color = colors.reflected.clamp(Vec3::ZERO, Vec3::ONE);
-    let implicit = ImplicitSettings { surface_share: Some(share), ..ImplicitSettings::default() };
+    let radius = Some(relative_radius(plant, radius, LEAST_SPACINGS));
+    let implicit = ImplicitSettings { surface_share: Some(share), radius, ..ImplicitSettings::default() };
     let baked = bake_implicit(plant, &implicit);
     let Some(surface) = baked.surface else { return CrownSurface { color, ..CrownSurface::default() } };
     let foliage = plant.parts.iter().zip(&baked.ambient).filter(|(part, _)| part.kind == PartKind::Foliage);
@@ -127,7 +136,7 @@ mod tests {
             let leaves = plant.triangle_count(PartKind::Foliage) as f32;
             // [Luft 2006, table 1].
             for (share, within) in [(COARSE_SHARE, 0.003), (FINE_SHARE, 0.005)] {
-                let surface = bake_crown_surface(&plant, &CrownSurfaceSettings { share });
+                let surface = bake_crown_surface(&plant, &CrownSurfaceSettings { share, ..CrownSurfaceSettings::default() });
                 assert!(surface.is_whole() && surface.mesh.is_closed());
                 let reached = surface.mesh.triangles.len() as f32 / leaves;
                 assert!((reached - share).abs() <= within, "{}: {reached} of {share}", plant.name);
@@ -152,7 +161,7 @@ mod tests {
 
     #[test]
     fn what_has_no_surface_has_none() {
-        let nothing = bake_crown_surface(&Plant::default(), &CrownSurfaceSettings { share: f32::NAN });
+        let nothing = bake_crown_surface(&Plant::default(), &CrownSurfaceSettings { share: f32::NAN, radius: f32::NAN });
         assert_eq!(nothing, CrownSurface::default());
         assert!(nothing.is_whole());
     }

@@ -16,6 +16,7 @@
 pub mod cloud;
 pub mod cross;
 pub mod crown_surface;
+mod level_set;
 pub mod rasterize;
 pub mod reduced;
 pub mod shadow_proxy;
@@ -26,6 +27,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+pub use self::level_set::LevelSet;
 use self::{cloud::Cloud, cross::Cross, crown_surface::CrownSurface, reduced::ReducedPlant};
 use super::{BakeSettings, lighting::BakedLighting};
 use crate::lod::Representation;
@@ -97,9 +99,6 @@ const BAKERS: [(Representation, Bake); 5] = [
     (Representation::SURFACE, bake_surface),
 ];
 
-/// The representations that are drawn by default.
-pub const DEFAULT: &[Representation] = &[Representation::MODEL, Representation::CROSS];
-
 /// Whether a representation is drawn with the filtered textures of the full model.
 pub fn needs_textures(representation: Representation) -> bool {
     [Representation::MODEL, Representation::CLOUD, Representation::THINNED, Representation::SURFACE]
@@ -119,7 +118,7 @@ pub const BAKED: &[Representation] = &{
 
 /// Bakes `plant` under `lighting` for the representations that `settings` list; one that needs no bake is passed over.
 pub fn bake_levels(plant: &Arc<Plant>, lighting: &BakedLighting, settings: &BakeSettings) -> Vec<BakedLevel> {
-    let listed = |(representation, _): &&(Representation, Bake)| settings.representations.contains(representation);
+    let listed = |(representation, _): &&(Representation, Bake)| settings.representations.contains(*representation);
     BAKERS.iter().filter(listed).map(|(_, bake)| bake(plant, lighting, settings)).collect()
 }
 
@@ -152,14 +151,13 @@ mod tests {
     #[test]
     fn each_baker_makes_the_level_of_its_representation() {
         let (plant, settings) =
-            (Arc::new(Plant::default()), BakeSettings { representations: BAKED, ..BakeSettings::default() });
+            (Arc::new(Plant::default()), BakeSettings { representations: LevelSet::all(), ..BakeSettings::default() });
         let made = bake_levels(&plant, &BakedLighting::Local, &settings);
         let names: Vec<_> = made.iter().map(BakedLevel::representation).collect();
         assert_eq!(names, BAKERS.map(|(representation, _)| representation));
         assert_eq!(names, BAKED);
         assert!(made.iter().all(|level| level.fits(&plant, &BakedLighting::Local)));
-        const LIST: &[Representation] = &[Representation::CROSS, Representation::named("box")];
-        let one = BakeSettings { representations: LIST, ..settings };
+        let one = BakeSettings { representations: [Representation::CROSS].into(), ..settings };
         let made = bake_levels(&plant, &BakedLighting::Local, &one);
         assert_eq!(made.iter().map(BakedLevel::representation).collect::<Vec<_>>(), [Representation::CROSS]);
     }

@@ -155,6 +155,13 @@ pub fn implicit_parameters(plant: &Plant, settings: &ImplicitSettings) -> Implic
     basis(&centered(parts_of(plant)).0, &settings.sanitized()).parameters
 }
 
+/// ρ in metres for `plant` as a share of its longest extent, and at least as many mean distances between neighbouring leaves as
+/// `spacings`. 0 where there is no foliage.
+pub fn relative_radius(plant: &Plant, share: f32, spacings: f32) -> f32 {
+    let parts = centered(parts_of(plant)).0;
+    parameters::relative_radius(&generators_of(&parts, PartKind::Foliage), extent(&parts), share, spacings)
+}
+
 fn parts_of(plant: &Plant) -> Vec<Part<'_>> {
     plant.parts.iter().map(|source| Part { source, mesh: Cow::Borrowed(&source.mesh) }).collect()
 }

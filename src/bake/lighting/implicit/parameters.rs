@@ -234,9 +234,12 @@ pub struct ImplicitParameters {
 /// ρ in metres for a plant with `generators`, one a primitive, whose longest extent is `extent` metres: as the settings
 /// say or as follows from the model. 0 where there are no generators or they have no extent.
 pub fn radius(generators: &[Generator], extent: f32, settings: &ImplicitSettings) -> f32 {
-    if let Some(radius) = settings.radius {
-        return radius;
-    }
+    settings.radius.unwrap_or_else(|| relative_radius(generators, extent, RADIUS_SHARE, RADIUS_SPACINGS))
+}
+
+/// ρ in metres as a share of the longest extent, `extent` or that of `generators`, and at least as many mean distances between
+/// neighbouring leaves as `spacings`. 0 where there are no generators or they have no extent.
+pub fn relative_radius(generators: &[Generator], extent: f32, share: f32, spacings: f32) -> f32 {
     // One that has no area may lie anywhere.
     let counted = generators.iter().filter(|generator| generator.area > 0.0);
     let bounds = Aabb::around(counted.map(|generator| generator.position));
@@ -252,7 +255,7 @@ pub fn radius(generators: &[Generator], extent: f32, settings: &ImplicitSettings
     let shares = || generators.iter().map(|g| f64::from(if heaviest > 0.0 { g.area / heaviest } else { 1.0 }));
     let number = shares().sum::<f64>().powi(2) / shares().map(|share| share * share).sum::<f64>();
     let spacing = (f64::from(relative.element_product()) / number.max(1.0)).cbrt() as f32;
-    (RADIUS_SHARE.max(RADIUS_SPACINGS * spacing).min(1.0)) * longest
+    share.max(spacings * spacing).min(1.0) * longest
 }
 
 /// The ambient field's first radius in metres for a plant whose longest extent is `extent` metres and whose field has

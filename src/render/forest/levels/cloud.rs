@@ -5,7 +5,7 @@ use std::{ops::Range, sync::Arc};
 
 use bevy::{
     asset::Handle,
-    log::{error, error_once},
+    log::error,
     render::{
         render_phase::TrackedRenderPass,
         render_resource::{
@@ -21,6 +21,7 @@ use glam::Vec3;
 
 use super::{
     model::ModelRenderer,
+    not_baked,
     reduced::{GpuReduced, Reduced},
 };
 use crate::{
@@ -144,12 +145,8 @@ impl LevelRenderer for CloudRenderer {
 
     fn upload(&self, forest: &Forest, upload: &mut ForestUpload) -> Box<dyn GpuLevel> {
         let plants = &forest.plants;
-        for plant in plants.iter().filter(|plant| plant.cloud().is_none()) {
-            error_once!(
-                "the plant `{}` is not drawn as a billboard cloud, as none was baked for it: list \
-                 `Representation::CLOUD` in `BakeSettings::representations`",
-                plant.plant.name
-            );
+        if let Some(told) = not_baked(plants, self) {
+            error!("{told}");
         }
         let limit = upload.gpu.device.limits().max_texture_array_layers as usize;
         let drawn = if plants.len() > limit {

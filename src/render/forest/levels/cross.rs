@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use bevy::{
     asset::Handle,
-    log::{error, error_once},
+    log::error,
     render::{
         render_phase::TrackedRenderPass,
         render_resource::{
@@ -20,6 +20,7 @@ use bevy::{
 };
 use glam::Vec3;
 
+use super::not_baked;
 use crate::{
     bake::{BakedPlant, levels::cross::Cross},
     cull::Grouping,
@@ -138,12 +139,8 @@ impl LevelRenderer for CrossRenderer {
 
     fn upload(&self, forest: &Forest, upload: &mut ForestUpload) -> Box<dyn GpuLevel> {
         let plants = &forest.plants;
-        for plant in plants.iter().filter(|plant| plant.cross().is_none()) {
-            error_once!(
-                "the plant `{}` is not drawn as crossed billboards, as none were baked for it: list \
-                 `Representation::CROSS` in `BakeSettings::representations`",
-                plant.plant.name
-            );
+        if let Some(told) = not_baked(plants, self) {
+            error!("{told}");
         }
         let (layers, limit) =
             (plants.len() * PLANES * SUN_LAYERS, upload.gpu.device.limits().max_texture_array_layers as usize);

@@ -1,21 +1,103 @@
-//! Reduced plants, drawn as full models: what simplified models, crown surfaces and the wood of billboard clouds have in common.
+//! Reduced plants, drawn as full models, with their shaders and in the light of their bake: simplified models [Cook et al. 2007],
+//! crown surfaces [Luft 2006, 4.1] and the wood of billboard clouds. They cast their own shadow.
 
 use std::sync::Arc;
 
-use bevy::render::render_phase::TrackedRenderPass;
+use bevy::{
+    log::error,
+    render::{render_phase::TrackedRenderPass, render_resource::RenderPipelineDescriptor},
+};
+use glam::Vec3;
 
-use super::model::ModelRenderer;
+use super::{model::ModelRenderer, not_baked};
 use crate::{
     bake::{BakedLevel, BakedPlant, lighting::BakedLighting},
+    cull::Grouping,
+    lod::Representation,
     plant::Plant,
     render::{
         components::Forest,
         forest::representation::{DrawnTrees, ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight, TreeDraw},
+        shaders::CanopyShaders,
     },
 };
 
 /// The plant that is drawn for a baked one, if there is one.
 pub type Reduced = fn(&BakedPlant) -> Option<BakedPlant>;
+
+/// Draws one kind of reduced plant.
+pub struct ReducedRenderer {
+    models: ModelRenderer,
+    representation: Representation,
+    label: &'static str,
+    tint: Vec3,
+    of: Reduced,
+}
+
+impl ReducedRenderer {
+    /// Draws simplified models.
+    pub fn thinned(shaders: &CanopyShaders) -> Self {
+        Self {
+            models: ModelRenderer::new(shaders),
+            representation: Representation::THINNED,
+            label: "simplified models",
+            tint: Vec3::new(0.9, 0.8, 0.1),
+            of: |plant| plant.thinned().map(|reduced| reduced.baked(plant)),
+        }
+    }
+
+    /// Draws crown surfaces.
+    pub fn crown_surface(shaders: &CanopyShaders) -> Self {
+        Self {
+            models: ModelRenderer::new(shaders),
+            representation: Representation::SURFACE,
+            label: "crown surfaces",
+            tint: Vec3::new(0.8, 0.3, 0.9),
+            of: |plant| plant.crown_surface().map(|surface| surface.baked(plant)),
+        }
+    }
+}
+
+impl LevelRenderer for ReducedRenderer {
+    fn representation(&self) -> Representation {
+        self.representation
+    }
+
+    fn label(&self) -> &'static str {
+        self.label
+    }
+
+    fn tint(&self) -> Vec3 {
+        self.tint
+    }
+
+    fn styled(&self) -> bool {
+        self.models.styled()
+    }
+
+    fn grouping(&self) -> Grouping {
+        self.models.grouping()
+    }
+
+    fn coarsest_shadow_texel(&self) -> Option<f64> {
+        self.models.coarsest_shadow_texel()
+    }
+
+    fn upload(&self, forest: &Forest, upload: &mut ForestUpload) -> Box<dyn GpuLevel> {
+        if let Some(told) = not_baked(&forest.plants, self) {
+            error!("{told}");
+        }
+        Box::new(GpuReduced::new(&self.models, forest, self.of, upload))
+    }
+
+    fn same_shape(&self, old: &BakedPlant, new: &BakedPlant) -> bool {
+        old.level(self.representation) == new.level(self.representation) && self.models.same_shape(old, new)
+    }
+
+    fn pipeline(&self, features: u32, target: LevelTarget) -> RenderPipelineDescriptor {
+        self.models.pipeline(features, target)
+    }
+}
 
 /// Reduced plants of a forest on the device.
 pub struct GpuReduced {
