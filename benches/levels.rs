@@ -5,6 +5,7 @@
 //! | `clusters` | which clustering is nearer to the plant at equal numbers of planes |
 //! | `reductions` | the publication's reductions [Franzke 2005, figs. 4.9, 4.19 to 4.23] on plants of their size |
 //! | `errors` | each level against the supersampled full model in the same light: four sides and above, three suns, 16 to 512 pixels |
+//! | `planes` | crosses of one to eight upright planes, from sides between them |
 //! | `cost` | a frame of many trees as each level |
 //! | `pop` | what a frame changes while a tree shrinks by one percent a frame |
 //! | `shimmer` | what a frame changes while the demo's camera turns by a tenth of a pixel a frame |
@@ -20,6 +21,8 @@ mod cost;
 mod errors;
 #[path = "levels/motion.rs"]
 mod motion;
+#[path = "levels/planes.rs"]
+mod planes;
 #[path = "levels/shapes.rs"]
 mod shapes;
 
@@ -40,6 +43,9 @@ fn main() {
     }
     if runs("errors") {
         errors::errors();
+    }
+    if runs("planes") {
+        planes::planes();
     }
     if runs("cost") {
         cost::cost();

@@ -176,6 +176,26 @@ fn a_cross_covers_what_the_plant_covers_in_every_mip() {
 }
 
 #[test]
+fn upright_planes_are_evenly_turned_and_each_shows_the_whole_plant() {
+    let plant = Arc::new(tree(1500, 4));
+    for uprights in [1, 3, 5] {
+        let settings = CrossSettings { uprights, resolution: 128, supersampling: 2, ..CrossSettings::default() };
+        let cross = bake_cross(&plant, &BakedLighting::Local, &settings);
+        assert!(cross.is_whole(false) && cross.planes.len() == uprights as usize + 1);
+        assert_eq!(cross.planes[uprights as usize].normal, Vec3::Y);
+        for (index, plane) in cross.uprights().iter().enumerate() {
+            let azimuth = plane.normal.x.atan2(plane.normal.z);
+            assert!((azimuth - index as f32 * std::f32::consts::PI / uprights as f32).abs() < 1e-5);
+            let view = View { center: plane.center, right: plane.u, up: plane.v, toward: plane.normal };
+            let shown = picture_area(&cross, index, 0) / projected_area(&plant, &view, 1024);
+            assert!((shown - 1.0).abs() < 0.04, "plane {index} of {uprights} shows {shown} of the plant");
+        }
+    }
+    let most = CrossSettings { uprights: 99, resolution: 64, supersampling: 1, ..CrossSettings::default() };
+    assert_eq!(bake_cross(&plant, &BakedLighting::Local, &most).uprights().len(), 8);
+}
+
+#[test]
 fn a_cross_has_no_foreign_colour_anywhere() {
     let plant = Arc::new(tree(1500, 5));
     let cross = bake_cross(&plant, &BakedLighting::Local, &CrossSettings { resolution: 128, ..Default::default() });

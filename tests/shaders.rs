@@ -343,7 +343,7 @@ fn gpu_structs_are_what_the_shaders_think() {
     twin!(
         layouts,
         "CrossVariant",
-        CrossVariantUniform { planes, transmission, first_layer, isotropic_fraction, first_light_layer }
+        CrossVariantUniform { planes, transmission, first_layer, isotropic_fraction, first_light_layer, uprights }
     );
     twin!(
         layouts,

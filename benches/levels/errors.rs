@@ -19,7 +19,7 @@ const TRUTH: usize = 4;
 /// Sizes from the largest to 16 pixels.
 const HALVINGS: usize = 5;
 /// In UTC: the sun high in the south, half high in the east, low in the west.
-const SUNS: [(&str, &str); 3] =
+pub const SUNS: [(&str, &str); 3] =
     [("high", "2026-06-21T11:15:00Z"), ("east", "2026-06-21T06:45:00Z"), ("low", "2026-06-21T17:45:00Z")];
 
 /// The plant with all of its levels.

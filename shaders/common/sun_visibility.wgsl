@@ -99,8 +99,8 @@ fn cascaded_visibility(relative: vec3<f32>, normal: vec3<f32>, bias: f32, pixel:
 }
 
 // Comparisons of a soft shadow, and the widest disc in texels that they cover without gaps: each reads two texels along an axis.
-const SOFT_COMPARISONS: i32 = 16;
-const WIDEST_DISC: f32 = 5.0;
+const SOFT_COMPARISONS: i32 = 32;
+const WIDEST_DISC: f32 = 8.0;
 
 // The same with an edge of +-`shadow.softness` metres: the mean of comparisons over a disc. Where the map is finer than the
 // comparisons are dense, the next coarser one is read.

@@ -1,9 +1,10 @@
-// Crossed billboards [Franzke 2005, 4.3]: two upright planes and a level one, eighteen pulled vertices a tree.
+// Crossed billboards [Franzke 2005, 4.3]: of the upright planes those two that face the viewer best, and the level one; eighteen
+// pulled vertices a tree.
 #import canopy::octahedral::decode_octahedral
-#import canopy::constants::{CROSS_VERTICES, PLANES, ISOTROPIC_LEVELS, LIGHT_SCALE, SUN_SCALE, WHOLE, FADE_SPAN, GONE}
+#import canopy::constants::{CROSS_VERTICES, ISOTROPIC_LEVELS, LIGHT_SCALE, SUN_SCALE, WHOLE, FADE_SPAN, GONE}
 #import canopy::cross_variant::cross_variants
 #import canopy::frame::{frame, light}
-#import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, rotated_vertex_position, level_distance, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, Crown, crown_of, depth_in_crown}
+#import canopy::instance::{Instance, view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, rotated_vertex_position, level_distance, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, Crown, crown_of, depth_in_crown}
 #import canopy::lighting::{Surface, shade_leaves, even_sky, leaf_transmission}
 #import canopy::output::finish
 #import canopy::sky::sky_transfer
@@ -24,6 +25,8 @@
 @group(3) @binding(0) var light_textures: texture_2d_array<f32>;
 #endif
 
+const PI: f32 = 3.14159265;
+
 struct Varying {
 #ifdef DEPTH_FIRST
     // The same bits in the pipelines of both stages.
@@ -33,7 +36,8 @@ struct Varying {
 #endif
     @location(0) relative: vec3<f32>,
     @location(1) uv: vec2<f32>,
-    @location(2) @interpolate(flat) layer: u32,
+    // Layer of the textures, and the variant.
+    @location(2) @interpolate(flat) layer: vec2<u32>,
     // The texture's right, up and front in world axes, the front towards the viewer.
     @location(3) @interpolate(flat) right: vec3<f32>,
     @location(4) @interpolate(flat) up: vec3<f32>,
@@ -78,8 +82,11 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     );
     let packed = trees[visible[index / CROSS_VERTICES]];
     let tree = unpack_tree(packed);
-    let plane_index = (index % CROSS_VERTICES) / 6u;
+    let slot = (index % CROSS_VERTICES) / 6u;
     let corner = corners[index % 6u];
+    let uprights = max(cross_variants[tree.variant].uprights, 1u);
+    let level = slot == 2u;
+    let plane_index = select(facing(tree, slot, uprights), uprights, level);
     let plane = cross_variants[tree.variant].planes[plane_index];
     let height = max(variants[tree.variant].height * tree.scale, 0.01);
 
@@ -88,10 +95,10 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     let toward = dot(normal, normalize(center));
     // A plane fades out when it is seen edge-on, where its texture is only a streak. The horizontal plane fades in only
     // when seen from above; from the side it would look like a shelf in the crown.
-    let level = plane_index == 2u;
     let edge = WHOLE + FADE_SPAN * (1.0 - smoothstep(select(0.10, 0.42, level), select(0.34, 0.72, level), abs(toward)));
-    let turned = turn(rotate(plane.u.xyz, tree.yaw), normal, center.xz, level);
-    let threshold = max(max(level_threshold(level_distance(packed, tree)), edge), turned.threshold);
+    let turned = turn(rotate(plane.u.xyz, tree.yaw), normal, center.xz, level, uprights);
+    let single = select(WHOLE, GONE, (slot == 1u) & (uprights == 1u));
+    let threshold = max(max(single, level_threshold(level_distance(packed, tree)), max(edge, turned.threshold));
 
     var out: Varying;
     let from_center = corner.x * turned.u + corner.y * rotate(plane.v.xyz, tree.yaw);
@@ -104,7 +111,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
         out.clip = vec4(0.0, 0.0, 0.5, 1.0);
     }
     out.uv = vec2(0.5 + 0.5 * corner.x, 0.5 - 0.5 * corner.y);
-    out.layer = cross_variants[tree.variant].first_layer + plane_index;
+    out.layer = vec2(cross_variants[tree.variant].first_layer + plane_index, tree.variant);
     out.right = rotate(plane.u.xyz, tree.yaw) / max(length(plane.u.xyz), 1e-6);
     out.up = rotate(plane.v.xyz, tree.yaw) / max(length(plane.v.xyz), 1e-6);
     // From behind, the other half of the crown faces the viewer: it is mirrored across the plane.
@@ -132,10 +139,20 @@ struct Turned {
     threshold: f32,
 }
 
+// The upright plane of `slot` 0 or 1: the two between whose normals, of front or back, the tree is seen.
+fn facing(tree: Instance, slot: u32, uprights: u32) -> u32 {
+    // The tree's foot in its own axes, from the viewer; of a viewer right above, any direction.
+    let foot = rotate(plant_vertex_position(tree, vec3(0.0)).relative, tree.yaw * vec2(1.0, -1.0));
+    let above = max(abs(foot.x), abs(foot.z)) < 1e-6;
+    // Normals turn from +Z over +X; half a turn on, a plane is seen from behind.
+    let azimuth = select(atan2(foot.x, foot.z), 0.0, above) / PI;
+    return (u32(fract(azimuth) * f32(uprights)) + slot) % uprights;
+}
+
 // Turns an upright plane about its middle towards the viewer. A plane that is seen at an angle shows its leaves as upright
-// streaks. So the one that the viewer is in front of is drawn, and between two, around 45 degrees, both. What they show stays as it was
+// streaks. So the one that the viewer is in front of is drawn, and around the middle between two, both. What they show stays as it was
 // baked: its light does not turn with it. `center`: from the viewer to the plane's middle, on the ground.
-fn turn(u: vec3<f32>, normal: vec3<f32>, center: vec2<f32>, level: bool) -> Turned {
+fn turn(u: vec3<f32>, normal: vec3<f32>, center: vec2<f32>, level: bool, uprights: u32) -> Turned {
     let far = length(center);
     if level || far < 1e-3 {
         return Turned(u, WHOLE);
@@ -147,7 +164,10 @@ fn turn(u: vec3<f32>, normal: vec3<f32>, center: vec2<f32>, level: bool) -> Turn
     let wanted = normalize(mix(front, view, TURN));
     let rotation = vec2(dot(front, wanted), front.x * wanted.y - front.y * wanted.x);
     let across = vec2(u.x * rotation.x - u.z * rotation.y, u.x * rotation.y + u.z * rotation.x);
-    return Turned(vec3(across.x, u.y, across.y), WHOLE + FADE_SPAN * (1.0 - smoothstep(0.58, 0.72, abs(toward))));
+    // Half of the angle between two planes.
+    let middle = 0.5 * PI / f32(uprights);
+    let seen = smoothstep(cos(1.21 * middle), cos(0.98 * middle), abs(toward));
+    return Turned(vec3(across.x, u.y, across.y), WHOLE + FADE_SPAN * (1.0 - seen));
 }
 
 // The twin of `basis` in src/bake/levels/cross/sun.rs. `sun`: right, zenith, front; there are no suns below the horizon.
@@ -161,7 +181,7 @@ fn set_sun_basis(sun: vec3<f32>, out: ptr<function, Varying>) {
 // Depth alone, with the alpha test of the light that follows.
 @fragment
 fn depth(in: Varying) -> @location(0) vec4<f32> {
-    let texel = textureSampleLevel(color_textures, texture_sampler, in.uv, in.layer, mip_level(in.uv));
+    let texel = textureSampleLevel(color_textures, texture_sampler, in.uv, in.layer.x, mip_level(in.uv));
     if texel.a < unpack_look(in.look).threshold {
         discard;
     }
@@ -175,17 +195,17 @@ fn depth(in: Varying) -> @location(0) vec4<f32> {
 fn styled(in: Varying) -> StyledSurface {
     let look = unpack_look(in.look);
     let level = mip_level(in.uv);
-    let texel = textureSampleLevel(color_textures, texture_sampler, in.uv, in.layer, level);
+    let texel = textureSampleLevel(color_textures, texture_sampler, in.uv, in.layer.x, level);
     if texel.a < look.threshold {
         discard;
     }
-    let properties = textureSampleLevel(property_textures, texture_sampler, in.uv, in.layer, level);
+    let properties = textureSampleLevel(property_textures, texture_sampler, in.uv, in.layer.x, level);
     let local = decode_octahedral(properties.xy);
     var normal = vec4(normalize(in.right * local.x + in.up * local.y + in.front * local.z), properties.b);
     let foliage = properties.a > 0.5;
 #ifndef OWN_NORMALS
     let crown = crown_surface(in.relative, Crown(in.crown_center, in.crown_inverse_extents));
-    normal = select(normal, crown, foliage & (variants[in.layer / PLANES].realigned < 0.5));
+    normal = select(normal, crown, foliage & (variants[in.layer.y].realigned < 0.5));
 #endif
     let albedo = mix(texel.rgb, tint_foliage(texel.rgb, look.tint), properties.a);
     let identity = vec2(select(WOOD_LAYER, in.identity.x, foliage), in.identity.y);
@@ -196,9 +216,9 @@ fn styled(in: Varying) -> StyledSurface {
 @fragment
 fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let look = unpack_look(in.look);
-    let variant = in.layer / PLANES;
+    let variant = in.layer.y;
     let level = mip_level(in.uv);
-    let texel = textureSampleLevel(color_textures, texture_sampler, in.uv, in.layer, level);
+    let texel = textureSampleLevel(color_textures, texture_sampler, in.uv, in.layer.x, level);
     var coverage = 1.0;
 #ifdef ALPHA_TO_COVERAGE
     coverage = clamp((texel.a - look.threshold) / max(fwidth(texel.a), 1e-4) + 0.5, 0.0, 1.0);
@@ -210,7 +230,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         discard;
     }
 #endif
-    let properties = textureSampleLevel(property_textures, texture_sampler, in.uv, in.layer, level);
+    let properties = textureSampleLevel(property_textures, texture_sampler, in.uv, in.layer.x, level);
     let local = decode_octahedral(properties.xy);
     let normal = normalize(in.right * local.x + in.up * local.y + in.front * local.z);
 
@@ -235,7 +255,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let stand = stand_light(ground.surrounding_cover * variants[variant].cover_weight, 1.0 - look.relative_height);
     var visibility = terrain_visibility(ground, look.height);
 #ifdef TRANSFER
-    let light_layer = cross_variants[variant].first_light_layer + in.layer % PLANES;
+    let light_layer = cross_variants[variant].first_light_layer + in.layer.x - cross_variants[variant].first_layer;
     let stored = textureSampleLevel(light_textures, texture_sampler, in.uv, light_layer, level) * LIGHT_SCALE;
     let side = in.right * stored.x + in.up * stored.y + in.front * stored.z;
     // The second band is not relative to the mean here.
@@ -260,7 +280,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         let cascades = cascaded_visibility(entry, light.key_direction, 0.25, in.clip.xy);
         visibility *= mix(mix(1.0, stand.key_transmittance, foliage), cascades.visibility, cascades.weight);
     }
-    let sun_layer = 2u * in.layer;
+    let sun_layer = 2u * in.layer.x;
     let sun = textureSampleLevel(sun_textures, texture_sampler, in.uv, sun_layer, level);
     let more_sun = textureSampleLevel(sun_textures, texture_sampler, in.uv, sun_layer + 1u, level);
     var lit = max(dot(sun, in.sun_basis) + dot(more_sun, in.more_sun_basis), 0.0);

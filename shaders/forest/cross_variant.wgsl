@@ -1,7 +1,7 @@
 // Data of each plant's crossed billboards, for the view and for the shadow maps.
 #define_import_path canopy::cross_variant
 
-#import canopy::constants::{PLANES, ISOTROPIC_VECTORS}
+#import canopy::constants::{MOST_PLANES, ISOTROPIC_VECTORS}
 
 struct Plane {
     center: vec4<f32>,
@@ -11,7 +11,8 @@ struct Plane {
 }
 
 struct CrossVariant {
-    planes: array<Plane, PLANES>,
+    // The upright planes, then the level one.
+    planes: array<Plane, MOST_PLANES>,
     // Factor for light through its leaves, as in `Surface`.
     transmission: vec3<f32>,
     // First layer of its textures, and of its lighting textures.
@@ -19,6 +20,8 @@ struct CrossVariant {
     // Fraction of a texel's leaf area with isotropic normals, 0..1, mip by mip.
     isotropic_fraction: array<vec4<f32>, ISOTROPIC_VECTORS>,
     first_light_layer: u32,
+    // Number of upright planes.
+    uprights: u32,
 }
 
 @group(2) @binding(3) var<storage, read> cross_variants: array<CrossVariant>;

@@ -21,7 +21,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     let tree = unpack_tree(trees[visible[index / CASTER_VERTICES]]);
     let upright = (index % CASTER_VERTICES) < 6u;
     let corner = corners[index % 6u];
-    let plane_index = select(2u, 0u, upright);
+    let plane_index = select(cross_variants[tree.variant].uprights, 0u, upright);
     let plane = cross_variants[tree.variant].planes[plane_index];
     var u = rotate(plane.u.xyz, tree.yaw);
     let v = rotate(plane.v.xyz, tree.yaw);

@@ -213,7 +213,11 @@ pub fn bake_settings(quality: &Quality, lighting: LightingSettings) -> BakeSetti
     BakeSettings {
         representations,
         lighting,
-        cross: CrossSettings { resolution: quality.cross_resolution, ..CrossSettings::default() },
+        cross: CrossSettings {
+            uprights: quality.cross_planes,
+            resolution: quality.cross_resolution,
+            ..CrossSettings::default()
+        },
         ..BakeSettings::default()
     }
 }

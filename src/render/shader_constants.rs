@@ -112,7 +112,7 @@ pub fn constants() -> Vec<(&'static str, &'static str, Value)> {
         ("LIST_HEADER", "Words before the ranges of the groups.", uint(device_lists::HEADER)),
         ("AMBIENT_FITTED", "Leaves that are lit by k_a with fitted constants.", (AmbientTerm::Fitted as u32).into()),
         ("AMBIENT_PUBLISHED", "Leaves that are lit by k_a as published.", (AmbientTerm::Published as u32).into()),
-        ("PLANES", "Planes of a cross.", uint(forest::PLANES)),
+        ("MOST_PLANES", "The most planes of a cross.", uint(forest::MOST_PLANES)),
         ("CROSS_VERTICES", "Vertices of a tree's cross.", forest::CROSS_VERTICES.into()),
         ("CASTER_VERTICES", "Vertices of a tree's cross as a caster.", forest::CROSS_CASTER_VERTICES.into()),
         ("ISOTROPIC_LEVELS", "Mips for which the isotropic fraction is known.", uint(cross::ISOTROPIC_LEVELS)),

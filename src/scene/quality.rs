@@ -4,6 +4,7 @@ use bevy::reflect::Reflect;
 use serde::Deserialize;
 
 use super::check::Check;
+use crate::bake::levels::cross::MOST_UPRIGHTS;
 use crate::lod::{FadeBand, Levels, MAX_LEVELS, Representation};
 
 /// The representations that a scene file can name.
@@ -73,6 +74,9 @@ pub struct Quality {
     /// Edge of a cross plane's texture in texels, 64 to 1024, rounded up to a power of two. Higher: sharper far trees,
     /// memory. Default 256.
     pub cross_resolution: u32,
+    /// Upright planes of a cross, 1 to 8, each of which shows the tree from another side. More: outlines as the models have them,
+    /// memory; not slower. Default 2.
+    pub cross_planes: u32,
     /// Distance in metres beyond which no tree is drawn, 100 to 200000. Default 20000.
     pub view_distance: f64,
     /// Greatest error of the drawn terrain in pixels, 0.25 to 32. Lower: more triangles. Default 1.
@@ -93,6 +97,7 @@ impl Default for Quality {
             levels: Vec::new(),
             msaa: 4,
             cross_resolution: 256,
+            cross_planes: 2,
             view_distance: 20_000.0,
             terrain_error: 1.0,
         }
@@ -174,6 +179,7 @@ impl Quality {
             check.problem("quality.msaa", format!("is {}", self.msaa), "write 1 (off) or 4");
         }
         check.count("quality.cross_resolution", self.cross_resolution, 64..=1024);
+        check.count("quality.cross_planes", self.cross_planes, 1..=MOST_UPRIGHTS);
         check.number("quality.view_distance", self.view_distance, 100.0..=200_000.0, "m");
         check.number("quality.terrain_error", self.terrain_error, 0.25..=32.0, "pixels");
     }

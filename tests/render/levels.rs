@@ -10,7 +10,7 @@ use canopy::{
     app::{RenderedImage, Renderer, Side, Studio},
     bake::{
         BakeSettings, BakedLevel, BakedPlant, bake_plant,
-        levels::cloud::CloudSettings,
+        levels::{cloud::CloudSettings, cross::CrossSettings},
         lighting::{LightingSettings, transfer::TransferSettings},
     },
     plant::grow::{GrowParameters, grow},
@@ -247,4 +247,37 @@ fn crosses_whose_depth_is_drawn_first_look_the_same() {
         assert!(statistics.iter().any(|level| level.trees > 50), "{statistics:?}");
     }
     assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+/// From the sides that a plane faces, a cross with more of them is the same; from between, it is nearer to the model.
+#[test]
+fn a_cross_with_more_upright_planes_is_nearer_to_the_model_from_between_them() {
+    let _gpu = gpu();
+    let plant = Arc::new(grow(&GrowParameters::broadleaf(), 1, 6000).expect("a shipped species grows"));
+    let studio = |uprights: u32| {
+        let cross = CrossSettings { uprights, resolution: 128, supersampling: 2, ..CrossSettings::default() };
+        let settings = BakeSettings { cross, lighting: LightingSettings::Local, ..BakeSettings::default() };
+        Studio::new(bake_plant(plant.clone(), &settings, None).0, 96, None, 4).expect("a renderer")
+    };
+    let image = |studio: &mut Studio, degrees: f32, level| {
+        studio.turn(degrees.to_radians());
+        studio.show(Some(level)).expect("a tree");
+        studio.cutout(Side::South, &Sun::default(), 1.0).expect("an image")
+    };
+    let (mut two, mut four, mut one) = (studio(2), studio(4), studio(1));
+    let mut errors = |degrees: f32| {
+        let truth = image(&mut two, degrees, Representation::MODEL);
+        [&mut one, &mut two, &mut four].map(|studio| image(studio, degrees, Representation::CROSS).error(&truth).rmse)
+    };
+    for degrees in [0.0, 90.0, 180.0] {
+        let [_, two, four] = errors(degrees);
+        assert!((two - four).abs() < 1e-3, "{degrees} degrees: {two} with two, {four} with four");
+    }
+    for degrees in [45.0, 135.0, 225.0] {
+        let [one, two, four] = errors(degrees);
+        println!("{degrees} degrees: {one:.3}, {two:.3}, {four:.3}");
+        assert!(four < 0.85 * two, "{degrees} degrees: {two} with two, {four} with four");
+    }
+    let [one, two, _] = errors(90.0);
+    assert!(two < 0.85 * one, "from the side: {one} with one, {two} with two");
 }

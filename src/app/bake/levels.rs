@@ -91,7 +91,7 @@ pub fn facts(plant: &BakedPlant) -> Vec<LevelFacts> {
         all.push(LevelFacts {
             representation: Representation::CROSS,
             title: "Crossed billboards",
-            triangles: 2 * cross.planes.len(),
+            triangles: 2 * cross.planes.len().min(3),
             bytes: chains.flat_map(|chain| &chain.levels).map(Vec::len).sum(),
             deviation: Some(deviation_of_cross(&plant.plant, cross)),
             notes: vec![format!("{} planes", cross.planes.len())],
@@ -113,7 +113,7 @@ fn deviation_of_cross(plant: &Plant, cross: &Cross) -> f32 {
             let weight = f64::from(mesh.area(triangle));
             let corners = triangle.map(|corner| mesh.positions.get(corner as usize).copied().unwrap_or_default());
             let middle = corners.iter().sum::<Vec3>() / 3.0;
-            for plane in cross.planes.iter().take(2) {
+            for plane in cross.uprights() {
                 sum += weight * f64::from((middle - plane.center).dot(plane.normal).powi(2));
                 area += weight;
             }

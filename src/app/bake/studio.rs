@@ -81,6 +81,8 @@ const MARGIN: f64 = 1.08;
 pub struct Studio {
     renderer: Renderer,
     plant: BakedPlant,
+    /// Of the tree, radians.
+    yaw: f32,
     forest: Option<Entity>,
     backdrop: Entity,
     colors: [bevy::asset::Handle<StandardMaterial>; 2],
@@ -126,7 +128,12 @@ impl Studio {
             ))
             .id();
         renderer.set_shadow(SunShadowSettings::default());
-        Ok(Self { renderer, plant, forest: None, backdrop, colors, size, center, extent, warm: false })
+        Ok(Self { renderer, plant, yaw: 0.0, forest: None, backdrop, colors, size, center, extent, warm: false })
+    }
+
+    /// Turns the tree that is shown next by `yaw` radians.
+    pub fn turn(&mut self, yaw: f32) {
+        self.yaw = yaw;
     }
 
     /// Shows the tree as one representation at all distances; with `None` it is gone.
@@ -147,7 +154,7 @@ impl Studio {
             world.despawn(forest);
         }
         if let Some(levels) = levels {
-            let tree = Tree { position: DVec3::ZERO, yaw: 0.0, scale: 1.0, variant: 0, tint: 0.0, index: 0 };
+            let tree = Tree { position: DVec3::ZERO, yaw: self.yaw, scale: 1.0, variant: 0, tint: 0.0, index: 0 };
             let stand = PackedStand::new(&Stand { trees: vec![tree] }, DEFAULT_CELL_SIZE, &[self.plant.size()])?;
             let forest = Forest {
                 stand: Arc::new(stand),

@@ -51,6 +51,7 @@ impl Stages {
         let quality = Quality {
             levels: further.iter().enumerate().map(level).collect(),
             cross_resolution: scene.quality.cross_resolution,
+            cross_planes: scene.quality.cross_planes,
             view_distance: scene.quality.view_distance,
             ..default
         };
@@ -115,7 +116,8 @@ mod tests {
             |scene| scene.quality.terrain_error = 4.0,
         ];
         assert!(drawn.into_iter().all(|change| stages.built_as(&with(change)) == built));
-        let baked: [fn(&mut Scene); 3] = [
+        let baked: [fn(&mut Scene); 4] = [
+            |scene| scene.quality.cross_planes = 4,
             |scene| scene.quality.cross_resolution = 64,
             |scene| scene.quality.view_distance = 500.0,
             |scene| scene.seed = 2,

@@ -85,7 +85,8 @@ fn levels(
     }
     if let (Some(fade), Some(cross)) = (fade, plant.cross()) {
         let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(cross_mesh(cross));
-        let texture = add_texture(app, &atlas(&cross.textures.color), ImageAddressMode::ClampToEdge);
+        let images: Vec<&MipChain> = shown(cross).into_iter().filter_map(|plane| cross.textures.color.get(plane)).collect();
+        let texture = add_texture(app, &atlas(&images), ImageAddressMode::ClampToEdge);
         let material = add_material(app, foliage(StandardMaterial { base_color_texture: Some(texture), ..matt() }));
         let range = VisibilityRange { start_margin: fade, end_margin: f32::MAX..f32::MAX, use_aabb: false };
         levels.push(Level { mesh, material, range: Some(range) });
@@ -173,11 +174,20 @@ pub fn build_mesh(positions: Vec<Vec3>, normals: Vec<Vec3>, uvs: Vec<Vec2>, indi
         .with_inserted_indices(Indices::U32(indices))
 }
 
+/// The planes that stock Bevy draws: two upright ones at right angles as far as there are, and the level one.
+fn shown(cross: &Cross) -> Vec<usize> {
+    let uprights = cross.uprights().len();
+    let mut planes = vec![0, uprights / 2, uprights];
+    planes.dedup();
+    planes
+}
+
 /// The planes' quads; each takes its image's column of the [`atlas`].
 fn cross_mesh(cross: &Cross) -> Mesh {
-    let count = cross.planes.len() as f32;
+    let planes: Vec<_> = shown(cross).into_iter().filter_map(|plane| cross.planes.get(plane)).collect();
+    let count = planes.len() as f32;
     let (mut positions, mut normals, mut uvs, mut indices) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    for (column, plane) in cross.planes.iter().enumerate() {
+    for (column, plane) in planes.into_iter().enumerate() {
         let first = positions.len() as u32;
         for (s, t) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
             positions.push(plane.center + plane.u * s + plane.v * t);
@@ -190,7 +200,7 @@ fn cross_mesh(cross: &Cross) -> Mesh {
 }
 
 /// The images side by side, mip by mip.
-fn atlas(images: &[MipChain]) -> MipChain {
+fn atlas(images: &[&MipChain]) -> MipChain {
     let Some(first) = images.first() else {
         return MipChain { width: 1, height: 1, levels: vec![vec![0; 4]] };
     };

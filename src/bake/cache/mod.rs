@@ -181,7 +181,7 @@ mod tests {
             change(&mut settings);
             BakeSettings { lighting: LightingSettings::Expressive(settings), ..base }
         };
-        let mut changed = [base; 15];
+        let mut changed = [base; 16];
         changed[0].lighting = LightingSettings::Local;
         changed[1] = expressive(&|settings| settings.radius = Some(0.1));
         changed[2] = expressive(&|settings| settings.radius = Some(0.1f32.next_up()));
@@ -197,10 +197,11 @@ mod tests {
         changed[12].thinned.share = 0.5;
         changed[13].surface.share = 0.5;
         changed[14].surface.radius = 0.5;
+        changed[15].cross.uprights = 3;
         let mut keys: Vec<String> =
             changed.iter().chain([&base]).map(|settings| CacheKey::new(&plant, settings).to_hex()).collect();
         keys.sort();
         keys.dedup();
-        assert_eq!(keys.len(), 16);
+        assert_eq!(keys.len(), 17);
     }
 }

@@ -7,7 +7,7 @@ use glam::Vec3;
 use crate::{
     bake::{
         BakedPlant,
-        levels::cross::ISOTROPIC_LEVELS,
+        levels::cross::{ISOTROPIC_LEVELS, MOST_UPRIGHTS},
         lighting::{
             BakedLighting,
             transfer::{PackedPart, TransferSettings, code_words, mean_words},
@@ -57,10 +57,10 @@ pub struct PlaneUniform {
     pub normal: [f32; 4],
 }
 
-/// Planes of a cross.
-pub const PLANES: usize = 3;
-/// Vertices that the shader pulls for a tree's cross.
-pub const CROSS_VERTICES: u32 = 6 * PLANES as u32;
+/// The most planes of a cross.
+pub const MOST_PLANES: usize = MOST_UPRIGHTS as usize + 1;
+/// Vertices that the shader pulls for a tree's cross: those two upright planes that face the viewer best, and the level one.
+pub const CROSS_VERTICES: u32 = 18;
 /// Vertices that the caster's shader pulls for a tree's cross: an upright plane and the level one.
 pub const CROSS_CASTER_VERTICES: u32 = 12;
 
@@ -107,8 +107,8 @@ pub struct VariantUniform {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct CrossVariantUniform {
-    /// Two upright planes and a level one.
-    pub planes: [PlaneUniform; PLANES],
+    /// The upright planes, then the level one.
+    pub planes: [PlaneUniform; MOST_PLANES],
     /// Mean factor for light through its leaves ([`PlantMaterial::transmission`]).
     pub transmission: [f32; 3],
     /// First layer of its textures.
@@ -117,8 +117,10 @@ pub struct CrossVariantUniform {
     pub isotropic_fraction: [[f32; 4]; ISOTROPIC_LEVELS / 4],
     /// First layer of its lighting textures, if it has any.
     pub first_light_layer: u32,
+    /// Number of upright planes.
+    pub uprights: u32,
     /// WGSL rounds the size up to 16 bytes.
-    pub padding: [u32; 3],
+    pub padding: [u32; 2],
 }
 
 /// `Part` of `shaders/forest/model.wgsl`.
@@ -249,14 +251,10 @@ fn variant(plant: &BakedPlant, size: &PlantSize) -> VariantUniform {
 
 /// The uniforms of the crosses of each plant; planes without extent for a plant without a cross.
 pub fn cross_variants(plants: &[BakedPlant]) -> Vec<CrossVariantUniform> {
-    let mut first_light_layer = 0;
+    let (mut first_layer, mut first_light_layer) = (0, 0);
     let mut variants = Vec::with_capacity(plants.len());
-    for (index, plant) in plants.iter().enumerate() {
-        let mut variant = CrossVariantUniform {
-            first_layer: (index * PLANES) as u32,
-            first_light_layer,
-            ..CrossVariantUniform::default()
-        };
+    for plant in plants {
+        let mut variant = CrossVariantUniform { first_layer, first_light_layer, ..CrossVariantUniform::default() };
         if let Some(cross) = plant.cross() {
             for (slot, plane) in variant.planes.iter_mut().zip(&cross.planes) {
                 *slot = PlaneUniform {
@@ -268,6 +266,8 @@ pub fn cross_variants(plants: &[BakedPlant]) -> Vec<CrossVariantUniform> {
             }
             variant.transmission = cross.transmission.to_array();
             variant.isotropic_fraction = bytemuck::cast(cross.isotropic_fraction);
+            variant.uprights = cross.uprights().len() as u32;
+            first_layer += cross.planes.len() as u32;
             first_light_layer += cross.textures.light.len() as u32;
         }
         variants.push(variant);

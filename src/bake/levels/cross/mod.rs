@@ -1,8 +1,8 @@
 //! Crossed billboards made from the model itself [Franzke 2005, 4.3, "Kreuzebenen"].
 //!
-//! Two vertical planes at right angles through the trunk's axis and a horizontal one through the foliage's centre.
-//! Each plane's texture shows the *whole* plant seen along the plane's normal, so three quads represent the tree from
-//! every side. A texel has a base colour, normal, ambient term and a fraction of foliage; how much of the sun's light it shows,
+//! Upright planes through the trunk's axis, two at right angles by default, and a level one through the foliage's centre.
+//! Each plane's texture shows the *whole* plant seen along the plane's normal, so a few quads represent the tree from
+//! every side. More upright planes are more views of it: of any number, those two are drawn that face the viewer best. A texel has a base colour, normal, ambient term and a fraction of foliage; how much of the sun's light it shows,
 //! for every sun (`sun.rs`); and if the plant is lit by radiance transfer, the transfer of the sky's light (`light.rs`).
 //!
 //! ```text
@@ -11,7 +11,7 @@
 //!                                                           \-one sample of each texel--sun.rs--> light of the sun
 //! ```
 //!
-//! Cost: three images of (resolution * supersampling)² samples. Limits: a plane looks right along its normal and
+//! Cost: an image for each plane, of (resolution * supersampling)² samples. Limits: a plane looks right along its normal and
 //! lacks parallax in other directions; a plane seen from behind shows the texture of its front, mirrored.
 
 pub(super) mod color;
@@ -38,7 +38,7 @@ use crate::plant::{Bounds, PartKind, Plant, PlantMaterial, geometry, texture::Al
 /// Crossed billboards of one plant.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cross {
-    /// The planes: facing +Z, facing +X, and facing up. Always three.
+    /// The upright planes, evenly turned from the one that faces +Z over +X; the last one faces up.
     pub planes: Vec<CrossPlane>,
     /// Their textures, in the order of the planes.
     pub textures: CrossTextures,
@@ -52,6 +52,11 @@ pub struct Cross {
 }
 
 impl Cross {
+    /// The upright planes.
+    pub fn uprights(&self) -> &[CrossPlane] {
+        self.planes.split_last().map_or(&[], |(_, uprights)| uprights)
+    }
+
     /// Whether the lists go together, of a plant that is lit by radiance transfer or not, and all values are in their
     /// ranges.
     pub fn is_whole(&self, of_transfer: bool) -> bool {
@@ -59,6 +64,7 @@ impl Cross {
         let planes = self.planes.len();
         let finite = |plane: &CrossPlane| [plane.center, plane.u, plane.v, plane.normal].iter().all(|v| v.is_finite());
         self.planes.iter().all(finite)
+            && (2..=MOST_UPRIGHTS as usize + 1).contains(&planes)
             && [color.len(), properties.len(), sun.len()] == [planes, planes, 2 * planes]
             && light.len() == if of_transfer { planes } else { 0 }
             && color.iter().chain(properties).chain(sun).chain(light).all(MipChain::is_whole)
@@ -66,6 +72,9 @@ impl Cross {
             && self.isotropic_fraction.iter().all(|share| (0.0..=1.0).contains(share))
     }
 }
+
+/// The most upright planes.
+pub const MOST_UPRIGHTS: u32 = 8;
 
 /// Mips for which [`Cross::isotropic_fraction`] is known.
 pub const ISOTROPIC_LEVELS: usize = 8;
@@ -128,6 +137,9 @@ pub struct CrossTextures {
 /// Settings of the crossed billboards. Values out of range are clamped.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CrossSettings {
+    /// Upright planes, 1..=[`MOST_UPRIGHTS`], each seen from another side: the outline is that of the tree within a quarter of a turn
+    /// over their number. All trees draw as many triangles; memory and the time of the bake grow in proportion.
+    pub uprights: u32,
     /// Edge of the square textures in texels, 64..=1024, rounded up to a power of two. Larger textures allow crosses
     /// nearer to the viewer; memory grows with the square (256: 4.2 MB per plant, 5.2 MB if it is lit by transfer).
     pub resolution: u32,
@@ -144,7 +156,7 @@ pub struct CrossSettings {
 
 impl Default for CrossSettings {
     fn default() -> Self {
-        Self { resolution: 256, supersampling: 4, normal_smoothing: 0.0, fade: AlphaFade::default() }
+        Self { uprights: 2, resolution: 256, supersampling: 4, normal_smoothing: 0.0, fade: AlphaFade::default() }
     }
 }
 
@@ -154,6 +166,7 @@ impl CrossSettings {
         let smoothing =
             if self.normal_smoothing.is_finite() { self.normal_smoothing } else { Self::default().normal_smoothing };
         Self {
+            uprights: self.uprights.clamp(1, MOST_UPRIGHTS),
             resolution: self.resolution.clamp(64, 1024).next_power_of_two(),
             supersampling: self.supersampling.clamp(1, 8),
             normal_smoothing: smoothing.clamp(0.0, 0.1),
@@ -163,11 +176,10 @@ impl CrossSettings {
 }
 
 /// Makes the crossed billboards of `plant` with the normals and the ambient term of its `lighting`; missing values are
-/// the plant's own, or 1. The planes cover the plant's bounds exactly; an empty plant gets three planes without extent
-/// and wholly transparent textures.
+/// the plant's own, or 1. The planes cover the plant exactly; an empty plant gets planes without extent and wholly transparent textures.
 pub fn bake_cross(plant: &Arc<Plant>, lighting: &BakedLighting, settings: &CrossSettings) -> Cross {
     let settings = settings.sanitized();
-    let planes = planes(plant);
+    let planes = planes(plant, settings.uprights);
     let resolution = settings.resolution as usize;
     let sides = light::vertex_sides(lighting);
     let render = |plane| render_plane(plant, lighting, sides.as_deref(), plane, &settings);
@@ -211,23 +223,44 @@ pub(in crate::bake::levels) fn mean_isotropic_fraction(images: &[Vec<IsotropicSu
     })
 }
 
-fn planes(plant: &Plant) -> Vec<CrossPlane> {
+fn planes(plant: &Plant, uprights: u32) -> Vec<CrossPlane> {
     let bounds = plant.bounds().filter(|bounds| bounds.min.is_finite() && bounds.max.is_finite());
     let bounds = bounds.unwrap_or(Bounds { min: Vec3::ZERO, max: Vec3::ZERO });
     let half = 0.5 * bounds.size();
     let middle = bounds.center();
     let height = foliage_height(plant).unwrap_or(middle.y).clamp(bounds.min.y, bounds.max.y);
-    let plane = |center: Vec3, right: Vec3, up: Vec3| CrossPlane {
-        center,
-        u: right * half,
-        v: up * half,
-        normal: right.cross(up),
+    let upright = |index: u32| {
+        let (sin, cos) = quarter_exact(f64::from(index) / f64::from(uprights));
+        let right = Vec3::new(cos, 0.0, -sin);
+        let (least, most) = reach(plant, right);
+        CrossPlane {
+            center: right * (0.5 * (least + most)) + Vec3::Y * middle.y,
+            u: right * (0.5 * (most - least)),
+            v: Vec3::Y * half.y,
+            normal: Vec3::new(sin, 0.0, cos),
+        }
     };
-    vec![
-        plane(middle.with_z(0.0), Vec3::X, Vec3::Y),
-        plane(middle.with_x(0.0), Vec3::NEG_Z, Vec3::Y),
-        plane(middle.with_y(height), Vec3::X, Vec3::NEG_Z),
-    ]
+    let level = CrossPlane {
+        center: middle.with_y(height),
+        u: Vec3::X * half.x,
+        v: Vec3::NEG_Z * half.z,
+        normal: Vec3::Y,
+    };
+    (0..uprights).map(upright).chain([level]).collect()
+}
+
+/// Sine and cosine of a part of half a turn; exactly 0 and 1 for half of it.
+fn quarter_exact(part: f64) -> (f32, f32) {
+    let (sin, cos) = (part * std::f64::consts::PI).sin_cos();
+    if part == 0.5 { (1.0, 0.0) } else { (sin as f32, cos as f32) }
+}
+
+/// How far the plant reaches along `axis`, metres from its foot: least and most. 0 where it is not finite.
+fn reach(plant: &Plant, axis: Vec3) -> (f32, f32) {
+    let positions = plant.parts.iter().flat_map(|part| &part.mesh.positions);
+    let reached = positions.map(|position| position.dot(axis));
+    let (least, most) = reached.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)));
+    if least.is_finite() && most.is_finite() { (least, most) } else { (0.0, 0.0) }
 }
 
 /// Height of the centre of the foliage's area, metres.

@@ -188,7 +188,7 @@ mod tests {
     #[test]
     fn the_axes_have_the_zenith_in_the_middle() {
         let plant = grow(&GrowParameters::broadleaf(), 1, 5000).unwrap();
-        for plane in planes(&plant) {
+        for plane in planes(&plant, 3) {
             let axes = axes(&plane);
             assert!((axes * Vec3::Y).abs_diff_eq(Vec3::Y, 1e-6), "{plane:?}");
             assert!((axes * plane.normal).y.abs() < 1e-6 || plane.normal.y == 1.0, "{plane:?}");
@@ -203,7 +203,7 @@ mod tests {
         for parameters in [GrowParameters::broadleaf(), GrowParameters::conifer()] {
             let plant = Arc::new(grow(&parameters, 1, 5000).unwrap());
             let tracer = PlantTracer::new(&plant);
-            let planes = planes(&plant);
+            let planes = planes(&plant, 2);
             let settings = CrossSettings { resolution: 64, supersampling: 2, ..CrossSettings::default() };
             let images: Vec<Image> =
                 planes.iter().map(|p| render_plane(&plant, &BakedLighting::Local, None, p, &settings)).collect();
@@ -258,7 +258,7 @@ mod tests {
     #[test]
     fn an_empty_plant_has_no_light() {
         let plant = Arc::new(Plant::default());
-        let planes = planes(&plant);
+        let planes = planes(&plant, 2);
         let none = coefficients(&plant, &planes, &[vec![], vec![], vec![]]);
         assert!(none.len() == 3 && none.iter().all(Vec::is_empty));
     }

@@ -33,7 +33,7 @@ use crate::{
                 DEPTH_FIRST, DrawnTrees, ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight, TreeDraw,
                 TreeVertices,
             },
-            uniforms::{CROSS_CASTER_VERTICES, CROSS_VERTICES, PLANES, cross_variants},
+            uniforms::{CROSS_CASTER_VERTICES, CROSS_VERTICES, cross_variants},
         },
         gpu,
         shaders::{CanopyShaders, ShaderFile},
@@ -143,13 +143,13 @@ impl LevelRenderer for CrossRenderer {
             error!("{told}");
         }
         let (layers, limit) =
-            (plants.len() * PLANES * SUN_LAYERS, upload.gpu.device.limits().max_texture_array_layers as usize);
+            (plane_count(plants) * SUN_LAYERS, upload.gpu.device.limits().max_texture_array_layers as usize);
         if layers > limit {
             error!(
                 "a forest's {} plants need {layers} texture layers for their crossed billboards, but this device has at \
                  most {limit}: they are not drawn so; use at most {} plants in a forest, or another list of levels",
                 plants.len(),
-                limit / (PLANES * SUN_LAYERS)
+                limit * plants.len() / layers
             );
             return Box::new(GpuCrosses { drawn: None });
         }
@@ -232,9 +232,9 @@ struct GpuCrosses {
 }
 
 struct DrawnCrosses {
-    /// Normals, ambient occlusion (k_a) and foliage, three layers per variant.
+    /// Normals, ambient occlusion (k_a) and foliage, a layer per plane.
     properties: Texture,
-    /// The light of the sun, six layers per variant.
+    /// The light of the sun, two layers per plane.
     sun: Texture,
     /// [`CrossVariantUniform`](crate::render::forest::CrossVariantUniform)s.
     variants: Buffer,
@@ -290,17 +290,18 @@ impl GpuLevel for GpuCrosses {
             _ => false,
         };
         let pairs = || relight.old.iter().zip(relight.new);
+        let variants = cross_variants(relight.new);
         for (index, (_, new)) in pairs().enumerate().filter(|(_, pair)| changed(pair)) {
             let Some(cross) = new.cross() else { continue };
-            for (plane, chain) in cross.textures.properties.iter().enumerate() {
-                gpu::write_layer(&upload.gpu.queue, &drawn.properties, (index * PLANES + plane) as u32, &chain.view());
+            let first = variants.get(index).map_or(0, |variant| variant.first_layer);
+            for (layer, chain) in (first..).zip(&cross.textures.properties) {
+                gpu::write_layer(&upload.gpu.queue, &drawn.properties, layer, &chain.view());
             }
-            for (layer, chain) in cross.textures.sun.iter().enumerate() {
-                let layer = (index * PLANES * SUN_LAYERS + layer) as u32;
+            for (layer, chain) in (first * SUN_LAYERS as u32..).zip(&cross.textures.sun) {
                 gpu::write_layer(&upload.gpu.queue, &drawn.sun, layer, &chain.view());
             }
         }
-        upload.gpu.queue.write_buffer(&drawn.variants, 0, bytemuck::cast_slice(&cross_variants(relight.new)));
+        upload.gpu.queue.write_buffer(&drawn.variants, 0, bytemuck::cast_slice(&variants));
         if pairs().filter(changed).any(|(old, new)| has_light(old) || has_light(new)) {
             // Adding or removing a plant's lighting textures moves the layers of the others.
             drawn.light = CrossLight::of(relight.new);
@@ -312,31 +313,27 @@ impl GpuLevel for GpuCrosses {
 /// Layers of the sun's light per plane.
 const SUN_LAYERS: usize = 2;
 
-/// A layer, of `count` per plant, of the textures that `of` takes from a cross. A plant without a cross gets those of
-/// another one; its planes have no extent, so they are never seen.
-fn layer(plants: &[BakedPlant], index: usize, count: usize, of: fn(&Cross) -> &[MipChain]) -> Option<MipView<'_>> {
-    let own = plants.get(index / count)?.cross().and_then(|cross| of(cross).get(index % count));
-    let blank = || plants.iter().filter_map(BakedPlant::cross).find_map(|cross| of(cross).first());
-    own.or_else(blank).map(MipChain::view)
+/// Planes of all crosses.
+fn plane_count(plants: &[BakedPlant]) -> usize {
+    plants.iter().filter_map(BakedPlant::cross).map(|cross| cross.planes.len()).sum()
 }
 
-/// A layer of the lighting textures, of those plants that have them.
-fn light_layer(plants: &[BakedPlant], index: usize) -> Option<MipView<'_>> {
+/// A layer of the textures that `of` takes from the crosses, one cross after the other.
+fn layer(plants: &[BakedPlant], index: usize, of: fn(&Cross) -> &[MipChain]) -> Option<MipView<'_>> {
     let crosses = plants.iter().filter_map(BakedPlant::cross);
-    crosses.flat_map(|cross| &cross.textures.light).nth(index).map(MipChain::view)
+    crosses.flat_map(|cross| of(cross)).nth(index).map(MipChain::view)
 }
 
 /// The textures of all crosses' properties and of the sun's light, the data of each plant's crosses, and their bind group.
 fn upload_textures(plants: &Arc<Vec<BakedPlant>>, upload: &mut ForestUpload) -> (Texture, Texture, Buffer, BindGroup) {
-    let has_crosses = plants.iter().any(|plant| plant.cross().is_some());
-    let (layers, smallest) = (if has_crosses { plants.len() * PLANES } else { 0 }, gpu::SMALLEST_TESTED_MIP);
+    let (layers, smallest) = (plane_count(plants), gpu::SMALLEST_TESTED_MIP);
     let (_, colors) = upload.texture_array(
         "canopy_cross_color",
         TextureFormat::Rgba8UnormSrgb,
         layers,
         smallest,
         plants,
-        |plants, index| layer(plants, index, PLANES, |cross| &cross.textures.color),
+        |plants, index| layer(plants, index, |cross| &cross.textures.color),
     );
     let (property_texture, properties) = upload.texture_array(
         "canopy_cross_properties",
@@ -344,7 +341,7 @@ fn upload_textures(plants: &Arc<Vec<BakedPlant>>, upload: &mut ForestUpload) -> 
         layers,
         smallest,
         plants,
-        |plants, index| layer(plants, index, PLANES, |cross| &cross.textures.properties),
+        |plants, index| layer(plants, index, |cross| &cross.textures.properties),
     );
     let (sun_texture, sun) = upload.texture_array(
         "canopy_cross_sun",
@@ -352,7 +349,7 @@ fn upload_textures(plants: &Arc<Vec<BakedPlant>>, upload: &mut ForestUpload) -> 
         layers * SUN_LAYERS,
         smallest,
         plants,
-        |plants, index| layer(plants, index, PLANES * SUN_LAYERS, |cross| &cross.textures.sun),
+        |plants, index| layer(plants, index, |cross| &cross.textures.sun),
     );
     let gpu = upload.gpu;
     let sampler = gpu.device.create_sampler(&SamplerDescriptor {
@@ -382,7 +379,7 @@ fn upload_light(plants: &Arc<Vec<BakedPlant>>, upload: &mut ForestUpload) -> Opt
     }
     let (label, format) = ("canopy_cross_light", TextureFormat::Rgba8Snorm);
     let (_, view) = upload.texture_array(label, format, layers, gpu::SMALLEST_TESTED_MIP, plants, |plants, index| {
-        light_layer(plants, index)
+        layer(plants, index, |cross| &cross.textures.light)
     });
     Some(upload.gpu.bind_group(label, &light_layout(), &BindGroupEntries::single(&view)))
 }
