@@ -422,19 +422,18 @@ fn what_is_not_listed_is_not_baked() {
     };
     let (all, _) = bake(BakeSettings::default().representations);
     assert!(all.cross().is_some() && all.shadow_proxy().is_some() && all.levels.len() == 2);
-    const MODEL: &[Representation] = &[Representation::MODEL, Representation::named("box")];
     for from_cache in [false, true] {
-        let (models, source) = bake(MODEL);
+        let (models, source) = bake([Representation::MODEL, Representation::named("box")].into());
         assert_eq!(matches!(source, BakeSource::Cache), from_cache, "{source:?}");
         assert!(models.cross().is_none() && models.shadow_proxy() == all.shadow_proxy());
         assert_eq!(models.textures.0.len(), plant.parts.len());
     }
     for _from_cache in [false, true] {
-        assert!(bake(&[]).0.levels.is_empty());
-        assert!(bake(&[]).0.textures.0.is_empty());
+        assert!(bake([].into()).0.levels.is_empty());
+        assert!(bake([].into()).0.textures.0.is_empty());
     }
     // A level goes into the place of its kind.
-    let (mut none, _) = bake(&[]);
+    let (mut none, _) = bake([].into());
     let cross = BakedLevel::Cross(all.cross().unwrap().clone());
     none.set_level(cross.clone());
     assert_eq!(none.clone().with_level(cross).levels, none.levels);

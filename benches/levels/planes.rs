@@ -39,7 +39,8 @@ fn images(plant: &BakedPlant, level: Representation, pixels: usize) -> Vec<Vec<C
         studio.show(Some(level)).expect("a tree");
         let sizes = |instant: &str| -> Vec<Cutout> {
             let zooms = if pixels > 1 { 1 } else { HALVINGS + 1 };
-            let zoomed = |halving| studio.cutout(Side::South, &sun(instant), f64::from(1u32 << halving)).expect("an image");
+            let zoomed =
+                |halving| studio.cutout(Side::South, &sun(instant), f64::from(1u32 << halving)).expect("an image");
             (0..zooms as u32).map(zoomed).collect()
         };
         SUNS.iter().map(|(_, instant)| *instant).map(sizes).collect::<Vec<_>>()

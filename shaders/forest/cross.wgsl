@@ -98,7 +98,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     let edge = WHOLE + FADE_SPAN * (1.0 - smoothstep(select(0.10, 0.42, level), select(0.34, 0.72, level), abs(toward)));
     let turned = turn(rotate(plane.u.xyz, tree.yaw), normal, center.xz, level, uprights);
     let single = select(WHOLE, GONE, (slot == 1u) & (uprights == 1u));
-    let threshold = max(max(single, level_threshold(level_distance(packed, tree)), max(edge, turned.threshold));
+    let threshold = max(max(single, level_threshold(level_distance(packed, tree))), max(edge, turned.threshold));
 
     var out: Varying;
     let from_center = corner.x * turned.u + corner.y * rotate(plane.v.xyz, tree.yaw);

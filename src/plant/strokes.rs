@@ -219,7 +219,8 @@ fn pieces(samples: &[Sample]) -> impl Iterator<Item = (Sample, Sample)> + '_ {
 impl Stroke {
     /// The texels that [`draw`](Self::draw) visits.
     fn work(&self, side: u32) -> f64 {
-        let area = |(from, to)| reached(from, to, side as f32).map(|texels| texels.len() as f64).iter().product::<f64>();
+        let area =
+            |(from, to)| reached(from, to, side as f32).map(|texels| texels.len() as f64).iter().product::<f64>();
         pieces(&self.samples(side as f32)).map(area).sum()
     }
 
@@ -342,7 +343,8 @@ mod tests {
         assert!(LeafStrokes::read(Path::new("none.strokes.ron")).is_err());
         // Hours of work are refused before they begin.
         let points: String = (0..1000).map(|index| format!("(0.5, {}),", 0.001 * f64::from(index))).collect();
-        let wide = |resolution| format!("(resolution: {resolution}, strokes: [(points: [{points}], width: (1.0, 1.0))])");
+        let wide =
+            |resolution| format!("(resolution: {resolution}, strokes: [(points: [{points}], width: (1.0, 1.0))])");
         let error = LeafStrokes::parse(&wide(4096), "a.ron").map(|_| ()).expect_err("too much").to_string();
         assert!(error.contains("`resolution: 4096`") && error.contains("write fewer points"), "{error}");
         assert!(LeafStrokes::parse(&wide(64), "a.ron").is_ok());

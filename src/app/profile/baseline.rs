@@ -26,7 +26,7 @@ pub fn rows(report: &ProfileReport, baseline: &ProfileReport, path: &Path) -> Re
     let mut rows = Vec::new();
     for own in &report.points {
         let Some(other) = baseline.points.iter().find(|point| point.settings == own.settings) else { continue };
-        let time = own.summary.median.zip(other.summary.median).and_then(|(own, other)| ratio(own, other));
+        let time = own.summary.mean.zip(other.summary.mean).and_then(|(own, other)| ratio(own, other));
         rows.push(BaselineRow { label: own.label.clone(), time, error: (own.summary.error, other.summary.error) });
     }
     if rows.is_empty() { Err(ProfileError::NothingInCommon(path.to_owned())) } else { Ok(rows) }
@@ -74,10 +74,10 @@ mod tests {
     use super::*;
     use crate::app::profile::record::PointRecord;
 
-    fn report(median: f64, reach: f64, setting: &str) -> ProfileReport {
+    fn report(mean: f64, reach: f64, setting: &str) -> ProfileReport {
         let mut point = PointRecord { label: setting.to_owned(), ..PointRecord::default() };
         point.settings.insert("a".to_owned(), setting.to_owned());
-        point.summary.median = Some(Interval { value: median, low: median - reach, high: median + reach });
+        point.summary.mean = Some(Interval { value: mean, low: mean - reach, high: mean + reach });
         ProfileReport { points: vec![point], ..ProfileReport::default() }
     }
 

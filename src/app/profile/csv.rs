@@ -91,12 +91,12 @@ pub fn points(report: &ProfileReport) -> Vec<u8> {
     let fixed = [
         "Point",
         "Label",
+        "MsFrameMean",
+        "MsFrameMeanLow",
+        "MsFrameMeanHigh",
         "MsFrameP50",
-        "MsFrameP50Low",
-        "MsFrameP50High",
         "MsFrameP95",
         "MsFrameP99",
-        "MsFrameMean",
         "MsFrame1PercentLow",
         "Ratio",
         "RatioLow",
@@ -128,17 +128,17 @@ pub fn points(report: &ProfileReport) -> Vec<u8> {
     let header: Vec<String> = header.chain(levels.iter().map(|name| format!("Trees_{name}"))).collect();
     let row = |(index, point): (usize, &super::PointRecord)| {
         let found = &point.summary;
-        let (frame, median, ratio) = (found.frame, found.median, found.ratio);
+        let (frame, mean, ratio) = (found.frame, found.mean, found.ratio);
         let bytes = |bytes: Option<u64>| bytes.map_or(MISSING.to_owned(), |bytes| bytes.to_string());
         let mut row = vec![
             index.to_string(),
             point.label.clone(),
+            number(found.mean_frame, 4),
+            number(mean.map(|mean| mean.low), 4),
+            number(mean.map(|mean| mean.high), 4),
             number(frame.map(|frame| frame.p50), 4),
-            number(median.map(|median| median.low), 4),
-            number(median.map(|median| median.high), 4),
             number(frame.map(|frame| frame.p95), 4),
             number(frame.map(|frame| frame.p99), 4),
-            number(frame.map(|frame| frame.mean), 4),
             number(found.low_1_percent, 4),
             number(ratio.map(|ratio| ratio.value), 4),
             number(ratio.map(|ratio| ratio.low), 4),

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::measure::{Change, Comparison, Interval, Summary};
 
 /// Version of the JSON and the CSV; it rises when a member or column changes its meaning or goes.
-pub const PROFILE_VERSION: u32 = 1;
+pub const PROFILE_VERSION: u32 = 2;
 
 /// A profile of a scene.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -202,10 +202,12 @@ pub struct PointSummary {
     pub frame: Option<Summary>,
     /// Mean of the slowest hundredth of the frames (at least one) in milliseconds.
     pub low_1_percent: Option<f64>,
-    /// The median frame time with its 95 % interval over the rounds.
-    pub median: Option<Interval>,
-    /// Frame time as a fraction of that of the scene as written, with its 95 % interval: in each round the median over the
-    /// views of the ratio of the same view, in both orders of the settings.
+    /// The mean frame time over the views. A frame that is farther than a factor of 1.5 from the median of its view over the rounds was
+    /// disturbed, and counts as that far.
+    pub mean_frame: Option<f64>,
+    /// The same with its 95 % interval over the rounds.
+    pub mean: Option<Interval>,
+    /// The same as a fraction of that of the scene as written, with its 95 % interval: round by round, in both orders of the settings.
     pub ratio: Option<Interval>,
     /// CPU time of the main world.
     pub cpu_main: Option<Summary>,

@@ -6,9 +6,10 @@ use crate::app::compare::{aligned, figure};
 impl ProfileReport {
     /// The combinations of settings from fast to slow, those on the front marked.
     pub fn lines(&self) -> Vec<String> {
-        let header = ["settings", "p50 ms", "±", "p95", "1 % low", "ratio", "95 %", "FLIP", "worst", "change", ""];
+        let header =
+            ["settings", "mean ms", "±", "p50", "p95", "1 % low", "ratio", "95 %", "FLIP", "worst", "change", ""];
         let mut order: Vec<usize> = (0..self.points.len()).collect();
-        let time = |index: &usize| self.points[*index].summary.frame.map_or(f64::INFINITY, |frame| frame.p50);
+        let time = |index: &usize| self.points[*index].summary.mean_frame.unwrap_or(f64::INFINITY);
         order.sort_by(|a, b| time(a).total_cmp(&time(b)));
         let row = |index: usize| {
             let (point, found) = (&self.points[index], &self.points[index].summary);
@@ -20,8 +21,9 @@ impl ProfileReport {
             };
             vec![
                 point.label.clone(),
+                figure(found.mean_frame, 2),
+                figure(found.mean.map(|mean| 0.5 * (mean.high - mean.low)), 2),
                 figure(found.frame.map(|frame| frame.p50), 2),
-                figure(found.median.map(|median| 0.5 * (median.high - median.low)), 2),
                 figure(found.frame.map(|frame| frame.p95), 2),
                 figure(found.low_1_percent, 2),
                 figure(found.ratio.map(|ratio| ratio.value), 3),

@@ -132,11 +132,11 @@ mod tests {
             levels: vec![
                 BakedLevel::ShadowProxy(Arc::new(vec![mesh])),
                 BakedLevel::Cross(Arc::new(Cross {
-                    planes: vec![plane],
+                    planes: vec![plane; 2],
                     textures: CrossTextures {
-                        color: vec![chain.clone()],
-                        properties: vec![chain.clone()],
-                        sun: vec![chain.clone(), chain],
+                        color: vec![chain.clone(); 2],
+                        properties: vec![chain.clone(); 2],
+                        sun: vec![chain; 4],
                         light: Vec::new(),
                     },
                     transmission: Vec3::new(0.1, 0.2, 0.3),

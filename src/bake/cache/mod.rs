@@ -26,7 +26,6 @@ use super::levels::{LevelSet, needs_textures};
 use super::textures::PlantTextures;
 use super::textures::filtered::FilteredTexture;
 use crate::files;
-use crate::lod::Representation;
 use crate::plant::Plant;
 pub use texture::TextureKey;
 
@@ -158,6 +157,7 @@ mod tests {
         LightingSettings,
         implicit::{ImplicitSettings, NormalSource},
     };
+    use crate::lod::Representation;
 
     #[test]
     fn the_folder_follows_the_environment() {

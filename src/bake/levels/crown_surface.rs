@@ -136,7 +136,8 @@ mod tests {
             let leaves = plant.triangle_count(PartKind::Foliage) as f32;
             // [Luft 2006, table 1].
             for (share, within) in [(COARSE_SHARE, 0.003), (FINE_SHARE, 0.005)] {
-                let surface = bake_crown_surface(&plant, &CrownSurfaceSettings { share, ..CrownSurfaceSettings::default() });
+                let surface =
+                    bake_crown_surface(&plant, &CrownSurfaceSettings { share, ..CrownSurfaceSettings::default() });
                 assert!(surface.is_whole() && surface.mesh.is_closed());
                 let reached = surface.mesh.triangles.len() as f32 / leaves;
                 assert!((reached - share).abs() <= within, "{}: {reached} of {share}", plant.name);
@@ -161,7 +162,8 @@ mod tests {
 
     #[test]
     fn what_has_no_surface_has_none() {
-        let nothing = bake_crown_surface(&Plant::default(), &CrownSurfaceSettings { share: f32::NAN, radius: f32::NAN });
+        let nothing =
+            bake_crown_surface(&Plant::default(), &CrownSurfaceSettings { share: f32::NAN, radius: f32::NAN });
         assert_eq!(nothing, CrownSurface::default());
         assert!(nothing.is_whole());
     }

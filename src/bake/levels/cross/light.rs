@@ -91,7 +91,7 @@ mod tests {
         let BakedLighting::Transfer(transfer) = &lighting else { panic!("no transfer") };
         let baked = transfer.packed.unpack();
         let settings = CrossSettings { resolution: 64, supersampling: 2, ..CrossSettings::default() };
-        let plane = &planes(&plant)[0];
+        let plane = &planes(&plant, 2)[0];
         let frame = plane.frame();
         let sides = vertex_sides(&lighting).unwrap();
         let texels = render_plane(&plant, &lighting, Some(&sides), plane, &settings).texels;

@@ -240,12 +240,8 @@ fn planes(plant: &Plant, uprights: u32) -> Vec<CrossPlane> {
             normal: Vec3::new(sin, 0.0, cos),
         }
     };
-    let level = CrossPlane {
-        center: middle.with_y(height),
-        u: Vec3::X * half.x,
-        v: Vec3::NEG_Z * half.z,
-        normal: Vec3::Y,
-    };
+    let level =
+        CrossPlane { center: middle.with_y(height), u: Vec3::X * half.x, v: Vec3::NEG_Z * half.z, normal: Vec3::Y };
     (0..uprights).map(upright).chain([level]).collect()
 }
 
