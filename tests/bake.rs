@@ -155,7 +155,7 @@ fn picture_area(cross: &Cross, index: usize, level: usize) -> f32 {
 #[test]
 fn a_cross_covers_what_the_plant_covers_in_every_mip() {
     let plant = Arc::new(tree(1500, 4));
-    let cross = bake_cross(&plant, &BakedLighting::Local, &CrossSettings::default());
+    let cross = bake_cross(&plant, &BakedLighting::Local, &CrossSettings { uprights: 2, ..Default::default() });
     let bounds = plant.bounds().unwrap();
     for (index, plane) in cross.planes.iter().enumerate() {
         assert!((plane.u.cross(plane.v).normalize() - plane.normal).length() < 1e-5);
@@ -224,7 +224,7 @@ fn a_cross_keeps_normal_ambient_and_kind() {
         ambient_field: AmbientField::Depth,
         together: false,
     });
-    let cross = bake_cross(&plant, &lighting, &CrossSettings { resolution: 64, ..Default::default() });
+    let cross = bake_cross(&plant, &lighting, &CrossSettings { uprights: 2, resolution: 64, ..Default::default() });
     for (plane, chain) in cross.planes.iter().zip(&cross.textures.properties) {
         for level in &chain.levels {
             for texel in level.chunks_exact(4) {
@@ -241,14 +241,15 @@ fn a_cross_keeps_normal_ambient_and_kind() {
 #[test]
 fn nothing_and_flat_plants_give_crosses_too() {
     let empty = bake_cross(&Arc::new(Plant::default()), &BakedLighting::Local, &CrossSettings::default());
-    assert_eq!(empty.planes.len(), 3);
+    assert_eq!(empty.planes.len(), 5);
     assert!(empty.textures.color.iter().flat_map(|chain| &chain.levels).flatten().all(|&byte| byte == 0));
 
     let mut mesh = PlantMesh::default();
     add_card(&mut mesh, Vec3::Y, Quat::IDENTITY, 1.0);
     let part = PlantPart { kind: PartKind::Foliage, mesh, material: PlantMaterial::default() };
     let flat = Arc::new(Plant { name: String::new(), parts: vec![part] });
-    let cross = bake_cross(&flat, &BakedLighting::Local, &CrossSettings { resolution: 64, ..Default::default() });
+    let cross =
+        bake_cross(&flat, &BakedLighting::Local, &CrossSettings { uprights: 2, resolution: 64, ..Default::default() });
     assert_eq!(cross.planes[1].u, Vec3::ZERO);
     assert!(cross.planes.iter().all(|plane| plane.frame().is_finite()));
     assert_eq!(cross.textures.color[0].coverage(0, 0.5), 1.0);

@@ -53,7 +53,7 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let texel = vec2<i32>(clamp(in.uv * style.map_size, vec2(0.0), style.map_size - 1.0));
     let seen = textureLoad(depths, texel, 0);
     let sky = seen <= 0.0;
-    let along = relative_position(in.uv, seen);
+    let point = relative_position(in.uv, seen);
 #ifdef TOON
     // The maps are twice as fine as the picture: the mean of four.
     let first = vec2<i32>(floor(in.uv * style.map_size - 0.5));
@@ -63,12 +63,12 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
         color += 0.25 * toned(clamp(first + vec2(i & 1, i >> 1u), vec2(0), last));
     }
     let drawn = contour(soft_normals, soft_lights, linear_sampler, in.uv, style.line_width) * f32(style.line_width > 0.0);
-    let distance = length(along);
+    let distance = length(point);
     let soft = textureSampleLevel(soft_lights, linear_sampler, in.uv, 0.0);
     let strokes = stroke_ink(in.uv, distance, soft.z, 1.0 - soft.x, identities) * f32(!sky);
     return vec4(mix(color, style.ink * 0.4, saturate(max(1.2 * drawn, strokes))), 1.0);
 #else
-    let relative = select(along, normalize(along) * 4000.0, sky);
+    let relative = select(point, normalize(point) * 4000.0, sky);
     let place = noise_place(page, relative, sky);
     let position = place.position;
     let footprint = place.pixel;
@@ -88,7 +88,7 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let hatched = style.hatching * 0.7 * max(first * smoothstep(0.22, 0.40, dark), second * smoothstep(0.5, 0.65, dark));
     let pressure = 0.85 + 0.25 * middle;
     let grain = smoothstep(0.1, 0.5, height + 0.35);
-    let strokes = stroke_ink(in.uv + 0.3 * tremble, length(along), soft.z, dark, identities) * f32(!sky);
+    let strokes = stroke_ink(in.uv + 0.3 * tremble, length(point), soft.z, dark, identities) * f32(!sky);
     let ink = saturate(max(max(drawn * 1.25, hatched), 1.1 * strokes) * pressure * grain * (1.0 - 0.6 * air));
     return vec4(mix(style.paper * (1.0 + 0.12 * (height - 0.5)), style.ink * 0.7, ink), 1.0);
 #endif

@@ -205,19 +205,37 @@ fn individuals(path: &Path, options: &GltfOptions) -> Vec<IndividualSource> {
     trees.into_iter().map(individual).collect()
 }
 
+/// Layers of a texture array on most devices, of which a plane of a cross takes two.
+const LAYERS: usize = 2048;
+
+/// Upright planes of each cross, so that the crosses of `plants` plants have at most as many planes as devices have layers for, less
+/// those that `others` have already.
+pub fn affordable_planes(wanted: u32, plants: usize, others: usize) -> u32 {
+    let each = (LAYERS / 2).saturating_sub(others) / plants.max(1);
+    wanted.min(u32::try_from(each).unwrap_or(u32::MAX).saturating_sub(1)).max(1)
+}
+
 /// Bake settings for a scene's quality and a species' lighting. What is drawn by default is always baked; other
-/// representations only for a scene that draws them.
-pub fn bake_settings(quality: &Quality, lighting: LightingSettings) -> BakeSettings {
+/// representations only for a scene that draws them. `uprights`: planes of its crosses.
+pub fn bake_settings(quality: &Quality, lighting: LightingSettings, uprights: u32) -> BakeSettings {
     let drawn = quality.lod_levels().representations().to_vec();
     let representations = LevelSet::default().iter().chain(drawn).collect();
     BakeSettings {
         representations,
         lighting,
-        cross: CrossSettings {
-            uprights: quality.cross_planes,
-            resolution: quality.cross_resolution,
-            ..CrossSettings::default()
-        },
+        cross: CrossSettings { uprights, resolution: quality.cross_resolution, ..CrossSettings::default() },
         ..BakeSettings::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::affordable_planes;
+
+    #[test]
+    fn many_plants_have_crosses_of_fewer_planes() {
+        let planes = |plants, others| affordable_planes(4, plants, others);
+        assert_eq!([1, 204, 205, 256, 257, 341, 342, 5000].map(|plants| planes(plants, 0)), [4, 4, 3, 3, 2, 2, 1, 1]);
+        assert_eq!((planes(0, 0), planes(100, 524), planes(100, 525), planes(1, 9999)), (4, 4, 3, 1));
     }
 }

@@ -307,6 +307,14 @@ fn bake(
     let cache = Cache::of_user();
     let mut baked = Vec::with_capacity(species.individuals.len());
     let mut fresh = 0;
+    let uprights = plants::affordable_planes(quality.cross_planes, species.individuals.len(), 0);
+    if uprights < quality.cross_planes {
+        progress.note(&format!(
+            "{} plants have crosses of {uprights} upright planes instead of {}: textures have no more layers",
+            species.individuals.len(),
+            quality.cross_planes
+        ));
+    }
     // A few at a time: in parallel, but with progress.
     for group in species.individuals.chunks(rayon::current_num_threads().max(1)) {
         check_wanted(progress)?;
@@ -316,7 +324,7 @@ fn bake(
             .par_iter()
             .zip(built)
             .map(|(individual, (plant, mut warnings))| {
-                let settings = plants::bake_settings(quality, individual.lighting);
+                let settings = plants::bake_settings(quality, individual.lighting, uprights);
                 let baked = bake_plant(Arc::new(plant), &settings, cache.as_ref());
                 warnings.extend(baked.0.lighting.warning().map(|what| format!("{}: {what}", baked.0.plant.name)));
                 (baked, warnings)

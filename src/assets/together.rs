@@ -9,7 +9,10 @@ use std::{collections::HashSet, sync::Arc};
 
 use rayon::prelude::*;
 
-use super::{StageError, plants::PlantPlan, plants::bake_settings};
+use super::{
+    StageError,
+    plants::{PlantPlan, affordable_planes, bake_settings},
+};
 use crate::{
     bake::{
         BakedLevel, BakedPlant,
@@ -73,7 +76,16 @@ pub fn light_together(
     if let Some(reason) = bake.report.no_surface {
         progress.warn(&format!("trees lit together: {reason}"));
     }
-    let cross = bake_settings(&scene.quality, LightingSettings::Local).sanitized().cross;
+    let wanted = scene.quality.cross_planes;
+    let others = plan.variants.iter().zip(&chosen).filter(|(_, chosen)| !**chosen).flat_map(|(v, _)| v.clone());
+    let planes = others.filter_map(|variant| plants.get(usize::from(variant))?.cross()).map(|cross| cross.planes.len());
+    let uprights = affordable_planes(wanted, count, planes.sum());
+    if uprights < wanted {
+        progress.note(&format!(
+            "{count} trees lit together have crosses of {uprights} upright planes instead of {wanted}: textures have no more layers"
+        ));
+    }
+    let cross = bake_settings(&scene.quality, LightingSettings::Local, uprights).sanitized().cross;
     let lit: Vec<BakedPlant> = order
         .par_iter()
         .zip(bake.plants)

@@ -75,7 +75,8 @@ pub struct Quality {
     /// memory. Default 256.
     pub cross_resolution: u32,
     /// Upright planes of a cross, 1 to 8, each of which shows the tree from another side. More: outlines as the models have them,
-    /// memory; not slower. Default 2.
+    /// memory; not slower. Default 4; fewer where a scene has
+    /// so many plants that their textures have too many layers.
     pub cross_planes: u32,
     /// Distance in metres beyond which no tree is drawn, 100 to 200000. Default 20000.
     pub view_distance: f64,
@@ -97,7 +98,7 @@ impl Default for Quality {
             levels: Vec::new(),
             msaa: 4,
             cross_resolution: 256,
-            cross_planes: 2,
+            cross_planes: 4,
             view_distance: 20_000.0,
             terrain_error: 1.0,
         }

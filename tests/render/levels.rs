@@ -156,12 +156,13 @@ fn more_crosses_than_a_texture_array_holds_are_refused_with_the_number_that_fits
     }
     draw(&mut renderer, stage, &from, NOON);
     let told = gpu.messages();
-    let remedy = format!("at most {} plants", limit / 6);
+    // Four upright planes and a level one, with two layers each of the sun's light.
+    let remedy = format!("at most {} plants", limit / 10);
     assert!(told.len() == 1 && told[0].contains("texture layers") && told[0].contains(&remedy), "{told:?}");
     // A scene is refused before it is shown.
     let crowded = Stage { plants, ..built.stage };
     let refused = crowded.check_device(renderer.app().world().resource::<RenderDevice>());
-    assert!(refused.is_err_and(|error| error.to_string().contains(&format!("at most {}", limit / 6))));
+    assert!(refused.is_err_and(|error| error.to_string().contains(&format!("at most {}", limit / 10))));
 }
 
 /// Billboard clouds and simplified models against the full model, isolated, in the same light.

@@ -55,11 +55,12 @@ impl SpeciesLight {
     /// The species of `stage`. The lighting of plants that are lit together with their neighbours cannot be baked per
     /// plant, so these are left out.
     pub fn of_stage(stage: &Stage) -> Vec<Self> {
-        let cross = plants::bake_settings(&stage.scene.quality, LightingSettings::Local).cross;
         let alone = stage.scene.species.iter().zip(&stage.variants).filter(|(species, _)| !species.is_lit_together());
         let light = alone.map(|(species, variants)| {
             let variants = usize::from(variants.start)..usize::from(variants.end);
             let own = stage.plants.get(variants.clone()).unwrap_or_default().to_vec();
+            let uprights = own.iter().find_map(BakedPlant::cross).map_or(1, |cross| cross.uprights().len() as u32);
+            let cross = plants::bake_settings(&stage.scene.quality, LightingSettings::Local, uprights).cross;
             let scene = species.lighting.clone().unwrap_or(Lighting::Transfer(Transfer::default()));
             Self {
                 name: species.name.clone(),

@@ -1,6 +1,6 @@
 //! Crossed billboards made from the model itself [Franzke 2005, 4.3, "Kreuzebenen"].
 //!
-//! Upright planes through the trunk's axis, two at right angles by default, and a level one through the foliage's centre.
+//! Upright planes through the trunk's axis, four by default, and a level one through the foliage's centre.
 //! Each plane's texture shows the *whole* plant seen along the plane's normal, so a few quads represent the tree from
 //! every side. More upright planes are more views of it: of any number, those two are drawn that face the viewer best. A texel has a base colour, normal, ambient term and a fraction of foliage; how much of the sun's light it shows,
 //! for every sun (`sun.rs`); and if the plant is lit by radiance transfer, the transfer of the sky's light (`light.rs`).
@@ -141,7 +141,7 @@ pub struct CrossSettings {
     /// over their number. All trees draw as many triangles; memory and the time of the bake grow in proportion.
     pub uprights: u32,
     /// Edge of the square textures in texels, 64..=1024, rounded up to a power of two. Larger textures allow crosses
-    /// nearer to the viewer; memory grows with the square (256: 4.2 MB per plant, 5.2 MB if it is lit by transfer).
+    /// nearer to the viewer; memory grows with the square (256: 7.0 MB per plant, 8.7 MB if it is lit by transfer).
     pub resolution: u32,
     /// Samples per texel along each axis, 1..=8. More give smoother colours and normals; time grows with the square.
     pub supersampling: u32,
@@ -156,7 +156,7 @@ pub struct CrossSettings {
 
 impl Default for CrossSettings {
     fn default() -> Self {
-        Self { uprights: 2, resolution: 256, supersampling: 4, normal_smoothing: 0.0, fade: AlphaFade::default() }
+        Self { uprights: 4, resolution: 256, supersampling: 4, normal_smoothing: 0.0, fade: AlphaFade::default() }
     }
 }
 

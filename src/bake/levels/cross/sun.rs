@@ -15,7 +15,7 @@
 //! squares to [`DIRECTIONS`] directions. A sun below the horizon needs none, so half of the sphere is all that is fitted.
 //! The other trees' shade is not in it: the shadow map adds that, looked up where the light enters the crown.
 //!
-//! Cost: 8 bytes per texel plus a third for mips: 2.1 MB per plant at 256 texels, and one ray per direction and texel.
+//! Cost: 8 bytes per texel plus a third for mips: 0.7 MB per plane at 256² texels, and one ray per direction and texel.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;

@@ -21,8 +21,8 @@ use glam::Vec3;
 
 use super::{
     model::ModelRenderer,
-    not_baked,
     reduced::{GpuReduced, Reduced},
+    tell_not_baked,
 };
 use crate::{
     bake::{BakedPlant, levels::cloud::Cloud},
@@ -145,9 +145,7 @@ impl LevelRenderer for CloudRenderer {
 
     fn upload(&self, forest: &Forest, upload: &mut ForestUpload) -> Box<dyn GpuLevel> {
         let plants = &forest.plants;
-        if let Some(told) = not_baked(plants, self) {
-            error!("{told}");
-        }
+        tell_not_baked(plants, self);
         let limit = upload.gpu.device.limits().max_texture_array_layers as usize;
         let drawn = if plants.len() > limit {
             error!(

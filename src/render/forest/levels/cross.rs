@@ -20,7 +20,7 @@ use bevy::{
 };
 use glam::Vec3;
 
-use super::not_baked;
+use super::tell_not_baked;
 use crate::{
     bake::{BakedPlant, levels::cross::Cross},
     cull::Grouping,
@@ -139,9 +139,7 @@ impl LevelRenderer for CrossRenderer {
 
     fn upload(&self, forest: &Forest, upload: &mut ForestUpload) -> Box<dyn GpuLevel> {
         let plants = &forest.plants;
-        if let Some(told) = not_baked(plants, self) {
-            error!("{told}");
-        }
+        tell_not_baked(plants, self);
         let (layers, limit) =
             (plane_count(plants) * SUN_LAYERS, upload.gpu.device.limits().max_texture_array_layers as usize);
         if layers > limit {

@@ -5,7 +5,12 @@ mod cross;
 mod model;
 mod reduced;
 
-use std::sync::Arc;
+use std::{
+    collections::BTreeSet,
+    sync::{Arc, Mutex, PoisonError},
+};
+
+use bevy::log::error;
 
 use super::representation::LevelRenderer;
 use crate::{bake::BakedPlant, render::shaders::CanopyShaders};
@@ -41,6 +46,16 @@ fn not_baked(plants: &[BakedPlant], renderer: &dyn LevelRenderer) -> Option<Stri
             names[..names.len().min(MOST_NAMES)].join(", ")
         )
     })
+}
+
+/// Tells the user of [`not_baked`], of the same plants once.
+fn tell_not_baked(plants: &[BakedPlant], renderer: &dyn LevelRenderer) {
+    static TOLD: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    if let Some(message) = not_baked(plants, renderer)
+        && TOLD.lock().unwrap_or_else(PoisonError::into_inner).insert(message.clone())
+    {
+        error!("{message}");
+    }
 }
 
 #[cfg(test)]

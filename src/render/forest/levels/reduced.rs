@@ -3,13 +3,10 @@
 
 use std::sync::Arc;
 
-use bevy::{
-    log::error,
-    render::{render_phase::TrackedRenderPass, render_resource::RenderPipelineDescriptor},
-};
+use bevy::render::{render_phase::TrackedRenderPass, render_resource::RenderPipelineDescriptor};
 use glam::Vec3;
 
-use super::{model::ModelRenderer, not_baked};
+use super::{model::ModelRenderer, tell_not_baked};
 use crate::{
     bake::{BakedLevel, BakedPlant, lighting::BakedLighting},
     cull::Grouping,
@@ -84,9 +81,7 @@ impl LevelRenderer for ReducedRenderer {
     }
 
     fn upload(&self, forest: &Forest, upload: &mut ForestUpload) -> Box<dyn GpuLevel> {
-        if let Some(told) = not_baked(&forest.plants, self) {
-            error!("{told}");
-        }
+        tell_not_baked(&forest.plants, self);
         Box::new(GpuReduced::new(&self.models, forest, self.of, upload))
     }
 
