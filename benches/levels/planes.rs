@@ -34,7 +34,7 @@ fn baked(plant: &Plant, uprights: u32) -> BakedPlant {
 fn images(plant: &BakedPlant, level: Representation, pixels: usize) -> Vec<Vec<Cutout>> {
     let mut studio = Studio::new(plant.clone(), (LARGEST * pixels) as u32, None, 4).expect("a renderer");
     let turn = |turn: u32| (f64::from(turn) + 0.5) / f64::from(TURNS) * std::f64::consts::FRAC_PI_2;
-    let mut of_turn = |index: u32| {
+    let of_turn = |index: u32| {
         studio.turn(turn(index) as f32);
         studio.show(Some(level)).expect("a tree");
         let sizes = |instant: &str| -> Vec<Cutout> {
@@ -45,7 +45,7 @@ fn images(plant: &BakedPlant, level: Representation, pixels: usize) -> Vec<Vec<C
         };
         SUNS.iter().map(|(_, instant)| *instant).map(sizes).collect::<Vec<_>>()
     };
-    (0..TURNS).flat_map(|index| of_turn(index)).collect()
+    (0..TURNS).flat_map(of_turn).collect()
 }
 
 fn bytes(cross: &Cross) -> usize {

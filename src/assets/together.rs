@@ -77,8 +77,8 @@ pub fn light_together(
         progress.warn(&format!("trees lit together: {reason}"));
     }
     let wanted = scene.quality.cross_planes;
-    let others = plan.variants.iter().zip(&chosen).filter(|(_, chosen)| !**chosen).flat_map(|(v, _)| v.clone());
-    let planes = others.filter_map(|variant| plants.get(usize::from(variant))?.cross()).map(|cross| cross.planes.len());
+    let alone = plan.variants.iter().zip(&chosen).filter(|(_, chosen)| !**chosen).flat_map(|(v, _)| v.clone());
+    let planes = alone.filter_map(|variant| plants.get(usize::from(variant))?.cross()).map(|cross| cross.planes.len());
     let uprights = affordable_planes(wanted, count, planes.sum());
     if uprights < wanted {
         progress.note(&format!(

@@ -1,7 +1,7 @@
 //! The foliage as the implicit surface of its leaves [Luft 2006, 4.1; Luft 2007, 2.3], beside the plant's own wood: the shape that
 //! watercolours paint, without the leaves.
 //!
-//! The surface is simplified to a share of the foliage's triangles, those of [Luft 2006, table 1] by default. It has the normals of
+//! The surface is simplified to a share of the foliage's triangles, that of the finer tree of [Luft 2006, table 1] by default. It has the normals of
 //! the density field, the ambient term of the leaves nearest to each vertex, and the mean colour of all leaves. Photographs light
 //! it as [Luft 2007] lights realigned leaves; styles have their own light.
 
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::BakedLevel;
 use crate::bake::BakedPlant;
 use crate::bake::lighting::implicit::foliage_normals::nearest_vertices;
-use crate::bake::lighting::implicit::{AmbientField, COARSE_SHARE, ImplicitSettings, bake_implicit, relative_radius};
+use crate::bake::lighting::implicit::{AmbientField, FINE_SHARE, ImplicitSettings, bake_implicit, relative_radius};
 use crate::bake::lighting::{BakedLighting, ExpressiveLighting};
 use crate::bake::textures::PlantTextures;
 use crate::plant::{PartKind, Plant, PlantMaterial, PlantMesh, PlantPart};
@@ -21,11 +21,11 @@ use crate::plant::{PartKind, Plant, PlantMaterial, PlantMesh, PlantPart};
 /// Settings of crown surfaces. Values out of range are clamped.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CrownSurfaceSettings {
-    /// Triangles as a fraction of the foliage's, 0..=1: [`COARSE_SHARE`] is the coarser tree of [Luft 2006, table 1], `FINE_SHARE`
-    /// the finer one.
+    /// Triangles as a fraction of the foliage's, 0..=1: [`FINE_SHARE`] is the finer tree of [Luft 2006, table 1], `COARSE_SHARE` the
+    /// coarser one.
     pub share: f32,
     /// Radius of the leaves' density as a fraction of the plant's longest extent, 0..=1. Smaller: gaps between twigs stay open. The
-    /// trees of [Luft 2006, table 1] have 0.05 and 0.075. Where leaves are sparse it is larger: half as much again as the mean
+    /// finer tree of [Luft 2006, table 1] has 0.05, the coarser one 0.075. Where leaves are sparse it is larger: half as much again as the mean
     /// distance between neighbours.
     pub radius: f32,
 }
@@ -35,7 +35,7 @@ const LEAST_SPACINGS: f32 = 1.5;
 
 impl Default for CrownSurfaceSettings {
     fn default() -> Self {
-        Self { share: COARSE_SHARE, radius: 0.05 }
+        Self { share: FINE_SHARE, radius: 0.05 }
     }
 }
 
@@ -124,7 +124,7 @@ pub fn bake_crown_surface(plant: &Plant, settings: &CrownSurfaceSettings) -> Cro
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bake::lighting::implicit::FINE_SHARE;
+    use crate::bake::lighting::implicit::COARSE_SHARE;
     use crate::bake::{BakeSettings, bake_plant};
     use crate::plant::grow::{GrowParameters, grow};
 
