@@ -194,7 +194,7 @@ mod tests {
         let text = String::from_utf8(frames(&report)).unwrap();
         let lines: Vec<&str> = text.lines().collect();
         assert!(lines[0].starts_with("Application,ProcessID,CPUStartTime,FrameTime,CPUBusy,CPUWait,GPUTime,GPUBusy"));
-        assert_eq!(lines[1], "canopy,NA,1.0000,2.5000,NA,NA,NA,NA,1,0,\"a=1, b=\"\"2\"\"\",0,0000,NA,NA");
+        assert_eq!(lines[1], "canopy,NA,1.0000,2.5000,NA,NA,NA,NA,2,0,\"a=1, b=\"\"2\"\"\",0,0000,NA,NA");
         let text = String::from_utf8(points(&report)).unwrap();
         let values = text.lines().nth(1).unwrap();
         assert!(!values.contains(",0.0") && values.matches(",NA").count() > 20, "{values}");

@@ -117,7 +117,7 @@ mod tests {
         ];
         assert!(drawn.into_iter().all(|change| stages.built_as(&with(change)) == built));
         let baked: [fn(&mut Scene); 4] = [
-            |scene| scene.quality.cross_planes = 4,
+            |scene| scene.quality.cross_planes = 2,
             |scene| scene.quality.cross_resolution = 64,
             |scene| scene.quality.view_distance = 500.0,
             |scene| scene.seed = 2,
