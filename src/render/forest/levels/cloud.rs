@@ -21,8 +21,8 @@ use glam::Vec3;
 
 use super::{
     model::ModelRenderer,
+    not_baked::tell_not_baked,
     reduced::{GpuReduced, Reduced},
-    tell_not_baked,
 };
 use crate::{
     bake::{BakedPlant, levels::cloud::Cloud},

@@ -20,7 +20,7 @@ use bevy::{
 };
 use glam::Vec3;
 
-use super::tell_not_baked;
+use super::not_baked::tell_not_baked;
 use crate::{
     bake::{BakedPlant, levels::cross::Cross},
     cull::Grouping,

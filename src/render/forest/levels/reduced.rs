@@ -6,7 +6,7 @@ use std::sync::Arc;
 use bevy::render::{render_phase::TrackedRenderPass, render_resource::RenderPipelineDescriptor};
 use glam::Vec3;
 
-use super::{model::ModelRenderer, tell_not_baked};
+use super::{model::ModelRenderer, not_baked::tell_not_baked};
 use crate::{
     bake::{BakedLevel, BakedPlant, lighting::BakedLighting},
     cull::Grouping,
