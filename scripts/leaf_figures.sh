@@ -3,12 +3,9 @@
 # against the light, by the layers of its leaves and by the standard model, with the time and the noise of each.
 #   scripts/leaf_figures.sh [FOLDER] [SAMPLES]      default: out/leaf-figures 16
 set -euo pipefail
-cd "$(dirname "$0")/.."
 out=${1:-out/leaf-figures}
 samples=${2:-16}
-canopy=${CANOPY:-${CARGO_TARGET_DIR:-target}/release/canopy}
-[ -x "$canopy" ] || { echo "error: $canopy is not there; run ./run build or name the program in CANOPY" >&2; exit 1; }
-mkdir -p "$out"
+. "$(dirname "$0")/program.sh"
 
 # Name, size, and what shows the plant against the light.
 figures="leaf 600x800

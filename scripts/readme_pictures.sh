@@ -2,11 +2,8 @@
 # Renders the pictures of the demo that README.md shows into a folder, as PNG.
 #   scripts/readme_pictures.sh [FOLDER]      default: out/readme
 set -euo pipefail
-cd "$(dirname "$0")/.."
 out=${1:-out/readme}
-canopy=${CANOPY:-${CARGO_TARGET_DIR:-target}/release/canopy}
-[ -x "$canopy" ] || { echo "error: $canopy is not there; run ./run build or name the program in CANOPY" >&2; exit 1; }
-mkdir -p "$out"
+. "$(dirname "$0")/program.sh"
 
 # Name, hour, and a camera where it is not that of the scene.
 while read -r name hour camera; do

@@ -2,11 +2,8 @@
 # Renders the pictures of styles that README.md shows, and measures the five kinds of scene of [Luft 2006, table 2].
 #   scripts/style_figures.sh [FOLDER]      default: out/styles
 set -euo pipefail
-cd "$(dirname "$0")/.."
 out=${1:-out/styles}
-canopy=${CANOPY:-${CARGO_TARGET_DIR:-target}/release/canopy}
-[ -x "$canopy" ] || { echo "error: $canopy is not there; run ./run build or name the program in CANOPY" >&2; exit 1; }
-mkdir -p "$out"
+. "$(dirname "$0")/program.sh"
 
 # The demo in each style.
 while read -r name options; do

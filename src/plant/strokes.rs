@@ -33,7 +33,7 @@ const RESOLUTIONS: std::ops::RangeInclusive<u32> = 16..=4096;
 const PIECES: usize = 12;
 /// The most points of a file.
 const MOST_POINTS: usize = 100_000;
-/// The most texels that the strokes of a file visit: some ten seconds of work.
+/// The most texels that the strokes of a file visit: 120 for each texel of the largest texture.
 const MOST_TEXELS: f64 = 2e9;
 
 /// When a stroke is seen.

@@ -75,8 +75,7 @@ pub struct Quality {
     /// memory. Default 256.
     pub cross_resolution: u32,
     /// Upright planes of a cross, 1 to 8, each of which shows the tree from another side. More: outlines as the models have them,
-    /// memory; not slower. Default 4; fewer where a scene has
-    /// so many plants that their textures have too many layers.
+    /// more memory, as many triangles. Default 4; fewer where a scene has so many plants that their textures have too many layers.
     pub cross_planes: u32,
     /// Distance in metres beyond which no tree is drawn, 100 to 200000. Default 20000.
     pub view_distance: f64,
