@@ -48,12 +48,6 @@ fn images(plant: &BakedPlant, level: Representation, pixels: usize) -> Vec<Vec<C
     (0..TURNS).flat_map(of_turn).collect()
 }
 
-fn bytes(cross: &Cross) -> usize {
-    let textures = &cross.textures;
-    let chains = textures.color.iter().chain(&textures.properties).chain(&textures.sun).chain(&textures.light);
-    chains.flat_map(|chain| &chain.levels).map(Vec::len).sum()
-}
-
 pub fn planes() {
     println!();
     println!("| tree | upright planes | MB | size, px | RMSE | cover | light | contrast |");
@@ -66,7 +60,7 @@ pub fn planes() {
             .collect();
         for uprights in UPRIGHTS {
             let plant = baked(&plant, uprights);
-            let megabytes = plant.cross().map_or(0.0, |cross| bytes(cross) as f64 / 1e6);
+            let megabytes = plant.cross().map_or(0.0, |cross| cross.texture_bytes() as f64 / 1e6);
             let shown = images(&plant, Representation::CROSS, 1);
             for halving in 0..=HALVINGS {
                 let (zoom, size) = (1 << halving, LARGEST >> halving);

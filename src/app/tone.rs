@@ -6,10 +6,11 @@ use bevy::{
     core_pipeline::tonemapping::{TonemappingLuts, TonemappingPlugin},
     image::{Image, ImagePlugin},
     render::render_resource::TextureFormat,
-    shader::Shader,
+    shader::{Shader, ShaderLoader},
 };
 use glam::Vec3;
 use half::f16;
+use tracing::subscriber::NoSubscriber;
 
 use super::error::AppError;
 use crate::reference::ToneTable;
@@ -23,7 +24,9 @@ pub fn tone_table() -> Result<ToneTable, AppError> {
     let failed = |what: &str| AppError::Render(format!("Bevy's tone curve cannot be read: {what}"));
     let mut app = App::new();
     app.add_plugins((TaskPoolPlugin::default(), AssetPlugin::default(), ImagePlugin::default()));
-    app.init_asset::<Shader>().add_plugins(TonemappingPlugin);
+    // The plugin loads shaders, which are not used, and logs errors where they have no loader or there is no renderer.
+    app.init_asset::<Shader>().init_asset_loader::<ShaderLoader>();
+    tracing::subscriber::with_default(NoSubscriber::default(), || app.add_plugins(TonemappingPlugin));
     let world = app.world();
     let handle = world.get_resource::<TonemappingLuts>().map(|tables| tables.blender_filmic.clone());
     let image = handle.as_ref().and_then(|handle| world.get_resource::<Assets<Image>>()?.get(handle));

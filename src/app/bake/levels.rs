@@ -86,13 +86,11 @@ pub fn facts(plant: &BakedPlant) -> Vec<LevelFacts> {
         });
     }
     if let Some(cross) = plant.cross() {
-        let textures = &cross.textures;
-        let chains = textures.color.iter().chain(&textures.properties).chain(&textures.light);
         all.push(LevelFacts {
             representation: Representation::CROSS,
             title: "Crossed billboards",
             triangles: 2 * cross.planes.len().min(3),
-            bytes: chains.flat_map(|chain| &chain.levels).map(Vec::len).sum(),
+            bytes: cross.texture_bytes(),
             deviation: Some(deviation_of_cross(&plant.plant, cross)),
             notes: vec![format!("{} planes", cross.planes.len())],
         });

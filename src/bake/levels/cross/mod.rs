@@ -57,6 +57,13 @@ impl Cross {
         self.planes.split_last().map_or(&[], |(_, uprights)| uprights)
     }
 
+    /// Bytes of all textures.
+    pub fn texture_bytes(&self) -> usize {
+        let CrossTextures { color, properties, sun, light } = &self.textures;
+        let chains = color.iter().chain(properties).chain(sun).chain(light);
+        chains.flat_map(|chain| &chain.levels).map(Vec::len).sum()
+    }
+
     /// Whether the lists go together, of a plant that is lit by radiance transfer or not, and all values are in their
     /// ranges.
     pub fn is_whole(&self, of_transfer: bool) -> bool {
