@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use canopy::app::{Side, Studio};
 use canopy::bake::cache::Cache;
-use canopy::bake::levels::cross::{Cross, CrossSettings};
+use canopy::bake::levels::cross::CrossSettings;
 use canopy::bake::{BakeSettings, BakedPlant, bake_plant};
 use canopy::lod::Representation;
 use canopy::measure::{Cutout, LevelError};

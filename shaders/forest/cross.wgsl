@@ -8,7 +8,7 @@
 #import canopy::lighting::{Surface, shade_leaves, even_sky, leaf_transmission}
 #import canopy::output::finish
 #import canopy::sky::sky_transfer
-#import canopy::stand::{stand_light, in_stand_by_transfer, evaluate_two_bands}
+#import canopy::stand::{stand_light, in_stand_by_transfer}
 #import canopy::sun_visibility::{sample_ground, terrain_visibility, cascaded_visibility}
 #ifdef STYLED
 #import canopy::constants::WOOD_LAYER
@@ -261,10 +261,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     // The second band is not relative to the mean here.
     let open = sky_transfer(stored.w, side);
     let around = in_stand_by_transfer(open, vec3(stored.w), vec3(side.y / max(stored.w, 1e-3)), stand);
-    let zenith = variants[variant].indirect_sun_zenith * light.key_direction.y;
-    let indirect = evaluate_two_bands(variants[variant].indirect_sun_mean, zenith) * stand.key_transmittance * visibility;
-    let indirect_sun = light.key_illuminance * variants[variant].indirect_sun_color * indirect;
-    var sky = (1.0 + surface.transmission) * (around + indirect_sun);
+    var sky = (1.0 + surface.transmission) * around;
 #ifdef PLAIN_TOO
     surface.ambient_visibility = with_indirect_ambient(properties.b, ambient_term);
     sky = select(even_sky(surface, stand), sky, by_transfer);
@@ -300,6 +297,10 @@ fn isotropic_fraction(variant: u32, level: f32) -> f32 {
     return mix((*fraction)[finer / 4u][finer % 4u], (*fraction)[coarser / 4u][coarser % 4u], fract(at));
 }
 
+// A bilinear lookup in the mip whose texels are as large as pixels is a mean over two pixels, which takes a fifth of a crown's contrast. One
+// mip finer it is a mean over one pixel, as the samples of a full model are.
+const SHARPER: f32 = 1.0;
+
 // Mip level of the textures: the mean of the two axes' levels. The larger one, which samplers use, would blur a plane
 // seen at an angle along its whole height. The little aliasing that remains affects leaves, whose coverage is right at
 // any level.
@@ -307,5 +308,5 @@ fn mip_level(uv: vec2<f32>) -> f32 {
     let size = vec2<f32>(textureDimensions(color_textures));
     let dx = dpdx(uv * size);
     let dy = dpdy(uv * size);
-    return 0.25 * (log2(max(dot(dx, dx), 1e-8)) + log2(max(dot(dy, dy), 1e-8)));
+    return 0.25 * (log2(max(dot(dx, dx), 1e-8)) + log2(max(dot(dy, dy), 1e-8))) - SHARPER;
 }

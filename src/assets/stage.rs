@@ -28,10 +28,10 @@ use crate::{
 pub(crate) const COVER_TEXEL: f64 = 8.0;
 /// The most texels of a cover map: those of wider forests are larger.
 pub(crate) const MOST_COVER_TEXELS: u32 = 1 << 24;
-/// Crown radius as a fraction of the larger half width of a plant.
-const CROWN_SHARE: f32 = 0.8;
 /// Extent of a plant without any surface, metres.
 const NO_PLANT: PlantSize = PlantSize { radius: 0.1, height: 0.1 };
+/// Radius of the ground under a plant without width, metres.
+const LEAST_RADIUS: f32 = 0.008;
 
 /// A built scene.
 pub struct Stage {
@@ -288,13 +288,10 @@ pub(crate) fn cover(stand: &PackedStand, plants: &[BakedPlant]) -> Result<CoverM
     Ok(bounded_cover_map(stand, &crowns, COVER_TEXEL, MOST_COVER_TEXELS)?.smoothed())
 }
 
-/// The disc of ground that the plant's crown covers, which is smaller than one that contains every twig.
+/// What the plant covers of the ground.
 fn crown(plant: &BakedPlant) -> PlantSize {
-    let (half_width, height) = plant.plant.bounds().map_or((NO_PLANT.radius, NO_PLANT.height), |bounds| {
-        let size = bounds.size();
-        ((0.5 * size.x.max(size.z)).max(0.01), bounds.max.y.max(0.01))
-    });
-    PlantSize { radius: half_width * CROWN_SHARE, height }
+    let height = plant.plant.bounds().map_or(NO_PLANT.height, |bounds| bounds.max.y);
+    PlantSize { radius: plant.plant.covered_radius().max(LEAST_RADIUS), height: height.max(0.01) }
 }
 
 fn bake(

@@ -4,10 +4,10 @@
 //! A stand is modelled as a uniform layer of upright crowns, from the tops (depth 0) to the ground (depth 1). Seen
 //! straight up, they cover the fraction `cover` of the sky. At an elevation e a ray meets crowns by their tops and by
 //! their sides. The sides are `4 l / (pi w)` times as large as the tops, where `w` and `l` are a crown's width and
-//! length over the tree's height [Li & Strahler 1985; Nilson 1971]:
+//! length over the tree's height [Li & Strahler 1985; Nilson 1971], and `f` is what a crown hides of its disc:
 //!
 //! ```text
-//!  transmittance(d, e) = exp(-tau (1 / l + 4 / (pi w) cot e) min(d, l))      tau = -ln(1 - 0.92 cover)
+//!  transmittance(d, e) = exp(-tau (1 / l + 4 / (pi w) cot e) min(d, l))      tau = -ln(1 - f cover)
 //!
 //!  sky_transmittance  of the sky's radiance through the neighbours, mean over what the own crown leaves of the sky
 //!  sun_transmittance  of the key light through the neighbours
@@ -37,8 +37,9 @@ pub const COVERS: usize = 16;
 /// Number of depths in the table, evenly from 0 to 1. The row of the ground follows them; it has no crown of its own.
 pub const DEPTHS: usize = 16;
 
-/// Fraction of a crown's outline that leaves fill.
-const FILLED: f32 = 0.92;
+/// The most that a crown hides of its disc. A dense crown reaches beyond its disc and hides more area than that; with this much, stands of
+/// grown trees are as bright as the path tracer has them.
+const MOST_FILL: f32 = 0.92;
 /// Albedo of the ground under trees: litter and moss, as `shaders/terrain/terrain.wgsl` draws them.
 const FLOOR: Vec3 = Vec3::new(0.062, 0.058, 0.026);
 /// The smallest share of light between crowns.
@@ -66,12 +67,19 @@ pub struct StandTrees {
     pub crown_width: f32,
     /// A crown's length over the tree's height; clamped to 0.1..=1. The trunks below it are ignored.
     pub crown_length: f32,
+    /// What a crown hides of the disc of ground that it covers, seen from above; clamped to 0.1..=0.92.
+    pub crown_fill: f32,
 }
 
 impl StandTrees {
     /// Black leaves.
-    pub const BLACK: Self =
-        Self { reflectance: Vec3::ZERO, transmittance: Vec3::ZERO, crown_width: 0.5, crown_length: 0.7 };
+    pub const BLACK: Self = Self {
+        reflectance: Vec3::ZERO,
+        transmittance: Vec3::ZERO,
+        crown_width: 0.5,
+        crown_length: 0.7,
+        crown_fill: MOST_FILL,
+    };
 
     /// Albedo of their closed crowns, seen from far above: that of a deep layer of isotropic scatterers, `(1 − γ) / (1 + γ)` with
     /// `γ² = 1 − R − T` [Hapke 1981, "Bidirectional reflectance spectroscopy", eq. 12], times what crowns that shade
@@ -86,19 +94,20 @@ impl StandTrees {
         if albedo.is_finite() { albedo } else { Vec3::ZERO }
     }
 
-    /// Width and length of a crown within their ranges; those of [`BLACK`](Self::BLACK) for what is no positive number.
-    fn crown(&self) -> (f32, f32) {
+    /// Width, length and fill of a crown within their ranges; those of [`BLACK`](Self::BLACK) for what is no positive number.
+    fn crown(&self) -> (f32, f32, f32) {
         let within = |value: f32, least: f32, most: f32, other: f32| {
             if value > 0.0 { value.clamp(least, most) } else { other }
         };
         let width = within(self.crown_width, 0.05, 2.0, Self::BLACK.crown_width);
-        (width, within(self.crown_length, 0.1, 1.0, Self::BLACK.crown_length))
+        let length = within(self.crown_length, 0.1, 1.0, Self::BLACK.crown_length);
+        (width, length, within(self.crown_fill, 0.1, MOST_FILL, Self::BLACK.crown_fill))
     }
 
     /// The crown of the mean tree.
     fn own_crown(&self) -> OwnCrown {
-        let (width, length) = self.crown();
-        OwnCrown { radius: 0.5 * width, length, extinction: -(1.0 - FILLED).ln() / length }
+        let (width, length, fill) = self.crown();
+        OwnCrown { radius: 0.5 * width, length, extinction: -(1.0 - fill).ln() / length }
     }
 }
 
@@ -271,8 +280,8 @@ struct Layer {
 
 impl Layer {
     fn new(cover: f32, trees: &StandTrees) -> Self {
-        let (width, length) = trees.crown();
-        Self { tau: -(1.0 - FILLED * cover).ln(), side: 4.0 / (PI * width), own: 0.5 * width, length }
+        let (width, length, fill) = trees.crown();
+        Self { tau: -(1.0 - fill * cover).ln(), side: 4.0 / (PI * width), own: 0.5 * width, length }
     }
 
     /// Fraction of light from an elevation of this sine that arrives at `depth`.
@@ -509,6 +518,17 @@ mod tests {
         assert!(slender.transmittance(0.5, 0.3) < layer.transmittance(0.5, 0.3));
     }
 
+    /// Crowns of few leaves let light through, whose colour it keeps.
+    #[test]
+    fn thin_crowns_are_brighter_below() {
+        let light = light(50.0);
+        let [thin, dense] =
+            [0.5, 0.95].map(|fill| StandLight::new(&light, &StandTrees { crown_fill: fill, ..leaves(0.1, 0.1) }));
+        let (thin, dense) = (thin.at(0.7, 1.0), dense.at(0.7, 1.0));
+        assert!(thin.sun_transmittance > 1.3 * dense.sun_transmittance);
+        assert!(thin.sky_transmittance.y > 1.3 * dense.sky_transmittance.y);
+    }
+
     #[test]
     fn leaves_that_absorb_nothing_lose_no_light() {
         let light = light(40.0);
@@ -545,6 +565,7 @@ mod tests {
             transmittance: Vec3::splat(9.0),
             crown_width: f32::NAN,
             crown_length: -1.0,
+            crown_fill: f32::INFINITY,
         };
         for light in [black, light(-3.0), light(0.0), light(89.0)] {
             for trees in [StandTrees::BLACK, leaves(0.5, 0.5), wild, StandTrees { crown_width: 1e9, ..wild }] {

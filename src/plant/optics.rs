@@ -41,6 +41,13 @@ impl Plant {
         }
     }
 
+    /// Radius of the disc of ground that the plant covers, metres: it is smaller than one that contains every twig. 0
+    /// without any surface.
+    pub fn covered_radius(&self) -> f32 {
+        let size = self.bounds().map_or(Vec3::ZERO, |bounds| bounds.size());
+        CROWN_SHARE * 0.5 * size.x.max(size.z)
+    }
+
     /// Width of the crown over the plant's height: the mean of its extents along x and z, of which a crown fills four
     /// fifths. 0 where there are no leaves or no height.
     pub fn crown_width(&self) -> f32 {

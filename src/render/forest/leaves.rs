@@ -1,5 +1,7 @@
 //! Optical properties of a forest's leaves, averaged over their areas.
 
+use std::f32::consts::PI;
+
 use glam::Vec3;
 
 use crate::{bake::BakedPlant, light::StandTrees, scatter::PackedStand};
@@ -12,6 +14,7 @@ pub struct Leaves {
     transmitted: Vec3,
     crown_width: f32,
     crown_length: f32,
+    crown_fill: f32,
 }
 
 impl Leaves {
@@ -32,6 +35,7 @@ impl Leaves {
                 transmitted: colors.transmitted * area,
                 crown_width: plant.plant.crown_width() * area,
                 crown_length: plant.plant.crown_length() * area,
+                crown_fill: crown_fill(plant) * area,
             }
         };
         plants.iter().zip(areas).map(of_plant).fold(Self::default(), Self::add)
@@ -45,6 +49,7 @@ impl Leaves {
             transmitted: self.transmitted + other.transmitted,
             crown_width: self.crown_width + other.crown_width,
             crown_length: self.crown_length + other.crown_length,
+            crown_fill: self.crown_fill + other.crown_fill,
         }
     }
 
@@ -56,9 +61,20 @@ impl Leaves {
                 transmittance: self.transmitted / self.area,
                 crown_width: self.crown_width / self.area,
                 crown_length: self.crown_length / self.area,
+                crown_fill: self.crown_fill / self.area,
             }
         } else {
             StandTrees::BLACK
         }
+    }
+}
+
+/// What leaves and branches hide of the ground that the plant covers, 0..=1; that of
+/// [`StandTrees::BLACK`] for a plant without a cross.
+fn crown_fill(plant: &BakedPlant) -> f32 {
+    let area = PI * plant.plant.covered_radius().powi(2);
+    match plant.cross() {
+        Some(cross) if area > 0.0 => (cross.area_from_above() / area).min(1.0),
+        _ => StandTrees::BLACK.crown_fill,
     }
 }

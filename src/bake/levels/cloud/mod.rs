@@ -350,7 +350,7 @@ fn draw(
 ) -> (Vec<Vec<Texel>>, Vec<Cell>) {
     const ROWS: u32 = 8;
     let cells = atlas::pack(sheets, settings.resolution);
-    let sides = light::vertex_sides(lighting);
+    let light = light::vertex_light(lighting);
     let surfaces = surfaces(plant);
     let samples = settings.supersampling;
     let draw = |(sheet, cell): (&Sheet, &Cell)| {
@@ -361,7 +361,7 @@ fn draw(
         let right = sheet.u.normalize_or(sheet.normal.any_orthonormal_vector());
         let to_plane = Mat3::from_cols(right, sheet.normal.cross(right), sheet.normal).transpose();
         let shader =
-            Shader { plant, lighting, sides: sides.as_deref(), raster: &raster, to_plane, toward: sheet.normal };
+            Shader { plant, lighting, light: light.as_deref(), raster: &raster, to_plane, toward: sheet.normal };
         shader.image(samples as usize).texels
     };
     let texels = sheets.par_iter().zip(&cells).map(draw).collect();

@@ -26,17 +26,23 @@
 use glam::{Mat3, Vec3, Vec4};
 
 use super::{Texel, signed_mips::signed_mips};
-use crate::bake::lighting::BakedLighting;
+use crate::bake::lighting::{BakedLighting, transfer::INDIRECT_SUN_COEFFICIENTS};
 use crate::math::MipChain;
 
 /// The value of a code of 127. An unoccluded side has a first coefficient of 0.282 and a vector of length 0.326.
 pub const LIGHT_SCALE: f32 = 0.4;
 
-/// The two sides of a vertex in the plant's frame: the vector, and in w the first coefficient.
-pub(in crate::bake::levels) type Sides = [Vec4; 2];
+/// The first two bands of the transfer of a vertex in the plant's frame: the vector, and in w the first coefficient.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::bake::levels) struct VertexLight {
+    /// All light on its front and on its back.
+    pub sides: [Vec4; 2],
+    /// The light of the sun that other leaves scatter to either side.
+    pub indirect_sun: Vec4,
+}
 
-/// Those of each vertex of each part; `None` where a plant is not lit by transfer.
-pub(in crate::bake::levels) fn vertex_sides(lighting: &BakedLighting) -> Option<Vec<Vec<Sides>>> {
+/// That of each vertex of each part; `None` where a plant is not lit by transfer.
+pub(in crate::bake::levels) fn vertex_light(lighting: &BakedLighting) -> Option<Vec<Vec<VertexLight>>> {
     let BakedLighting::Transfer(transfer) = lighting else { return None };
     let baked = transfer.packed.unpack();
     let (count, channels) = (baked.settings.coefficients().max(1), baked.settings.channels.count());
@@ -45,14 +51,22 @@ pub(in crate::bake::levels) fn vertex_sides(lighting: &BakedLighting) -> Option<
             let of = coefficients.get(index * channels..(index + 1) * channels).unwrap_or(&[]);
             of.iter().sum::<f32>() / channels as f32
         };
-        // The second band as a vector: `light::sh` has the signs.
-        Vec4::new(-mean(1), mean(2), -mean(3), mean(0))
+        two_bands(mean(0), [mean(1), mean(2), mean(3)])
     };
     let parts = baked.parts.iter().map(|part| {
         let back = part.back.chunks_exact(count).map(side).chain(std::iter::repeat(Vec4::ZERO));
-        part.front.chunks_exact(count).map(side).zip(back).map(|(front, back)| [front, back]).collect()
+        let (indirect, _) = part.indirect_sun.as_chunks::<INDIRECT_SUN_COEFFICIENTS>();
+        let indirect = indirect.iter().map(|&[mean, a, b, c]| two_bands(mean, [a, b, c]));
+        let front = part.front.chunks_exact(count).map(side);
+        let vertices = front.zip(back).zip(indirect.chain(std::iter::repeat(Vec4::ZERO)));
+        vertices.map(|((front, back), indirect_sun)| VertexLight { sides: [front, back], indirect_sun }).collect()
     });
     Some(parts.collect())
+}
+
+/// The second band as a vector: `light::sh` has the signs.
+fn two_bands(mean: f32, [a, b, c]: [f32; 3]) -> Vec4 {
+    Vec4::new(-a, b, -c, mean)
 }
 
 /// What a sample stores whose viewer sees `near`, with light of the share `transmission` from `far`.
@@ -93,8 +107,8 @@ mod tests {
         let settings = CrossSettings { resolution: 64, supersampling: 2, ..CrossSettings::default() };
         let plane = &planes(&plant, 2)[0];
         let frame = plane.frame();
-        let sides = vertex_sides(&lighting).unwrap();
-        let texels = render_plane(&plant, &lighting, Some(&sides), plane, &settings).texels;
+        let light = vertex_light(&lighting).unwrap();
+        let texels = render_plane(&plant, &lighting, Some(&light), plane, &settings).texels;
         let codes = mips(&texels, 64);
         let air = Atmosphere::new(AtmosphereParams::with_visibility_km(60.0)).unwrap();
         for elevation in [40.0, 5.0, -4.0] {
@@ -106,10 +120,11 @@ mod tests {
             let vertices = |part: usize| {
                 let part = &baked.parts[part];
                 let count = part.front.len() / baked.settings.coefficients();
-                let side = |i| [lit(part.front_of(i, &baked.settings)), lit(part.back_of(i, &baked.settings))];
-                (0..count).map(side).collect::<Vec<Sides>>()
+                let sides = |i| [lit(part.front_of(i, &baked.settings)), lit(part.back_of(i, &baked.settings))];
+                let vertex = |i| VertexLight { sides: sides(i), ..VertexLight::default() };
+                (0..count).map(vertex).collect::<Vec<_>>()
             };
-            let lit: Vec<Vec<Sides>> = (0..baked.parts.len()).map(vertices).collect();
+            let lit: Vec<Vec<VertexLight>> = (0..baked.parts.len()).map(vertices).collect();
             let truth = render_plane(&plant, &lighting, Some(&lit), plane, &settings).texels;
             let vector = frame.transpose() * Vec3::new(-luminance(sky[1]), luminance(sky[2]), -luminance(sky[3]));
             let (mut error, mut error_by_ambient, mut square) = (0.0, 0.0, 0.0);

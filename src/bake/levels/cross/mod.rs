@@ -29,7 +29,7 @@ use glam::{Mat3, Vec3, Vec4};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use self::properties::IsotropicSum;
+use self::{light::VertexLight, properties::IsotropicSum};
 use super::rasterize::{Hit, Raster, View};
 use crate::bake::lighting::{AmbientTerm, BakedLighting};
 use crate::math::{MipChain, hash::mix32, luminance};
@@ -55,6 +55,12 @@ impl Cross {
     /// The upright planes.
     pub fn uprights(&self) -> &[CrossPlane] {
         self.planes.split_last().map_or(&[], |(_, uprights)| uprights)
+    }
+
+    /// Area that the plant hides from above, m²: that of the level plane's outline.
+    pub fn area_from_above(&self) -> f32 {
+        let (Some(plane), Some(color)) = (self.planes.last(), self.textures.color.last()) else { return 0.0 };
+        4.0 * plane.u.length() * plane.v.length() * color.coverage(0, 0.5)
     }
 
     /// Bytes of all textures.
@@ -188,8 +194,8 @@ pub fn bake_cross(plant: &Arc<Plant>, lighting: &BakedLighting, settings: &Cross
     let settings = settings.sanitized();
     let planes = planes(plant, settings.uprights);
     let resolution = settings.resolution as usize;
-    let sides = light::vertex_sides(lighting);
-    let render = |plane| render_plane(plant, lighting, sides.as_deref(), plane, &settings);
+    let light = light::vertex_light(lighting);
+    let render = |plane| render_plane(plant, lighting, light.as_deref(), plane, &settings);
     let images: Vec<Image> = planes.par_iter().map(render).collect();
     let samples: Vec<Vec<sun::Sample>> = images.iter().map(Image::samples).collect();
     let coefficients = sun::coefficients(plant, &planes, &samples);
@@ -199,7 +205,7 @@ pub fn bake_cross(plant: &Arc<Plant>, lighting: &BakedLighting, settings: &Cross
         .map(|(image, coefficients)| {
             let texels = &image.texels;
             let properties = properties::mips(texels, resolution, settings.normal_smoothing);
-            let light = sides.is_some().then(|| light::mips(texels, resolution));
+            let light = light.is_some().then(|| light::mips(texels, resolution));
             let sun = sun::mips(image, coefficients, resolution);
             (color::mips(texels, resolution, settings.fade), (properties, (sun, light)))
         })
@@ -329,7 +335,7 @@ impl Image {
 fn render_plane(
     plant: &Plant,
     lighting: &BakedLighting,
-    sides: Option<&[Vec<light::Sides>]>,
+    light: Option<&[Vec<VertexLight>]>,
     plane: &CrossPlane,
     settings: &CrossSettings,
 ) -> Image {
@@ -338,7 +344,7 @@ fn render_plane(
     let side = settings.resolution * settings.supersampling;
     let raster = Raster::new(plant, &view, side, side, ROWS * settings.supersampling);
     let shader =
-        Shader { plant, lighting, sides, raster: &raster, to_plane: plane.frame().transpose(), toward: plane.normal };
+        Shader { plant, lighting, light, raster: &raster, to_plane: plane.frame().transpose(), toward: plane.normal };
     shader.image(settings.supersampling as usize)
 }
 
@@ -347,7 +353,7 @@ pub(in crate::bake::levels) struct Shader<'a> {
     pub plant: &'a Plant,
     pub lighting: &'a BakedLighting,
     pub raster: &'a Raster,
-    pub sides: Option<&'a [Vec<light::Sides>]>,
+    pub light: Option<&'a [Vec<VertexLight>]>,
     pub to_plane: Mat3,
     pub toward: Vec3,
 }
@@ -444,7 +450,10 @@ impl Shader<'_> {
         let seen = self.seen(hit);
         let positions = &self.plant.parts[seen.part].mesh.positions;
         let position = seen.weighted().map(|(corner, weight)| weight * positions[corner]).sum();
-        sun::Sample { position, normal: seen.normal, transmission: seen.transmission }
+        let light = self.light.and_then(|parts| parts.get(seen.part)).map_or(&[][..], Vec::as_slice);
+        let scattered = |corner: usize| light.get(corner).map_or(Vec4::ZERO, |light| light.indirect_sun);
+        let indirect = seen.weighted().map(|(corner, weight)| weight * scattered(corner)).sum();
+        sun::Sample { position, normal: seen.normal, transmission: seen.transmission, indirect }
     }
 
     fn add(&self, hit: &Hit, texel: &mut Texel) {
@@ -452,9 +461,9 @@ impl Shader<'_> {
         let kind = self.plant.parts[seen.part].kind;
         let values = self.lighting.ambient(seen.part);
         let ambient: f32 = seen.weighted().map(|(c, w)| w * values.get(c).copied().unwrap_or(1.0)).sum();
-        if let Some(sides) = self.sides.and_then(|parts| parts.get(seen.part)) {
+        if let Some(light) = self.light.and_then(|parts| parts.get(seen.part)) {
             let blended = |side: usize| -> Vec4 {
-                seen.weighted().map(|(c, w)| w * sides.get(c).map_or(Vec4::ZERO, |sides| sides[side])).sum()
+                seen.weighted().map(|(c, w)| w * light.get(c).map_or(Vec4::ZERO, |light| light.sides[side])).sum()
             };
             let front = usize::from(seen.from_behind && kind == PartKind::Foliage);
             texel.light += light::stored(blended(front), blended(1 - front), seen.transmission, &self.to_plane);

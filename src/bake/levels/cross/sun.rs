@@ -7,9 +7,12 @@
 //! For a sample of a texel, with `V(w)` the visibility of the direction `w` behind the plant's other leaves:
 //!
 //! ```text
-//!  S(w) = V(w) (max(n.w, 0) + t max(-n.w, 0)) / (1 + t)        n towards the viewer, t the luminance of the transmission
+//!  S(w) = V(w) (max(n.w, 0) + t max(-n.w, 0)) / (1 + t) + pi I(w)      n towards the viewer, t the luminance of the transmission
 //!  radiance under the sun = base colour (1 + t) E / pi S(w)
 //! ```
+//!
+//! `I` is the light that other leaves scatter to the sample, of a plant that is lit by transfer
+//! ([`crate::bake::lighting::transfer::indirect_sun_share`]); its colour is taken to be that of the light itself.
 //!
 //! Averaged over leaves, `S` is smooth in `w`, and eight polynomials over the hemisphere hold it ([`basis`]), fitted by least
 //! squares to [`DIRECTIONS`] directions. A sun below the horizon needs none, so half of the sphere is all that is fitted.
@@ -17,6 +20,7 @@
 //!
 //! Cost: 8 bytes per texel plus a third for mips: 0.7 MB per plane at 256² texels, and one ray per direction and texel.
 
+use std::f32::consts::PI;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -24,6 +28,7 @@ use glam::{Mat3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::{CrossPlane, Image, signed_mips::signed_mips};
+use crate::bake::lighting::transfer::indirect_sun_share;
 use crate::math::{MipChain, cholesky, hammersley};
 use crate::plant::Plant;
 use crate::trace::PlantTracer;
@@ -67,6 +72,8 @@ pub(super) struct Sample {
     pub normal: Vec3,
     /// Luminance of the light that comes through, as a share of what is reflected.
     pub transmission: f32,
+    /// The sun's light that other leaves scatter to it ([`super::light::VertexLight::indirect_sun`]).
+    pub indirect: Vec4,
 }
 
 impl Sample {
@@ -74,6 +81,12 @@ impl Sample {
         let cosine = self.normal.dot(sun);
         let shown = (cosine.max(0.0) + self.transmission * (-cosine).max(0.0)) / (1.0 + self.transmission);
         if shown.is_finite() { shown } else { 0.0 }
+    }
+
+    /// What it shows of the light that other leaves scatter, at most 1.
+    fn scattered(&self, sun: Vec3) -> f32 {
+        let [x, y, z, w] = self.indirect.to_array();
+        (PI * indirect_sun_share(&[w, -x, y, -z], sun)).min(1.0)
     }
 }
 
@@ -104,9 +117,9 @@ pub(super) fn coefficients(plant: &Arc<Plant>, planes: &[CrossPlane], samples: &
             .collect();
         let of_sample = |(index, sample): (usize, &Sample)| {
             let mut sum = [0.0f32; SUN_FUNCTIONS];
-            let visible = suns.iter().zip(&hidden).zip(&weights).filter(|((_, hidden), _)| !hidden[index]);
-            for ((sun, _), weights) in visible {
-                let shown = sample.shown(from_basis * *sun);
+            for ((sun, hidden), weights) in suns.iter().zip(&hidden).zip(&weights) {
+                let sun = from_basis * *sun;
+                let shown = sample.scattered(sun) + if hidden[index] { 0.0 } else { sample.shown(sun) };
                 sum.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += weight * shown);
             }
             let [a, b, c, d, e, f, g, h] = sum;
@@ -248,11 +261,34 @@ mod tests {
 
     #[test]
     fn a_lone_leaf_is_lit_from_both_sides() {
-        let leaf = Sample { position: Vec3::ZERO, normal: Vec3::Z, transmission: 0.5 };
+        let leaf = Sample { position: Vec3::ZERO, normal: Vec3::Z, transmission: 0.5, indirect: Vec4::ZERO };
         assert!((leaf.shown(Vec3::Z) - 1.0 / 1.5).abs() < 1e-6);
         assert!((leaf.shown(-Vec3::Z) - 0.5 / 1.5).abs() < 1e-6);
         let broken = Sample { transmission: f32::INFINITY, ..leaf };
         assert_eq!(broken.shown(Vec3::Z), 0.0);
+    }
+
+    /// What other leaves scatter is shown in the shade too, and from the side that it comes from.
+    #[test]
+    fn scattered_light_is_added() {
+        let plant = Arc::new(grow(&GrowParameters::broadleaf(), 1, 5000).unwrap());
+        let planes = planes(&plant, 1);
+        let dark = Sample { position: Vec3::Y, normal: Vec3::Z, transmission: 0.0, indirect: Vec4::ZERO };
+        let lit = Sample { indirect: Vec4::new(0.0, 0.05, 0.0, 0.2), ..dark };
+        let found = coefficients(&plant, &planes, &[vec![dark, lit], vec![]]);
+        for (azimuth, elevation) in [(10.0, 15.0), (200.0, 40.0), (90.0, 85.0)] {
+            let sun = toward(azimuth, elevation);
+            let functions = basis(axes(&planes[0]) * sun);
+            let value = |index: usize| -> f32 {
+                let [low, high] = found[0][index].map(|c: Vec4| c.to_array());
+                low.iter().chain(&high).zip(functions).map(|(c, f)| c * f).sum()
+            };
+            let wanted = PI * (0.282_094_8 * 0.2 + 0.488_602_5 * 0.05 * sun.y);
+            assert!((value(1) - value(0) - wanted).abs() < 1e-5, "{} for {wanted}", value(1) - value(0));
+        }
+        let broken = Sample { indirect: Vec4::NAN, ..dark };
+        assert_eq!(broken.scattered(Vec3::Y), 0.0);
+        assert_eq!(Sample { indirect: Vec4::splat(1e30), ..dark }.scattered(Vec3::Y), 1.0);
     }
 
     #[test]
