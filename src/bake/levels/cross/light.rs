@@ -167,6 +167,6 @@ mod tests {
 
     #[test]
     fn nothing_is_made_without_transfer() {
-        assert_eq!(vertex_sides(&BakedLighting::Local), None);
+        assert!(vertex_light(&BakedLighting::Local).is_none());
     }
 }
