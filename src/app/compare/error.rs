@@ -15,6 +15,23 @@ pub enum CompareError {
         /// The reason.
         why: String,
     },
+    /// Pixels whose light is no number.
+    #[error(
+        "{}: {count} of {total} pixels are not finite (NaN or infinite), the first in column {column} of row {row}, counted from 0 at the \
+         upper left; an image with such pixels cannot be judged, render it anew or replace them", path.display()
+    )]
+    NotFinite {
+        /// The file.
+        path: PathBuf,
+        /// Number of these pixels.
+        count: usize,
+        /// Number of all pixels.
+        total: usize,
+        /// Column of the first one.
+        column: usize,
+        /// Its row.
+        row: usize,
+    },
     /// Images that do not fit together.
     #[error("{} and {}: {source}", test.display(), reference.display())]
     Measure {

@@ -17,10 +17,10 @@ use crate::{
 };
 
 /// Reads an image: a display's from PNG or JPEG (alpha has no effect), a scene's radiance from OpenEXR. What it is follows
-/// from its content, not its name.
+/// from its content, not its name. Negative light, which OpenEXR can hold, counts as none.
 ///
 /// # Errors
-/// [`CompareError::Read`].
+/// [`CompareError::Read`], [`CompareError::NotFinite`].
 pub fn read(path: &Path) -> Result<Picture, CompareError> {
     let failed = |why: String| CompareError::Read { path: path.to_owned(), why };
     let bytes = files::read_ordinary(path).map_err(|error| failed(error.to_string()))?;
@@ -31,7 +31,9 @@ pub fn read(path: &Path) -> Result<Picture, CompareError> {
     let (width, height) = (image.width() as usize, image.height() as usize);
     let picture = match (format, image) {
         (ImageFormat::OpenExr, image) => {
-            Picture::new(width, height, Light::Scene, colors(&image.into_rgb32f(), |light| light))
+            let light = colors(&image.into_rgb32f(), |light| light);
+            check_finite(path, width, &light)?;
+            Picture::new(width, height, Light::Scene, light)
         }
         (
             _,
@@ -43,6 +45,19 @@ pub fn read(path: &Path) -> Result<Picture, CompareError> {
         (_, image) => Picture::new(width, height, Light::Display, colors(&image.into_rgb32f(), srgb_to_linear)),
     };
     picture.map_err(|error| failed(error.to_string()))
+}
+
+/// A picture takes what is not finite as black, which would look like a good match of a dark reference.
+fn check_finite(path: &Path, width: usize, light: &[Vec3]) -> Result<(), CompareError> {
+    let mut wrong = light.iter().enumerate().filter(|(_, pixel)| !pixel.is_finite());
+    let Some((first, _)) = wrong.next() else { return Ok(()) };
+    Err(CompareError::NotFinite {
+        path: path.to_owned(),
+        count: 1 + wrong.count(),
+        total: light.len(),
+        column: first % width,
+        row: first / width,
+    })
 }
 
 fn colors(values: &[f32], decode: fn(f32) -> f32) -> Vec<Vec3> {
@@ -145,6 +160,23 @@ mod tests {
             let message = read(&at(wrong)).map_err(|error| error.to_string());
             assert!(message.is_err_and(|message| message.contains(folder.path().to_str().unwrap())), "{wrong}");
         }
+        Ok(())
+    }
+
+    /// An image of nothing but NaN once had a FLIP of 0 against a black one, and passed every limit.
+    #[test]
+    fn what_is_not_finite_is_refused_with_its_place_and_negative_light_is_none() -> Outcome {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("a.exr");
+        for wrong in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let light = |x: u32, y: u32| if (x + 6 * y) >= 19 { [1.0, wrong, 1.0] } else { [0.5; 3] };
+            image::Rgb32FImage::from_fn(6, 4, |x, y| image::Rgb(light(x, y))).save(&path)?;
+            let message = read(&path).err().map(|error| error.to_string()).unwrap_or_default();
+            assert!(message.contains("a.exr: 5 of 24 pixels are not finite"), "{message}");
+            assert!(message.contains("column 1 of row 3"), "{message}");
+        }
+        image::Rgb32FImage::from_pixel(2, 1, image::Rgb([-1.0, 2.0, 0.0])).save(&path)?;
+        assert_eq!(read(&path)?.pixels, [Vec3::new(0.0, 2.0, 0.0); 2]);
         Ok(())
     }
 

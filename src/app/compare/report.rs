@@ -76,13 +76,13 @@ impl CompareReport {
         Some((&worst.name, flip(&worst)))
     }
 
-    /// Fails if the mean FLIP of an image is above `limit`.
+    /// Fails if the mean FLIP of an image is above `limit`, or no number.
     ///
     /// # Errors
     /// [`CompareError::Limit`] with the worst image.
     pub fn check_limit(&self, limit: f64) -> Result<(), CompareError> {
         match self.worst() {
-            Some((name, found)) if found > limit => Err(CompareError::Limit { name: name.to_owned(), found, limit }),
+            Some((name, found)) if found > limit || found.is_nan() => Err(CompareError::Limit { name: name.to_owned(), found, limit }),
             _ => Ok(()),
         }
     }

@@ -19,7 +19,8 @@ use clap::Args;
   canopy compare noon.exr truth.exr --half truth-half.exr the noise of the truth is no contrast
   canopy compare flight 'truth/frame-*.png' --json > comparison.json
 FLIP is 0 where nobody sees a difference and 1 for black against white [Andersson et al. 2020]; EXR files are compared by its
-version for radiance. Light, contrast and correlation by area tell wrong light from another leaf at the same pixel.")]
+version for radiance, in which negative light counts as none, and pixels that are not finite are an error. Light, contrast and
+correlation by area tell wrong light from another leaf at the same pixel.")]
 pub struct Compare {
     /// The image to judge (PNG, JPEG or OpenEXR), or a sequence: a folder or a pattern with one `*`.
     pub test: PathBuf,
