@@ -162,19 +162,28 @@ fn compare_images(options: &canopy::app::CompareOptions, arguments: &cli::Compar
 }
 
 fn profile_scene(options: &canopy::app::ProfileOptions, arguments: &cli::Profile, quiet: bool) -> anyhow::Result<()> {
-    use canopy::app::{BaselineRow, against, profile, profiled_scene, read_report, settings_of};
+    use canopy::{
+        app::{BaselineRow, against, cautions, check_baseline, profile, profiled_scene, read_report, settings_of},
+        progress::Progress,
+    };
     if arguments.list_settings {
         let settings = settings_of(&profiled_scene(&options.scene, &options.overrides)?);
         return cli::print_lines(
             settings.iter().map(|one| format!("{} = {}   ({})", one.name, one.value, one.expected)),
         );
     }
-    // A baseline that cannot be read is found before the long work.
+    // A baseline that cannot be read or compared with is found before the long work.
     let baseline = arguments.baseline.as_deref().map(|path| Ok::<_, anyhow::Error>((path, read_report(path)?)));
     let baseline = baseline.transpose()?;
+    if let Some((path, baseline)) = &baseline {
+        check_baseline(options, baseline, path)?;
+    }
     canopy::app::listen_to_interrupts()?;
     let mut bars = Bars::new(quiet);
     let (report, files) = profile(options, &mut bars)?;
+    if let Some((path, baseline)) = &baseline {
+        cautions(&report, baseline, path).iter().for_each(|caution| bars.warn(caution));
+    }
     drop(bars);
     if !quiet {
         cli::print_lines(report.lines())?;

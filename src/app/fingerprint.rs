@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::{
-    scene::{Ground, GrownForm, PlantSource, Scene, Trees},
+    scene::{Ground, GrownForm, Overrides, PlantSource, Scene, Trees},
     style::Palette,
 };
 
@@ -23,6 +23,27 @@ pub fn fingerprint(scene: &Scene) -> String {
         palette.clear();
     }
     hasher.update(format!("{} {bare:?}", env!("CARGO_PKG_VERSION")).as_bytes());
+    hasher.finalize().to_hex()[..32].to_owned()
+}
+
+/// 32 hexadecimal digits that follow from the content of the scene's file, of those that it names, and from what `overrides` replace in
+/// it. Another version of the program, whose scenes may have more values, has the same.
+pub fn source_fingerprint(scene: &Scene, overrides: &Overrides) -> String {
+    let mut bare = scene.clone();
+    let mut hasher = blake3::Hasher::new();
+    match bare.file.take() {
+        Some(file) => hash(&mut hasher, &file),
+        None => {
+            hasher.update(format!("{bare:?}").as_bytes());
+        }
+    }
+    for path in paths(&mut bare) {
+        hash(&mut hasher, path);
+    }
+    if let Some(palette) = bare.style.palette_mut().filter(|palette| Palette::is_file(palette)) {
+        hash(&mut hasher, Path::new(palette.as_str()));
+    }
+    hasher.update(format!("{overrides:?}").as_bytes());
     hasher.finalize().to_hex()[..32].to_owned()
 }
 
@@ -95,6 +116,18 @@ mod tests {
         std::fs::write(folder.path().join("b.glb"), "two")?;
         assert_ne!(first, fingerprint(&scene("b.glb")));
         assert_ne!(first, fingerprint(&scene("none.glb")));
+
+        // A report is compared with one of the same scene, which another folder or a rule of the program does not change.
+        std::fs::write(folder.path().join("c.ron"), "scene")?;
+        std::fs::write(folder.path().join("d.ron"), "scene")?;
+        let read = |file: &str, seed: u64| Scene { file: Some(folder.path().join(file)), seed, ..scene("a.glb") };
+        let none = Overrides::default();
+        let first = source_fingerprint(&read("c.ron", 1), &none);
+        assert_eq!(first, source_fingerprint(&read("d.ron", 1), &none));
+        let seed = Overrides { seed: Some(2), ..Overrides::default() };
+        assert_ne!(first, source_fingerprint(&read("c.ron", 2), &seed));
+        std::fs::write(folder.path().join("a.glb"), "three")?;
+        assert_ne!(first, source_fingerprint(&read("c.ron", 1), &none));
 
         // Once a palette counted by the place of its file, not by its pigments.
         let painted = |folder: &str| {

@@ -61,8 +61,8 @@ pub use plan::{Frame, PlanError, RenderPlan};
 pub use profile::{
     BaselineRow, Combination, FrameTime, LevelCount, Machine, Memory, Method, PROFILE_VERSION, Peer, PictureRecord,
     PointRecord, PointSummary, ProfileError, ProfileOptions, ProfileReport, ReferenceKind, ReportFiles, Round,
-    SettingError, SettingInfo, Sweep, ViewRecord, Views, against, profile, profiled_scene, read_report, set_setting,
-    settings_of,
+    SettingError, SettingInfo, Sweep, ViewRecord, Views, against, cautions, check_baseline, profile, profiled_scene,
+    read_report, set_setting, settings_of,
 };
 pub use reference::reference;
 pub use rendered_image::RenderedImage;

@@ -82,7 +82,9 @@ impl CompareReport {
     /// [`CompareError::Limit`] with the worst image.
     pub fn check_limit(&self, limit: f64) -> Result<(), CompareError> {
         match self.worst() {
-            Some((name, found)) if found > limit || found.is_nan() => Err(CompareError::Limit { name: name.to_owned(), found, limit }),
+            Some((name, found)) if found > limit || found.is_nan() => {
+                Err(CompareError::Limit { name: name.to_owned(), found, limit })
+            }
             _ => Ok(()),
         }
     }

@@ -1,8 +1,22 @@
 //! Why a scene cannot be profiled.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::settings::SettingError;
+
+/// Rounds from which on a mean time has an interval.
+pub const LEAST_ROUNDS_FOR_MEAN: u32 = 2;
+/// Rounds from which on times of settings have ratios: two in each order.
+pub const LEAST_ROUNDS_FOR_RATIO: u32 = 4;
+
+/// What times above `limit` are, as a fraction of those in `baseline`.
+fn beyond(limit: f64, baseline: &Path) -> String {
+    let baseline = baseline.display();
+    match limit {
+        1.0.. => format!("are slower than in {baseline} by more than {:.0} %", 100.0 * (limit - 1.0)),
+        _ => format!("take more than {limit} of the time in {baseline}"),
+    }
+}
 
 /// Why a scene cannot be profiled, or what a profile found.
 #[derive(Debug, thiserror::Error)]
@@ -41,7 +55,7 @@ pub enum ProfileError {
         total: usize,
     },
     /// It has become slower.
-    #[error("{} of {total} settings are slower than in {} by more than {:.0} %: {}", slower.len(), baseline.display(), 100.0 * (limit - 1.0), slower.join("; "))]
+    #[error("{} of {total} settings {}: {}", slower.len(), beyond(*limit, baseline), slower.join("; "))]
     Slower {
         /// The report that it was compared with.
         baseline: PathBuf,
@@ -51,6 +65,38 @@ pub enum ProfileError {
         total: usize,
         /// The ratio allowed.
         limit: f64,
+    },
+    /// A baseline of something else.
+    #[error(
+        "{} cannot be compared with this profile: {}; measure the baseline again with the same scene, --size and views",
+        baseline.display(), differences.join("; ")
+    )]
+    Incomparable {
+        /// The report.
+        baseline: PathBuf,
+        /// What differs.
+        differences: Vec<String>,
+    },
+    /// Times that there are not.
+    #[error(
+        "{}: no times can be compared of {}; measure both reports with at least {LEAST_ROUNDS_FOR_MEAN} --rounds", baseline.display(),
+        settings.join("; ")
+    )]
+    Untimed {
+        /// The report that it was compared with.
+        baseline: PathBuf,
+        /// The settings that lack a time in either report.
+        settings: Vec<String>,
+    },
+    /// Too few rounds.
+    #[error("--rounds {rounds} are too few {purpose}; give at least {least}")]
+    FewRounds {
+        /// Rounds asked for.
+        rounds: u32,
+        /// What for.
+        purpose: &'static str,
+        /// The least that will do.
+        least: u32,
     },
     /// Nothing can be compared with a baseline.
     #[error("{}: none of its settings is in this profile, so nothing can be compared", .0.display())]

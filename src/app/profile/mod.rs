@@ -31,7 +31,7 @@ use std::{
 use chrono::{DateTime, Utc};
 
 pub use self::{
-    baseline::{BaselineRow, against},
+    baseline::{BaselineRow, against, cautions, check_baseline},
     contestant::Peer,
     error::ProfileError,
     record::{
@@ -51,7 +51,11 @@ use self::{
     sweep::{Point, points},
     views::ProfileView,
 };
-use super::{AppError, Part, Renderer, adapter, compare::read_image, compare::save_map, fingerprint::fingerprint};
+use super::{
+    AppError, Part, Renderer, adapter,
+    compare::{read_image, save_map},
+    fingerprint::{fingerprint, source_fingerprint},
+};
 use crate::{
     files,
     measure::{ComparisonSettings, PIXELS_PER_DEGREE, Picture, change, compare},
@@ -163,12 +167,15 @@ pub fn profile(
     options: &ProfileOptions,
     progress: &mut dyn Progress,
 ) -> Result<(ProfileReport, ReportFiles), AppError> {
-    profile_of(profiled_scene(&options.scene, &options.overrides)?, options, progress)
+    let scene = profiled_scene(&options.scene, &options.overrides)?;
+    let source = source_fingerprint(&scene, &options.overrides);
+    profile_of(scene, source, options, progress)
 }
 
-/// The same of a scene that has its overrides; those of `options` count no more.
+/// The same of a scene that has its overrides; those of `options` count no more. `source` is what tells it from others, if that is known.
 pub(super) fn profile_of(
     scene: Scene,
+    source: String,
     options: &ProfileOptions,
     progress: &mut dyn Progress,
 ) -> Result<(ProfileReport, ReportFiles), AppError> {
@@ -216,6 +223,7 @@ pub(super) fn profile_of(
     let mut contestants = Contestants { renderer, stages, stock };
 
     let mut work = Work::new(options, &scene, &points, &views, &contestants)?;
+    work.report.scene_fingerprint = source;
     let outcome = work.run(&mut contestants, &scene, progress);
     work.report.complete = outcome.is_ok();
     summary::summarize(&mut work.report);
@@ -262,6 +270,7 @@ impl<'a> Work<'a> {
             begun: DateTime::<Utc>::from(SystemTime::now()).to_rfc3339_opts(chrono::SecondsFormat::Secs, true),
             complete: false,
             fingerprint: whole.clone(),
+            scene_fingerprint: String::new(),
             machine,
             method: Method {
                 size: options.size,

@@ -28,6 +28,9 @@ pub struct ProfileReport {
     pub complete: bool,
     /// What tells it from other profiles.
     pub fingerprint: String,
+    /// What tells the scene from others, on any machine and for any version of the program; empty where it is not known.
+    #[serde(default)]
+    pub scene_fingerprint: String,
     /// The machine.
     pub machine: Machine,
     /// How it was measured.

@@ -89,7 +89,8 @@ pub fn tune(options: &TuneOptions, progress: &mut dyn Progress) -> Result<Tuned,
             step + 1,
             sweeps.iter().map(|sweep| sweep.values.len()).sum::<usize>()
         ));
-        let (report, _) = profile_of(centre.clone(), &step_options(options, &centre, sweeps, step), progress)?;
+        let (report, _) =
+            profile_of(centre.clone(), String::new(), &step_options(options, &centre, sweeps, step), progress)?;
         let candidates = candidates(&report)?;
         let now = candidates[0].1;
         let best = best(&candidates, options.goal);

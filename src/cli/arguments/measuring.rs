@@ -91,10 +91,12 @@ pub struct Profile {
     /// Number of views whose images the page shows.
     #[arg(long, value_name = "NUMBER", default_value_t = 3)]
     pub pictures: u32,
-    /// Compare with the report of an earlier profile, and fail where it is slower.
+    /// Compare with the report of an earlier profile (report.json) of the same scene, size and views, and fail where it is slower;
+    /// another machine, driver or version is warned of.
     #[arg(long, value_name = "FILE")]
     pub baseline: Option<PathBuf>,
-    /// Frame time, as a fraction of the baseline's, above which --baseline fails.
+    /// Frame time, as a fraction of the baseline's, above which --baseline fails, unless that may be chance: the 95 % interval of the
+    /// fraction begins at 1 or below (for a limit below 1, at the limit or below).
     #[arg(long, value_name = "RATIO", default_value_t = 1.1, value_parser = parse_positive, requires = "baseline")]
     pub limit: f64,
     /// Go on with an earlier, interrupted profile of the same scene and settings.
