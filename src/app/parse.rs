@@ -201,21 +201,19 @@ pub fn parse_exposure(text: &str) -> Result<f64, ArgumentError> {
 /// # Errors
 /// [`ArgumentError::Chunk`].
 pub fn parse_chunk(text: &str) -> Result<Selection, ArgumentError> {
-    let parts =
-        text.split_once('/').and_then(|(number, of)| Some((number.trim().parse().ok()?, of.trim().parse().ok()?)));
-    let chunk = parts.filter(|(_, of): &(u32, u32)| *of > 0);
-    chunk.map(|(number, of)| Selection::Chunk { number, of }).ok_or_else(|| ArgumentError::Chunk(text.to_owned()))
+    parse_part(text).map(|Part { number, of }| Selection::Chunk { number, of })
 }
 
-/// Reads `2/8`: one of several parts of the samples.
+/// Reads `2/8`: one of several parts of the samples, or of the settings of a profile. Whether it is one of them is checked where they are
+/// cut ([`Part::check`]).
 ///
 /// # Errors
 /// [`ArgumentError::Chunk`].
 pub fn parse_part(text: &str) -> Result<Part, ArgumentError> {
-    match parse_chunk(text)? {
-        Selection::Chunk { number, of } if (1..=of).contains(&number) => Ok(Part { number, of }),
-        _ => Err(ArgumentError::Chunk(text.to_owned())),
-    }
+    let parts =
+        text.split_once('/').and_then(|(number, of)| Some((number.trim().parse().ok()?, of.trim().parse().ok()?)));
+    let part = parts.filter(|(_, of): &(u32, u32)| *of > 0);
+    part.map(|(number, of)| Part { number, of }).ok_or_else(|| ArgumentError::Chunk(text.to_owned()))
 }
 
 /// Reads `10-19,30`: numbers of frames and ranges of them, both ends included.
@@ -312,6 +310,12 @@ mod tests {
         assert_eq!((parse_milliseconds("8.5ms"), parse_milliseconds("8")), (Ok(8.5), Ok(8.0)));
         assert!(["", "ms", "8s", "0", "-1ms"].iter().all(|wrong| parse_milliseconds(wrong).is_err()));
         assert_eq!(parse_chunk("2/8"), Ok(Selection::Chunk { number: 2, of: 8 }));
+        // Those that there are not were once a usage error of profiles and traces, and an error of renders.
+        for (number, of) in [(2, 8), (3, 2), (0, 2)] {
+            let text = format!("{number}/{of}");
+            assert_eq!(parse_part(&text), Ok(Part { number, of }));
+            assert_eq!(parse_chunk(&text), Ok(Selection::Chunk { number, of }));
+        }
         assert_eq!(parse_frames("10-19, 30"), Ok(Selection::Only(vec![(10, 19), (30, 30)])));
         assert!(["", "1", "1/0", "a/2", "-1/2"].iter().all(|wrong| parse_chunk(wrong).is_err()));
         assert!(["", "a", "5-3", "1,,2", "1-"].iter().all(|wrong| parse_frames(wrong).is_err()));

@@ -254,11 +254,21 @@ fn numbers(selection: &Selection, frames: u32) -> Result<Vec<u32>, PlanError> {
             Ok((0..frames).filter(wanted).collect())
         }
         Selection::Chunk { number, of } => {
-            if *number == 0 || number > of {
-                return Err(PlanError::NoChunk { number: *number, of: *of });
-            }
-            Ok(Part { number: *number, of: *of }.range(frames).collect())
+            let part = Part { number: *number, of: *of };
+            part.check()?;
+            Ok(part.range(frames).collect())
         }
+    }
+}
+
+impl Part {
+    /// Whether it is one of the parts.
+    ///
+    /// # Errors
+    /// [`PlanError::NoChunk`].
+    pub fn check(self) -> Result<(), PlanError> {
+        let Self { number, of } = self;
+        if (1..=of).contains(&number) { Ok(()) } else { Err(PlanError::NoChunk { number, of }) }
     }
 }
 
@@ -464,6 +474,9 @@ mod tests {
         assert_eq!(error(View::Scene, sequence(u32::MAX, None, standing), &bare), Some(PlanError::TooMany(u32::MAX)));
         let twice = Output::Stills(vec![Still { out: "a.png".into(), at: None }; 2]);
         assert_eq!(error(View::Scene, twice, &bare), Some(PlanError::SameFile("a.png".into())));
+        let none = Part { number: 4, of: 3 }.check().err().map(|error| error.to_string());
+        assert_eq!(none.as_deref(), Some("there is no piece 4 of 3; the pieces are 1/3 to 3/3"));
+        assert!(Part { number: 0, of: 3 }.check().is_err() && Part { number: 3, of: 3 }.check().is_ok());
         let fault = PlanError::NoPng("a.jpg".into()).to_string();
         assert!(fault.ends_with("call it a.png"), "{fault}");
         for (endings, words) in

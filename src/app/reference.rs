@@ -10,7 +10,7 @@ use std::{
 use glam::DVec3;
 
 use super::{
-    Frame, LeafModel, LightGroup, ReferenceOptions, RenderPlan,
+    Frame, LeafModel, LightGroup, Part, ReferenceOptions, RenderPlan,
     camera::NEAR,
     error::AppError,
     film_notes::FilmNotes,
@@ -62,9 +62,7 @@ pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Res
         endings: if options.part.is_some() { FILMS } else { IMAGES },
     };
     request.check(&written)?;
-    if let Some(part) = options.part.filter(|part| part.number == 0 || part.number > part.of) {
-        return Err(PlanError::NoChunk { number: part.number, of: part.of }.into());
-    }
+    options.part.map_or(Ok(()), Part::check)?;
     if let Some(part) = options.part.filter(|part| part.of > options.samples) {
         return Err(PlanError::TooManyParts { of: part.of, samples: options.samples }.into());
     }
