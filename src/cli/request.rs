@@ -247,7 +247,7 @@ pub fn tune_options(tune: &Tune, common: &Common) -> Result<TuneOptions, clap::E
         (None, None) => return Err(usage("give a --budget or an --error".to_owned())),
     };
     let profile = measured(&tune.scene, &tune.out, &tune.measured, common)?;
-    Ok(TuneOptions { goal, profile: ProfileOptions { sweeps: tune.sweep.clone(), ..profile } })
+    Ok(TuneOptions { goal, profile: ProfileOptions { sweeps: tune.sweep.clone(), resume: tune.resume, ..profile } })
 }
 
 /// What profiles and searches have in common.
@@ -433,6 +433,30 @@ mod tests {
         assert_eq!(read("--out a.png --light sky")?.light, LightGroup::Sky);
         for wrong in ["", "--out a.jpg", "--out a.exr --spp 0", "--out a.exr --bounces -1"] {
             assert_eq!(read(wrong).map(|_| ()).map_err(|error| error.exit_code()), Err(2), "{wrong}");
+        }
+        Ok(())
+    }
+
+    /// The number of frames beside a camera was once ignored, and a search could not be gone on with.
+    #[test]
+    fn profiles_and_searches() -> Result<(), Box<dyn std::error::Error>> {
+        let read = |line: &str| {
+            let words = ["canopy"].into_iter().chain(line.split_whitespace());
+            let arguments = Arguments::try_parse_from(words)?;
+            match arguments.command {
+                Some(Command::Profile(profile)) => profile_options(&profile, &arguments.common),
+                Some(Command::Tune(tune)) => Ok(tune_options(&tune, &arguments.common)?.profile),
+                _ => Err(usage("no profile".to_owned())),
+            }
+        };
+        assert!(read("tune s.ron --budget 8ms --resume")?.resume && !read("tune s.ron --budget 8ms")?.resume);
+        assert!(matches!(read("profile s.ron --camera 0,2,0,90,0")?.views, Views::Stills { .. }));
+        assert!(matches!(read("profile s.ron --frames 5")?.views, Views::Flight { frames: 5, .. }));
+        let both = read("profile s.ron --camera 0,2,0,90,0 --frames 5").map(|_| ());
+        assert!(both.is_err_and(|error| error.exit_code() == 2 && error.to_string().contains("--frames")));
+        // Which pieces there are is said where they are cut, as for frames.
+        for line in ["profile s.ron --chunk 3/2", "profile s.ron --chunk 0/2"] {
+            assert!(read(line).is_ok(), "{line}");
         }
         Ok(())
     }

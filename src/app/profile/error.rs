@@ -30,6 +30,9 @@ pub enum ProfileError {
         /// The most.
         most: usize,
     },
+    /// A setting in two sweeps, of which the later one would replace the values of the earlier one.
+    #[error("`{0}` is swept twice; write all its values in one sweep, as in --sweep {0}=VALUE,VALUE")]
+    SweptTwice(String),
     /// A report that cannot be read.
     #[error("{}: {why}", path.display())]
     Report {
@@ -101,6 +104,9 @@ pub enum ProfileError {
     /// Nothing can be compared with a baseline.
     #[error("{}: none of its settings is in this profile, so nothing can be compared", .0.display())]
     NothingInCommon(PathBuf),
+    /// A search without a reference.
+    #[error("a search needs a reference to count errors from; give --reference full, traced or a folder instead of none")]
+    NoReference,
     /// No setting is good enough.
     #[error("{0}")]
     NoAnswer(String),

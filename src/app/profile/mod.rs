@@ -33,14 +33,14 @@ use chrono::{DateTime, Utc};
 pub use self::{
     baseline::{BaselineRow, against, cautions, check_baseline},
     contestant::Peer,
-    error::ProfileError,
+    error::{LEAST_ROUNDS_FOR_RATIO, ProfileError},
     record::{
         FrameTime, LevelCount, Machine, Memory, Method, PROFILE_VERSION, PictureRecord, PointRecord, PointSummary,
         ProfileReport, Round, ViewRecord,
     },
     reference::ReferenceKind,
     settings::{AUTOMATIC, SettingError, SettingInfo, list as settings_of, set as set_setting},
-    sweep::{Combination, Sweep},
+    sweep::{Combination, Sweep, check_names},
     views::Views,
 };
 
@@ -179,6 +179,7 @@ pub(super) fn profile_of(
     options: &ProfileOptions,
     progress: &mut dyn Progress,
 ) -> Result<(ProfileReport, ReportFiles), AppError> {
+    options.part.map_or(Ok(()), Part::check)?;
     let mut points = points(&scene, &options.sweeps, options.combination)?;
     if let Some(part) = options.part {
         // Each part has the scene as written, which the others are compared with.

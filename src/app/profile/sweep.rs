@@ -135,11 +135,24 @@ pub enum Combination {
     Each,
 }
 
+/// Whether each setting has one sweep.
+///
+/// # Errors
+/// [`ProfileError::SweptTwice`].
+pub fn check_names(sweeps: &[Sweep]) -> Result<(), ProfileError> {
+    let twice = |(number, sweep): &(usize, &Sweep)| sweeps.iter().take(*number).any(|before| before.name == sweep.name);
+    match sweeps.iter().enumerate().find(twice) {
+        Some((_, sweep)) => Err(ProfileError::SweptTwice(sweep.name.clone())),
+        None => Ok(()),
+    }
+}
+
 /// The points of `sweeps`: the scene as written first, and none twice.
 ///
 /// # Errors
-/// [`ProfileError::Setting`], [`ProfileError::TooManyPoints`].
+/// [`ProfileError::SweptTwice`], [`ProfileError::Setting`], [`ProfileError::TooManyPoints`].
 pub fn points(scene: &Scene, sweeps: &[Sweep], combination: Combination) -> Result<Vec<Point>, ProfileError> {
+    check_names(sweeps)?;
     let mut combined: Vec<Vec<(String, String)>> = vec![Vec::new()];
     for sweep in sweeps {
         let pairs = || sweep.values.iter().map(|value| (sweep.name.clone(), value.clone()));
@@ -204,8 +217,14 @@ mod tests {
         let levels = [sweep("quality.levels=[(draw: \"model\", until: 40), (draw: \"cross\")]")];
         let found = points(&scene, &levels, Combination::All).unwrap();
         assert_eq!(found[1].label(), "levels=(model 40 m, cross)");
-        let many = sweep(&format!("quality.near_distance={}", vec!["1"; 40].join(",")));
-        let cube = [many.clone(), many.clone(), many];
+        // Of two sweeps of one setting the second one's values once replaced the first one's without a word.
+        let twice = [sweep("quality.msaa=1"), sweep("quality.msaa=4")];
+        for combination in [Combination::All, Combination::Each] {
+            let message = points(&scene, &twice, combination).err().map(|error| error.to_string()).unwrap_or_default();
+            assert!(message.starts_with("`quality.msaa` is swept twice; write all its values in one"), "{message}");
+        }
+        let cube = ["near_distance", "shadow_distance", "terrain_error"]
+            .map(|name| sweep(&format!("quality.{name}={}", vec!["1"; 40].join(","))));
         assert!(matches!(points(&scene, &cube, Combination::All), Err(ProfileError::TooManyPoints { .. })));
         assert!(matches!(points(&scene, &[sweep("no=1")], Combination::All), Err(ProfileError::Setting(_))));
     }

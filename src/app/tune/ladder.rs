@@ -1,6 +1,6 @@
 //! The values between which a search steps.
 
-use super::{ProfileError, Scene, Sweep, set_setting, settings_of};
+use super::{ProfileError, Scene, Sweep, check_names, set_setting, settings_of};
 
 /// A setting with its values in order.
 pub type Ladder = Sweep;
@@ -18,8 +18,9 @@ const BUILT_IN: [&str; 6] = [
 /// The ladders that were asked for, or the built-in ones that have an effect on `scene`.
 ///
 /// # Errors
-/// [`ProfileError::Setting`] for a value that a setting cannot have.
+/// [`ProfileError::Setting`] for a value that a setting cannot have, [`ProfileError::SweptTwice`].
 pub fn ladders(asked: &[Sweep], scene: &Scene) -> Result<Vec<Ladder>, ProfileError> {
+    check_names(asked)?;
     let has_effect = |ladder: &Sweep| scene.quality.levels.is_empty() || ladder.name != "quality.near_distance";
     let built_in = || BUILT_IN.iter().filter_map(|ladder| ladder.parse().ok()).filter(has_effect).collect();
     let ladders: Vec<Ladder> = if asked.is_empty() { built_in() } else { asked.to_vec() };

@@ -13,7 +13,8 @@ use std::path::PathBuf;
 
 use self::ladder::{ladders, neighbours};
 use super::{
-    AppError, Combination, ProfileError, ProfileOptions, ProfileReport, ReferenceKind, Sweep, profile::profile_of,
+    AppError, Combination, ProfileError, ProfileOptions, ProfileReport, ReferenceKind, ReportFiles, Sweep,
+    profile::{LEAST_ROUNDS_FOR_RATIO, check_names, profile_of},
     profiled_scene, set_setting, settings_of,
 };
 use crate::{
@@ -74,8 +75,10 @@ pub struct Tuned {
 /// Searches the settings of a scene.
 ///
 /// # Errors
-/// Those of [`profile`](super::profile()); [`ProfileError::NoAnswer`] if no settings reach the goal, with how near it came.
+/// [`ProfileError::FewRounds`] and [`ProfileError::NoReference`] before anything is measured. Those of [`profile`](super::profile());
+/// [`ProfileError::NoAnswer`] if no settings reach the goal, with how near it came.
 pub fn tune(options: &TuneOptions, progress: &mut dyn Progress) -> Result<Tuned, AppError> {
+    check(&options.profile)?;
     let mut centre = profiled_scene(&options.profile.scene, &options.profile.overrides)?;
     let ladders = ladders(&options.profile.sweeps, &centre)?;
     let out = &options.profile.out;
@@ -89,8 +92,7 @@ pub fn tune(options: &TuneOptions, progress: &mut dyn Progress) -> Result<Tuned,
             step + 1,
             sweeps.iter().map(|sweep| sweep.values.len()).sum::<usize>()
         ));
-        let (report, _) =
-            profile_of(centre.clone(), String::new(), &step_options(options, &centre, sweeps, step), progress)?;
+        let (report, _) = measure_step(&centre, step_options(options, &centre, sweeps, step), step, progress)?;
         let candidates = candidates(&report)?;
         let now = candidates[0].1;
         let best = best(&candidates, options.goal);
@@ -122,6 +124,31 @@ pub fn tune(options: &TuneOptions, progress: &mut dyn Progress) -> Result<Tuned,
     }
     Err(ProfileError::NoAnswer(format!("the search did not end within {MOST_STEPS} steps; give ladders with --sweep"))
         .into())
+}
+
+/// Whether candidates can be told from each other at all.
+fn check(profile: &ProfileOptions) -> Result<(), ProfileError> {
+    let (rounds, least) = (profile.rounds, LEAST_ROUNDS_FOR_RATIO);
+    if rounds < least {
+        return Err(ProfileError::FewRounds { rounds, purpose: "to tell which settings are faster", least });
+    }
+    if profile.reference == ReferenceKind::None { Err(ProfileError::NoReference) } else { Ok(()) }
+}
+
+/// Measures a step, or goes on with it where `options` say so. The first one decides whether an interrupted search is this one; a later
+/// one of other settings is left of a search before, and replaced.
+fn measure_step(
+    centre: &Scene,
+    options: ProfileOptions,
+    step: usize,
+    progress: &mut dyn Progress,
+) -> Result<(ProfileReport, ReportFiles), AppError> {
+    match profile_of(centre.clone(), String::new(), &options, progress) {
+        Err(AppError::Profile(ProfileError::Another(_))) if step > 0 => {
+            profile_of(centre.clone(), String::new(), &ProfileOptions { resume: false, ..options }, progress)
+        }
+        outcome => outcome,
+    }
 }
 
 fn no_answer(goal: Goal, now: Measured, candidates: &[(usize, Measured)]) -> String {
@@ -278,6 +305,55 @@ mod tests {
 
     fn measured(time: f64, ratio: f64, error: f64) -> (usize, Measured) {
         (0, Measured { time, ratio: Some((ratio, ratio - 0.01, ratio + 0.01)), error })
+    }
+
+    fn options(rounds: u32, reference: ReferenceKind) -> TuneOptions {
+        let profile = ProfileOptions {
+            scene: "nowhere.ron".into(),
+            out: "nowhere".into(),
+            sweeps: Vec::new(),
+            combination: Combination::Each,
+            part: None,
+            control: false,
+            against: None,
+            views: crate::app::Views::Flight { frames: 1, fps: None, from: None, at: None },
+            size: (64, 36),
+            rounds,
+            warm_up: 0,
+            reference,
+            shown: 1,
+            resume: true,
+            overrides: Overrides::default(),
+            adapter: None,
+            command: "canopy tune".to_owned(),
+        };
+        TuneOptions { goal: Goal::Budget(400.0), profile }
+    }
+
+    /// With 1 to 3 rounds no neighbour has a ratio, and the search once ended with "no settings were found" beside times within the
+    /// budget.
+    #[test]
+    fn a_search_that_could_tell_nothing_is_refused_before_the_scene_is_read() {
+        let refusal = |options: &TuneOptions| {
+            tune(options, &mut crate::progress::Silent).err().map(|error| error.to_string()).unwrap_or_default()
+        };
+        for rounds in 0..4 {
+            let message = refusal(&options(rounds, ReferenceKind::Full { supersampling: 1 }));
+            let expected = format!("--rounds {rounds} are too few to tell which settings are faster; give at least 4");
+            assert_eq!(message, expected);
+        }
+        assert!(refusal(&options(4, ReferenceKind::None)).contains("instead of none"));
+        assert!(refusal(&options(4, ReferenceKind::Full { supersampling: 1 })).contains("nowhere.ron"));
+    }
+
+    /// "The same command with --resume goes on", it said, and there was no --resume.
+    #[test]
+    fn an_interrupted_search_goes_on_with_its_steps() {
+        let search = options(4, ReferenceKind::Full { supersampling: 1 });
+        for step in 0..2 {
+            let own = step_options(&search, &Scene::default(), Vec::new(), step);
+            assert!(own.resume && own.out.ends_with(format!("step-{:02}", step + 1)));
+        }
     }
 
     #[test]

@@ -118,7 +118,7 @@ pub struct Measured {
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "640x360")]
     pub size: (u32, u32),
     /// Number of views along the scene's path.
-    #[arg(long, value_name = "NUMBER", default_value_t = 24, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "NUMBER", default_value_t = 24, value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with = "camera")]
     pub frames: u32,
     /// Frames per second of the flight [default: the views are spread over the whole path].
     #[arg(long, value_name = "RATE", value_parser = parse_positive, conflicts_with = "camera")]
@@ -132,7 +132,7 @@ pub struct Measured {
     /// Date and time with the offset from UTC [default: the scene's]; with --camera it may be repeated.
     #[arg(long, value_name = "TIME")]
     pub at: Vec<LocalTime>,
-    /// Rounds, each of which draws all views with all settings; 0 times nothing.
+    /// Rounds, each of which draws all views with all settings; 0 times nothing, and ratios of times need 4.
     #[arg(long, value_name = "NUMBER", default_value_t = 8, value_parser = clap::value_parser!(u32).range(0..=10_000))]
     pub rounds: u32,
     /// Frames before those that count, each time that settings change.
@@ -157,7 +157,8 @@ pub struct Measured {
   canopy tune demo.ron --error 0.08 --size 1280x720 --reference traced
   canopy tune demo.ron --budget 8ms --sweep quality.near_distance=10,20,40,80 --sweep quality.msaa=1,4
 The search steps from the scene's own settings to the best neighbour, one rung of one setting at a time, until none is better.
-It writes the settings as a scene file has them (quality.ron), and the report of each step beside it.")]
+It writes the settings as a scene file has them (quality.ron), and the report of each step beside it (step-01 and so on). It needs at
+least 4 rounds. Ctrl-C keeps the steps; the same command with --resume goes on.")]
 pub struct Tune {
     /// Scene file.
     pub scene: PathBuf,
@@ -170,6 +171,9 @@ pub struct Tune {
     /// Folder of the results.
     #[arg(long, value_name = "FOLDER", default_value = "tune")]
     pub out: PathBuf,
+    /// Go on with an earlier, interrupted search of the same scene: what its steps have measured is kept.
+    #[arg(long)]
+    pub resume: bool,
     /// Values to step between, NAME=VALUE,VALUE from cheap to dear, instead of the built-in ones.
     #[arg(long, value_name = "SWEEP")]
     pub sweep: Vec<Sweep>,
