@@ -57,6 +57,19 @@ pub enum ProfileError {
         /// Number of frames.
         total: usize,
     },
+    /// An image of a reference of another size.
+    #[error(
+        "{} has {}x{} pixels, not {}x{}; give the --size of the reference, or a reference of that size", path.display(), found.0, found.1,
+        wanted.0, wanted.1
+    )]
+    ReferenceSize {
+        /// The image.
+        path: PathBuf,
+        /// Its width and height.
+        found: (u32, u32),
+        /// Those of the frames.
+        wanted: (u32, u32),
+    },
     /// It has become slower.
     #[error("{} of {total} settings {}: {}", slower.len(), beyond(*limit, baseline), slower.join("; "))]
     Slower {

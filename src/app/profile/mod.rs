@@ -13,6 +13,7 @@ mod machine;
 mod page;
 mod record;
 mod reference;
+mod report_files;
 mod settings;
 mod stages;
 mod summary;
@@ -23,7 +24,7 @@ mod views;
 
 use std::{
     collections::BTreeMap,
-    path::{Path, PathBuf},
+    path::PathBuf,
     sync::Arc,
     time::{Instant, SystemTime},
 };
@@ -39,6 +40,7 @@ pub use self::{
         ProfileReport, Round, ViewRecord,
     },
     reference::ReferenceKind,
+    report_files::{ReportFiles, read_report},
     settings::{AUTOMATIC, SettingError, SettingInfo, list as settings_of, set as set_setting},
     sweep::{Combination, Sweep, check_names},
     views::Views,
@@ -47,6 +49,7 @@ pub use self::{
 use self::{
     contestant::{Contestant, Contestants, Stock},
     reference::{Asked, Reference},
+    report_files::{discard_earlier, json, relative, set_aside, write},
     stages::Stages,
     sweep::{Point, points},
     views::ProfileView,
@@ -103,53 +106,6 @@ pub struct ProfileOptions {
     pub command: String,
 }
 
-/// The files of a report.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ReportFiles {
-    /// All figures: docs/reports.md documents them.
-    pub json: PathBuf,
-    /// One row a frame, with the columns of PresentMon.
-    pub frames: PathBuf,
-    /// One row a combination of settings.
-    pub points: PathBuf,
-    /// The page for people.
-    pub page: PathBuf,
-}
-
-impl ReportFiles {
-    fn in_folder(folder: &Path) -> Self {
-        Self {
-            json: folder.join("report.json"),
-            frames: folder.join("frames.csv"),
-            points: folder.join("points.csv"),
-            page: folder.join("report.html"),
-        }
-    }
-
-    /// The files.
-    pub fn all(&self) -> [&Path; 4] {
-        [&self.page, &self.json, &self.frames, &self.points]
-    }
-}
-
-/// Reads a report.
-///
-/// # Errors
-/// [`ProfileError::Report`].
-pub fn read_report(path: &Path) -> Result<ProfileReport, ProfileError> {
-    let failed = |why: String| ProfileError::Report { path: path.to_owned(), why };
-    let bytes = files::read_ordinary(path).map_err(|error| failed(error.to_string()))?;
-    let report: ProfileReport =
-        serde_json::from_slice(&bytes).map_err(|error| failed(format!("this is not a profile's report: {error}")))?;
-    if report.schema != "canopy-profile" || report.version != PROFILE_VERSION {
-        let (schema, version) = (report.schema, report.version);
-        return Err(failed(format!(
-            "this is {schema} version {version}; this program reads canopy-profile version {PROFILE_VERSION}"
-        )));
-    }
-    Ok(report)
-}
-
 /// The scene of a profile with its overrides; its settings are those of `--list-settings`.
 ///
 /// # Errors
@@ -161,7 +117,8 @@ pub fn profiled_scene(source: &SceneSource, overrides: &Overrides) -> Result<Sce
 /// Profiles a scene and writes the report.
 ///
 /// # Errors
-/// [`AppError`]; what was measured before it is in the report. [`AppError::Interrupted`] soon after `progress`
+/// [`AppError`]; what was measured before it is in the report, and a complete report that was in the folder is in the folder `earlier`
+/// there, unless it was this one that is gone on with. [`AppError::Interrupted`] soon after `progress`
 /// [is cancelled](Progress::is_cancelled).
 pub fn profile(
     options: &ProfileOptions,
@@ -194,7 +151,7 @@ pub(super) fn profile_of(
     // Views off the path and references that are missing are found before the long work; heights do not matter for that.
     let early = options.views.of(&scene, &|_, _| 0.0)?;
     if let ReferenceKind::Folder(given) = &options.reference {
-        reference::given_files(given, &early)?;
+        reference::given_files(given, &early, options.size)?;
     }
     let report_files = ReportFiles::in_folder(&options.out);
     for file in report_files.all() {
@@ -225,13 +182,19 @@ pub(super) fn profile_of(
 
     let mut work = Work::new(options, &scene, &points, &views, &contestants)?;
     work.report.scene_fingerprint = source;
-    let outcome = work.run(&mut contestants, &scene, progress);
+    // Until there are references nothing is measured, and nothing written that a report needs.
+    work.make_references(&mut contestants, &scene, progress)?;
+    if !work.goes_on && let Some(earlier) = set_aside(&options.out)? {
+        progress.note(&format!("{} keeps the complete report that was there until this one is complete", earlier.display()));
+    }
+    let outcome = work.run(&mut contestants, progress);
     work.report.complete = outcome.is_ok();
     summary::summarize(&mut work.report);
     // What was measured is kept, whatever went wrong. A report that cannot be written says why, unless something else did.
     let saved = work.save(&report_files);
     outcome?;
     saved?;
+    discard_earlier(&options.out)?;
     Ok((work.report, report_files))
 }
 
@@ -243,6 +206,8 @@ struct Work<'a> {
     references: Vec<Option<Reference>>,
     fingerprint: String,
     report: ProfileReport,
+    /// Whether the report is an earlier one that is gone on with.
+    goes_on: bool,
 }
 
 impl<'a> Work<'a> {
@@ -291,7 +256,8 @@ impl<'a> Work<'a> {
             record.label = contestants.stock.as_ref().map_or(record.label.clone(), Stock::label);
         }
         let json = ReportFiles::in_folder(&options.out).json;
-        let report = if options.resume && json.exists() {
+        let goes_on = options.resume && json.exists();
+        let report = if goes_on {
             let mut earlier = read_report(&json)?;
             // A report that was edited may have fewer points and views than its settings say.
             let counts = (earlier.points.len(), earlier.views.len());
@@ -303,10 +269,10 @@ impl<'a> Work<'a> {
         } else {
             fresh
         };
-        Ok(Self { options, points, views, references: Vec::new(), fingerprint: fingerprint(scene), report })
+        Ok(Self { options, points, views, references: Vec::new(), fingerprint: fingerprint(scene), report, goes_on })
     }
 
-    fn run(
+    fn make_references(
         &mut self,
         contestants: &mut Contestants,
         scene: &Scene,
@@ -324,6 +290,10 @@ impl<'a> Work<'a> {
         for (view, reference) in self.report.views.iter_mut().zip(&self.references) {
             view.reference = reference.as_ref().map(|reference| relative(&reference.file, &self.options.out));
         }
+        Ok(())
+    }
+
+    fn run(&mut self, contestants: &mut Contestants, progress: &mut dyn Progress) -> Result<(), AppError> {
         self.draw_all(contestants, progress)?;
         self.time_all(contestants, progress)
     }
@@ -486,22 +456,6 @@ impl<'a> Work<'a> {
         let page = page::page(&self.report, &self.options.out, self.options.shown as usize);
         write(&files.page, page?.as_bytes())
     }
-}
-
-fn json(report: &ProfileReport) -> Result<Vec<u8>, AppError> {
-    serde_json::to_vec_pretty(report)
-        .map_err(|error| AppError::Render(format!("the report cannot be written: {error}")))
-}
-
-fn write(path: &Path, bytes: &[u8]) -> Result<(), AppError> {
-    files::write_whole(path, |writer| writer.write_all(bytes))
-        .map_err(|source| AppError::Write { path: path.to_owned(), source })
-}
-
-/// `file` as it is named from `folder`; one that does not lie in it by its whole path.
-fn relative(file: &Path, folder: &Path) -> String {
-    let elsewhere = || std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
-    file.strip_prefix(folder).map_or_else(|_| elsewhere(), Path::to_owned).display().to_string()
 }
 
 fn step(views: &[ProfileView]) -> Option<f64> {

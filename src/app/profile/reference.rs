@@ -2,10 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use image::ImageReader;
+
 use super::{error::ProfileError, stages::Stages, views::ProfileView};
 use crate::{
     app::{
-        AppError, Frame, RenderedImage, Renderer, adapter,
+        AppError, CompareError, Frame, RenderedImage, Renderer, adapter,
         reference::{Model, TraceJob, Truth},
     },
     assets::Stage,
@@ -131,7 +133,9 @@ pub fn make(
 ) -> Result<Vec<Option<Reference>>, AppError> {
     match kind {
         ReferenceKind::None => Ok(vec![None; views.len()]),
-        ReferenceKind::Folder(given) => Ok(given_files(given, views)?.into_iter().map(Reference::whole).collect()),
+        ReferenceKind::Folder(given) => {
+            Ok(given_files(given, views, asked.size)?.into_iter().map(Reference::whole).collect())
+        }
         ReferenceKind::Full { supersampling } => draw_full(*supersampling, scene, stages, views, asked, progress),
         ReferenceKind::Traced { samples } => trace_all(*samples, scene, views, asked, progress),
     }
@@ -149,11 +153,11 @@ pub struct Asked<'a> {
     pub fingerprint: &'a str,
 }
 
-/// The files of a given folder, one for each view.
+/// The files of a given folder, one for each view, of `size` (width and height in pixels).
 ///
 /// # Errors
-/// [`ProfileError::Missing`].
-pub fn given_files(given: &Path, views: &[ProfileView]) -> Result<Vec<PathBuf>, ProfileError> {
+/// [`ProfileError::Missing`], [`ProfileError::ReferenceSize`], [`CompareError::Read`].
+pub fn given_files(given: &Path, views: &[ProfileView], size: (u32, u32)) -> Result<Vec<PathBuf>, AppError> {
     let file = |view: &ProfileView| {
         let candidates = ["png", "jpg"].map(|ending| given.join(format!("{}.{ending}", view.name)));
         candidates.into_iter().find(|file| file.is_file())
@@ -161,9 +165,19 @@ pub fn given_files(given: &Path, views: &[ProfileView]) -> Result<Vec<PathBuf>, 
     let missing: Vec<String> = views.iter().filter(|view| file(view).is_none()).map(|view| view.name.clone()).collect();
     if !missing.is_empty() {
         let (folder, total) = (given.to_owned(), views.len());
-        return Err(ProfileError::Missing { folder, missing, total });
+        return Err(ProfileError::Missing { folder, missing, total }.into());
     }
-    Ok(views.iter().filter_map(file).collect())
+    let found: Vec<PathBuf> = views.iter().filter_map(file).collect();
+    for path in &found {
+        let failed = |why: String| CompareError::Read { path: path.clone(), why };
+        let reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format);
+        let reader = reader.map_err(|error| failed(error.to_string()))?;
+        let own = reader.into_dimensions().map_err(|error| failed(error.to_string()))?;
+        if own != size {
+            return Err(ProfileError::ReferenceSize { path: path.clone(), found: own, wanted: size }.into());
+        }
+    }
+    Ok(found)
 }
 
 fn draw_full(
@@ -200,7 +214,7 @@ fn draw_full(
         for view in missing {
             if progress.is_cancelled() {
                 return Err(AppError::Interrupted(
-                    "the reference was still being drawn; run the same command with --resume to go on".to_owned(),
+                    "the reference was still being drawn; the same command goes on with it".to_owned(),
                 ));
             }
             let image = renderer.draw(&stage, &view.view, view.instant)?;
@@ -263,6 +277,24 @@ fn go_on_from(half: &Path, whole: &Path) -> Result<(), AppError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::app::Views;
+
+    /// A size that did not fit was once found when the report in the folder had been overwritten.
+    #[test]
+    fn given_images_are_of_the_size_of_the_frames() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let file = folder.path().join("0000.png");
+        image::RgbImage::new(64, 36).save(&file)?;
+        let views = Views::Flight { frames: 1, fps: None, from: None, at: None }.of(&Scene::default(), &|_, _| 0.0)?;
+        assert_eq!(given_files(folder.path(), &views, (64, 36))?, [file.clone()]);
+        let message = |size| given_files(folder.path(), &views, size).err().map(|error| error.to_string());
+        assert!(message((32, 18)).is_some_and(|text| text.contains("0000.png has 64x36 pixels, not 32x18")));
+        std::fs::write(&file, "no image")?;
+        assert!(message((64, 36)).is_some_and(|text| text.contains("images are PNG, JPEG or OpenEXR files")));
+        std::fs::remove_file(&file)?;
+        assert!(message((64, 36)).is_some_and(|text| text.contains("lacks 1 of the 1 reference frames: 0000")));
+        Ok(())
+    }
 
     #[test]
     fn full_models_of_a_large_forest_end_where_trees_have_few_pixels() {

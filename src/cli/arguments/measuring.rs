@@ -61,7 +61,7 @@ Ctrl-C keeps what was measured; the same command with --resume goes on.")]
 pub struct Profile {
     /// Scene file.
     pub scene: PathBuf,
-    /// Folder of the report.
+    /// Folder of the report. A complete report in it is kept in its folder `earlier` until this profile is complete.
     #[arg(long, value_name = "FOLDER", default_value = "profile")]
     pub out: PathBuf,
     /// Values of a setting, NAME=VALUE,VALUE; several sweeps are combined, each value with each.
