@@ -34,9 +34,11 @@ pub(crate) fn replace(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Resu
     let folder = folder_of(path);
     fs::create_dir_all(folder)?;
     let file = temporary(folder)?;
-    let mut writer = BufWriter::new(file);
+    // The file itself, not by its temporary name, which would be in every error.
+    let mut writer = BufWriter::new(file.as_file());
     fill(&mut writer)?;
-    let file = writer.into_inner().map_err(io::IntoInnerError::into_error)?;
+    writer.flush()?;
+    drop(writer);
     readable_by_all(file.as_file())?;
     file.persist(path).map_err(|error| error.error)?;
     Ok(())
@@ -105,7 +107,14 @@ fn folder_of(path: &Path) -> &Path {
 }
 
 fn temporary(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
-    tempfile::Builder::new().prefix(".canopy-").suffix(".tmp").tempfile_in(folder)
+    tempfile::Builder::new().prefix(".canopy-").suffix(".tmp").tempfile_in(folder).map_err(|error| {
+        // The temporary name says nothing to anyone: the caller names the file.
+        let text = error.to_string();
+        match text.split_once(" at path ") {
+            Some((reason, _)) => io::Error::new(error.kind(), reason.to_owned()),
+            None => error,
+        }
+    })
 }
 
 /// A temporary file is its owner's alone; a result is like any other file.
@@ -192,6 +201,9 @@ mod tests {
         });
         assert_eq!(full.map_err(|error| error.kind()), Err(ErrorKind::StorageFull));
         assert_eq!((fs::read_to_string(&path)?.as_str(), fs::read_dir(folder.path())?.count()), ("old", 1));
+        // The system's reason alone: the file was once named twice, by its own name and by a temporary one.
+        let no_folder = temporary(&folder.path().join("none")).map(drop).map_err(|error| error.to_string());
+        assert!(no_folder.is_err_and(|text| !text.contains("none") && !text.contains(".canopy-")));
         // Nothing can be renamed to a folder.
         let folder_in_the_way = folder.path().join("taken");
         fs::create_dir(&folder_in_the_way)?;

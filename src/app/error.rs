@@ -1,6 +1,6 @@
 //! Errors of the program: every cause in one type, each with its location and remedy.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::assets::StageError;
 
@@ -110,8 +110,7 @@ pub enum AppError {
     Interrupted(String),
     /// Some images of several failed; the others are finished.
     #[error(
-        "{failed} of {total} images failed, the first of them {}: {source}; the same command with --resume renders these alone",
-        file.display()
+        "{failed} of {total} images failed, the first of them {}; {remedy}", of_file(file, source)
     )]
     SomeFailed {
         /// How many failed.
@@ -122,6 +121,8 @@ pub enum AppError {
         file: PathBuf,
         /// Why.
         source: Box<AppError>,
+        /// What to do.
+        remedy: &'static str,
     },
     /// Rendering failed.
     #[error("rendering failed: {0}")]
@@ -158,4 +159,31 @@ pub enum AppError {
         /// The file.
         path: PathBuf,
     },
+}
+
+/// What [`AppError::SomeFailed`] says where `--resume` goes on.
+pub(super) const RESUME: &str = "the same command with --resume renders these alone";
+
+/// `error` with the name of `file` before it, unless it begins with it.
+pub(super) fn of_file(file: &Path, error: &AppError) -> String {
+    let (file, error) = (file.display().to_string(), error.to_string());
+    if error.starts_with(&file) { error } else { format!("{file}: {error}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A full disk was told with the name of the image twice.
+    #[test]
+    fn a_file_is_named_once() {
+        let file = PathBuf::from("out/0001.png");
+        let write = AppError::Write { path: file.clone(), source: std::io::ErrorKind::StorageFull.into() };
+        let render = AppError::Render("no device".to_owned());
+        assert_eq!(of_file(&file, &render), "out/0001.png: rendering failed: no device");
+        let some = AppError::SomeFailed { failed: 1, total: 3, file, source: Box::new(write), remedy: RESUME };
+        let message = some.to_string();
+        assert_eq!(message.matches("0001.png").count(), 1, "{message}");
+        assert!(message.ends_with(RESUME), "{message}");
+    }
 }

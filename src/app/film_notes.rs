@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{AppError, RenderedImage, tone::tone_table};
+use super::{AppError, RenderedImage, notes::SCENE, tone::tone_table};
 use crate::{
     light::ScotopicTint,
     reference::{DisplayTransform, Film},
@@ -31,6 +31,16 @@ impl FilmNotes {
     /// Reads them back; `None` for bytes that are none.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         serde_json::from_slice(bytes).ok()
+    }
+
+    /// Whether both are of one image. The name of the scene's file, which has no influence on it, may differ.
+    pub fn is_of_same_image(&self, other: &Self) -> bool {
+        let bare = |notes: &Self| {
+            let mut bare = notes.clone();
+            bare.text.retain(|(keyword, _)| keyword != SCENE);
+            bare
+        };
+        bare(self) == bare(other)
     }
 
     /// `film` as a screen shows it.

@@ -7,7 +7,7 @@ use bevy::render::renderer::RenderDevice;
 use super::{
     Frame, RenderOptions, RenderPlan, RenderReport, Renderer, adapter,
     beside::{Choice, Panels},
-    error::AppError,
+    error::{AppError, RESUME, of_file},
     plan::PlanRequest,
     rendered_image::RenderedImage,
 };
@@ -68,7 +68,7 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
         let seconds = started.elapsed().as_secs_f64();
         if let Err(error) = drawn.and_then(|picture| picture.save(&frame.file, &panels.notes(frame))) {
             // The other frames do not depend on this one.
-            progress.warn(&format!("{}: {error}", frame.file.display()));
+            progress.warn(&of_file(&frame.file, &error));
             failures.push((frame.file.clone(), error));
             progress.advance(1);
             continue;
@@ -91,7 +91,8 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
         None => Ok(report),
         Some((_, error)) if finished == 0 => Err(error),
         Some((file, error)) => {
-            Err(AppError::SomeFailed { failed, total: finished + failed, file, source: Box::new(error) })
+            let (total, source) = (finished + failed, Box::new(error));
+            Err(AppError::SomeFailed { failed, total, file, source, remedy: RESUME })
         }
     }
 }

@@ -5,7 +5,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{error::AppError, film_notes::FilmNotes, plan::PlanError, reference::save};
+use super::{
+    error::{AppError, of_file},
+    film_notes::FilmNotes,
+    plan::PlanError,
+    reference::save,
+};
 use crate::{
     files,
     progress::Progress,
@@ -42,12 +47,33 @@ pub enum MergeError {
         /// A file.
         file: PathBuf,
     },
+    /// A file that is no film.
+    #[error("{}: {what}; give films (.film) alone, and trace a part whose film is damaged again with `canopy reference --part`", path.display())]
+    NoFilm {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        what: &'static str,
+    },
     /// A film that another command kept.
     #[error("{}: this film does not say how it is to be shown; merge those that `canopy reference --part` writes", .0.display())]
     NoNotes(PathBuf),
     /// Films of different images.
     #[error("{} and {} are not parts of one image: scene, light, camera, size or settings differ", .0.display(), .1.display())]
     Different(PathBuf, PathBuf),
+    /// Films of different numbers of samples.
+    #[error(
+        "{} is a part of {} samples a pixel and {} one of {}; merge parts that were traced with the same --spp", first.display(), totals.0,
+        second.display(), totals.1
+    )]
+    Totals {
+        /// A film.
+        first: PathBuf,
+        /// The other one.
+        second: PathBuf,
+        /// Samples of the whole of each.
+        totals: (u32, u32),
+    },
     /// Samples twice.
     #[error("{} and {} both have sample {sample}; leave one of them out", first.display(), second.display())]
     Twice {
@@ -80,27 +106,44 @@ pub enum MergeError {
 /// What an image can be written as.
 const IMAGES: &[&str] = &["exr", "png", "film"];
 
-/// Merges the films of `options`; returns the images.
+/// What to do where some images of several cannot be merged.
+const MEND: &str = "mend their films, and merge again";
+
+/// Merges the films of `options`; returns the images. One that fails does not stop the others.
 ///
 /// # Errors
 /// [`AppError::Merge`], [`AppError::Plan`], [`AppError::Reference`], [`AppError::Write`]; existing images stay as they are.
+/// [`AppError::SomeFailed`] where some of several images failed.
 pub fn merge(options: &MergeOptions, progress: &mut dyn Progress) -> Result<Vec<PathBuf>, AppError> {
     let images = images(options)?;
     for image in images.keys().take(1) {
         files::check_writable(image).map_err(|source| AppError::Write { path: image.clone(), source })?;
     }
     progress.begin("Images", images.len() as u64);
-    let mut done = Vec::new();
+    let (total, mut done, mut failures) = (images.len(), Vec::new(), Vec::new());
     for (image, parts) in images {
         if progress.is_cancelled() {
             return Err(AppError::Interrupted(format!("{} images are finished", done.len())));
         }
-        merge_one(&parts, &image, options.incomplete)?;
-        done.push(image);
+        match merge_one(&parts, &image, options.incomplete) {
+            Ok(()) => done.push(image),
+            Err(error) if total == 1 => return Err(error),
+            Err(error) => {
+                progress.warn(&of_file(&image, &error));
+                failures.push((image, error));
+            }
+        }
         progress.advance(1);
     }
     progress.end();
-    Ok(done)
+    let failed = failures.len();
+    match failures.into_iter().next() {
+        None => Ok(done),
+        Some((_, error)) if done.is_empty() => Err(error),
+        Some((file, error)) => {
+            Err(AppError::SomeFailed { failed, total, file, source: Box::new(error), remedy: MEND })
+        }
+    }
 }
 
 /// The parts of each image.
@@ -153,11 +196,27 @@ fn films_in(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
 fn merge_one(parts: &[PathBuf], image: &Path, incomplete: bool) -> Result<(), AppError> {
     let mut films = Vec::with_capacity(parts.len());
     for part in parts {
-        let kept = KeptFilm::load(part)?.ok_or_else(|| MergeError::NotThere(part.clone()))?;
+        let kept = match KeptFilm::load(part) {
+            // What is to be done about a checkpoint is of no use here: it would delete what is no film.
+            Err(ReferenceError::Checkpoint { path, what }) => return Err(MergeError::NoFilm { path, what }.into()),
+            kept => kept?.ok_or_else(|| MergeError::NotThere(part.clone()))?,
+        };
         let notes = FilmNotes::from_bytes(&kept.notes).ok_or_else(|| MergeError::NoNotes(part.clone()))?;
         films.push((part, kept, notes));
     }
     films.sort_by_key(|(_, kept, _)| (kept.film.first(), kept.film.samples()));
+    // Films of another image tell nothing of what is missing.
+    if let Some(((first, kept, notes), others)) = films.split_first() {
+        for (part, other, own) in others {
+            if own.total != notes.total {
+                let (first, second, totals) = ((*first).clone(), (*part).clone(), (notes.total, own.total));
+                return Err(MergeError::Totals { first, second, totals }.into());
+            }
+            if other.fingerprint != kept.fingerprint || !own.is_of_same_image(notes) {
+                return Err(MergeError::Different((*first).clone(), (*part).clone()).into());
+            }
+        }
+    }
     let mut films = films.into_iter();
     let Some((first, KeptFilm { mut film, fingerprint, .. }, notes)) = films.next() else {
         return Err(MergeError::NoFilms(image.to_owned()).into());
@@ -173,10 +232,7 @@ fn merge_one(parts: &[PathBuf], image: &Path, incomplete: bool) -> Result<(), Ap
         return Err(missing(0, film.first(), true).into());
     }
     let mut before = first;
-    for (part, next, own) in films {
-        if next.fingerprint != fingerprint || own != notes {
-            return Err(MergeError::Different(first.clone(), part.clone()).into());
-        }
+    for (part, next, _) in films {
         let (end, start) = (film.samples(), next.film.first());
         if start < end {
             return Err(MergeError::Twice { first: before.clone(), second: part.clone(), sample: start + 1 }.into());
@@ -191,4 +247,68 @@ fn merge_one(parts: &[PathBuf], image: &Path, incomplete: bool) -> Result<(), Ap
         return Err(missing(film.samples(), notes.total, false).into());
     }
     save(&film, image, &fingerprint, &notes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        light::ScotopicTint,
+        progress::Silent,
+        reference::{Camera, Film, Shot},
+        scene::Viewpoint,
+    };
+
+    type Outcome = Result<(), Box<dyn std::error::Error>>;
+
+    /// Writes a film without samples that begins at sample `first` of `total`.
+    fn film(path: &Path, first: u32, total: u32, scene: &str) -> Outcome {
+        let view = Viewpoint { position: glam::DVec3::ZERO, yaw: 0.0, pitch: 0.0, field_of_view: 1.0 };
+        let shot = Shot { camera: Camera { view, size: (2, 1), near: 0.1 }, fog: None };
+        let text = vec![("Scene".to_owned(), scene.to_owned())];
+        let notes = FilmNotes { total, exposure: 1.0, night: ScotopicTint { tint: glam::Vec3::ONE, amount: 0.0, strength: 0.0 }, text };
+        std::fs::create_dir_all(path.parent().unwrap_or(Path::new(".")))?;
+        Ok(Film::beginning_at(&shot, first)?.keep(path, &[7; 32], &notes.to_bytes())?)
+    }
+
+    fn merged(parts: &[&Path], out: &Path) -> Result<Vec<PathBuf>, AppError> {
+        let parts = parts.iter().map(|part| (*part).to_owned()).collect();
+        merge(&MergeOptions { parts, out: out.to_owned(), exr: true, incomplete: true }, &mut Silent)
+    }
+
+    /// A scene given by mistake was to be deleted, and films of other --spp were said to lack samples.
+    #[test]
+    fn what_is_no_film_of_the_image_is_told_with_its_remedy() -> Outcome {
+        let folder = tempfile::tempdir()?;
+        let at = |name: &str| folder.path().join(name);
+        film(&at("a.film"), 0, 4, "wood.ron")?;
+        film(&at("b.film"), 5, 8, "wood.ron")?;
+        std::fs::write(at("wood.ron"), "(terrain: Flat())")?;
+        let message = |parts: &[&Path]| merged(parts, &at("out.exr")).err().map(|error| error.to_string());
+        let no_film = message(&[&at("a.film"), &at("wood.ron")]).unwrap_or_default();
+        assert!(no_film.contains("wood.ron: this is not") && !no_film.contains("delete"), "{no_film}");
+        assert!(no_film.contains("again with `canopy reference --part`"), "{no_film}");
+        let other = message(&[&at("a.film"), &at("b.film")]).unwrap_or_default();
+        assert!(other.contains("a part of 4 samples a pixel and") && other.ends_with("with the same --spp"), "{other}");
+        // The same scene by another name.
+        film(&at("c.film"), 0, 4, "copy.ron")?;
+        assert_eq!(merged(&[&at("a.film"), &at("c.film")], &at("out.exr"))?, [at("out.exr")]);
+        Ok(())
+    }
+
+    /// The first bad film of a sequence once ended it.
+    #[test]
+    fn images_that_cannot_be_merged_do_not_stop_the_others() -> Outcome {
+        let folder = tempfile::tempdir()?;
+        let at = |name: &str| folder.path().join(name);
+        for name in ["parts/0000.film", "parts/0001.film", "parts/0002.film"] {
+            film(&at(name), 0, 4, "wood.ron")?;
+        }
+        std::fs::write(at("parts/0001.film"), "half a film")?;
+        let error = merged(&[&at("parts")], &at("out")).err().ok_or("it failed")?;
+        assert!(matches!(error, AppError::SomeFailed { failed: 1, total: 3, .. }), "{error}");
+        assert!(error.to_string().ends_with(MEND) && !error.to_string().contains("--resume"), "{error}");
+        assert!(at("out/0000.exr").is_file() && !at("out/0001.exr").exists() && at("out/0002.exr").is_file());
+        Ok(())
+    }
 }

@@ -12,7 +12,7 @@ use glam::DVec3;
 use super::{
     Frame, LeafModel, LightGroup, Part, ReferenceOptions, RenderPlan,
     camera::NEAR,
-    error::AppError,
+    error::{AppError, RESUME, of_file},
     film_notes::FilmNotes,
     interrupt,
     notes::notes,
@@ -92,7 +92,7 @@ pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Res
             Err(error) if count == 1 || matches!(error, AppError::Interrupted(_)) => return Err(error),
             // The other images do not depend on this one.
             Err(error) => {
-                progress.warn(&format!("{}: {error}", frame.file.display()));
+                progress.warn(&of_file(&frame.file, &error));
                 failures.push((frame.file.clone(), error));
             }
         }
@@ -101,7 +101,9 @@ pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Res
     match failures.into_iter().next() {
         None => Ok(files),
         Some((_, error)) if files.is_empty() => Err(error),
-        Some((file, error)) => Err(AppError::SomeFailed { failed, total: count, file, source: Box::new(error) }),
+        Some((file, error)) => {
+            Err(AppError::SomeFailed { failed, total: count, file, source: Box::new(error), remedy: RESUME })
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::{fs::File, io::BufReader, io::Write, path::Path};
 
-use super::error::AppError;
+use super::{error::AppError, notes::SCENE};
 use crate::files::write_whole;
 
 /// A rendered image.
@@ -28,15 +28,24 @@ impl RenderedImage {
             .map_err(|source| AppError::Write { path: path.to_owned(), source })
     }
 
-    /// Whether `path` is a finished image of this size (width and height in pixels) with exactly these notes.
+    /// Whether `path` is a finished image of this size (width and height in pixels) with exactly these notes, but for the name of the
+    /// scene's file. It is decoded, so that half a file is none.
     pub fn is_stored(path: &Path, size: (u32, u32), notes: &[(&str, String)]) -> bool {
         let ordinary = std::fs::metadata(path).is_ok_and(|found| found.is_file());
         let Some(file) = ordinary.then(|| File::open(path).ok()).flatten() else { return false };
-        let Ok(reader) = png::Decoder::new(BufReader::new(file)).read_info() else { return false };
+        let Ok(mut reader) = png::Decoder::new(BufReader::new(file)).read_info() else { return false };
         let info = reader.info();
         let stored = info.utf8_text.iter().map(|chunk| (chunk.keyword.as_str(), chunk.get_text().ok()));
         let wanted = notes.iter().map(|(keyword, text)| (*keyword, Some(text.clone())));
-        (info.width, info.height) == size && stored.eq(wanted)
+        let [stored, wanted] = [stored.collect::<Vec<_>>(), wanted.collect()].map(|mut notes| {
+            notes.retain(|(keyword, _)| *keyword != SCENE);
+            notes
+        });
+        if (info.width, info.height) != size || stored != wanted {
+            return false;
+        }
+        let Some(bytes) = reader.output_buffer_size() else { return false };
+        reader.next_frame(&mut vec![0; bytes]).is_ok() && reader.finish().is_ok()
     }
 
     fn encode(&self, writer: impl Write, notes: &[(&str, String)]) -> Result<(), png::EncodingError> {
@@ -72,6 +81,16 @@ mod tests {
         );
         let other = [("Title", "a wood".to_owned()), ("Seed", "2".to_owned())];
         assert!(!RenderedImage::is_stored(&path, (2, 1), &other));
+        // A file that was cut off once counted as finished, since its notes come first.
+        let bytes = std::fs::read(&path)?;
+        for length in [bytes.len() - 1, bytes.len() - 12, bytes.len() - 20, bytes.len() / 2] {
+            std::fs::write(&path, &bytes[..length])?;
+            assert!(!RenderedImage::is_stored(&path, (2, 1), &notes), "{length} of {} bytes", bytes.len());
+        }
+        // The same scene by another path is the same scene.
+        let of = |scene: &str| [("Title", "a wood".to_owned()), (SCENE, scene.to_owned())];
+        image.save(&path, &of("wood.ron"))?;
+        assert!(RenderedImage::is_stored(&path, (2, 1), &of("/home/me/wood.ron")));
         std::fs::write(&path, b"no image")?;
         assert!(
             !RenderedImage::is_stored(&path, (2, 1), &notes)

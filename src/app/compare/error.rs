@@ -32,6 +32,14 @@ pub enum CompareError {
         /// Its row.
         row: usize,
     },
+    /// A map that cannot be written.
+    #[error("{}: {source}; choose a writable file with --map, or for sequences a folder", path.display())]
+    Map {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
     /// Images that do not fit together.
     #[error("{} and {}: {source}", test.display(), reference.display())]
     Measure {

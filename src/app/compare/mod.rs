@@ -38,8 +38,8 @@ pub struct CompareOptions {
 /// Compares images.
 ///
 /// # Errors
-/// [`AppError::Compare`]: files that are no images or do not fit together. [`AppError::Write`] for a map that cannot be
-/// written. [`AppError::Interrupted`].
+/// [`AppError::Compare`]: files that are no images or do not fit together, a map that cannot be written.
+/// [`AppError::Interrupted`].
 pub fn compare(options: &CompareOptions, progress: &mut dyn Progress) -> Result<CompareReport, AppError> {
     let (test, reference) = (Images::at(&options.test)?, Images::at(&options.reference)?);
     let half = options.half.as_deref().map(Images::at).transpose()?;
@@ -74,7 +74,7 @@ pub fn compare(options: &CompareOptions, progress: &mut dyn Progress) -> Result<
         };
         if let Some(out) = &options.map {
             let file = if is_sequence { out.join(format!("{}.png", frame.name)) } else { out.clone() };
-            save_map(&compared.map, pair.1.size(), &file)?;
+            save_map(&compared.map, pair.1.size(), &file).map_err(of_map)?;
             report.maps.push(file);
         }
         report.add(&frame.name, &pair.1, compared.comparison, change);
@@ -83,6 +83,14 @@ pub fn compare(options: &CompareOptions, progress: &mut dyn Progress) -> Result<
     }
     progress.end();
     Ok(report)
+}
+
+/// The error of a map: this command has no --out.
+fn of_map(error: AppError) -> AppError {
+    match error {
+        AppError::Write { path, source } => CompareError::Map { path, source }.into(),
+        other => other,
+    }
 }
 
 /// The files of one comparison.
@@ -153,4 +161,28 @@ fn check_size(
 pub fn save_map(map: &[f32], (width, height): (usize, usize), path: &Path) -> Result<(), AppError> {
     let pixels = map.iter().flat_map(|error| magma(*error)).collect();
     RenderedImage { width: width as u32, height: height as u32, pixels }.save(path, &[])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The remedy once named --out, which this command does not have.
+    #[test]
+    fn a_map_that_cannot_be_written_names_its_option() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let image = folder.path().join("a.png");
+        image::RgbImage::new(16, 16).save(&image)?;
+        let options = CompareOptions {
+            test: image.clone(),
+            reference: image.clone(),
+            pixels_per_degree: 67.0,
+            mask: None,
+            half: None,
+            map: Some(image.join("map.png")),
+        };
+        let message = compare(&options, &mut crate::progress::Silent).err().map(|error| error.to_string());
+        assert!(message.is_some_and(|text| text.contains("map.png") && text.contains("--map") && !text.contains("--out")));
+        Ok(())
+    }
 }
