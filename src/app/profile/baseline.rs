@@ -10,7 +10,7 @@ use super::{
     error::{LEAST_ROUNDS_FOR_MEAN, ProfileError},
     profiled_scene,
     record::{Machine, Method, ProfileReport, ViewRecord},
-    view_record,
+    unmeasured::view_record,
 };
 use crate::{
     app::{AppError, fingerprint::source_fingerprint},

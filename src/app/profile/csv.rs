@@ -165,7 +165,9 @@ pub fn points(report: &ProfileReport) -> Vec<u8> {
             report.front.contains(&index).to_string(),
             (report.knee == Some(index)).to_string(),
         ];
-        row.extend(settings.iter().map(|name| point.settings.get(*name).cloned().unwrap_or_default()));
+        // Reports of earlier versions have the values that were set alone.
+        let value = |name: &String| point.values.get(name).or_else(|| point.settings.get(name)).cloned();
+        row.extend(settings.iter().map(|name| value(name).unwrap_or_default()));
         let trees = |name: &&&String| found.levels.iter().find(|level| level.name == ***name).map(|level| level.trees);
         row.extend(levels.iter().map(|name| number(trees(&name), 1)));
         row

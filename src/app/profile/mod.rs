@@ -20,10 +20,10 @@ mod summary;
 mod sweep;
 mod table;
 mod timing;
+mod unmeasured;
 mod views;
 
 use std::{
-    collections::BTreeMap,
     path::PathBuf,
     sync::Arc,
     time::{Instant, SystemTime},
@@ -41,7 +41,7 @@ pub use self::{
     },
     reference::ReferenceKind,
     report_files::{ReportFiles, read_report},
-    settings::{AUTOMATIC, SettingError, SettingInfo, list as settings_of, set as set_setting},
+    settings::{AUTOMATIC, SettingError, SettingInfo, levels_to_ron, list as settings_of, set as set_setting},
     sweep::{Combination, Sweep, check_names},
     views::Views,
 };
@@ -52,6 +52,7 @@ use self::{
     report_files::{discard_earlier, json, relative, set_aside, write},
     stages::Stages,
     sweep::{Point, points},
+    unmeasured::{point_records, view_record},
     views::ProfileView,
 };
 use super::{
@@ -248,7 +249,7 @@ impl<'a> Work<'a> {
                 step_seconds: step(views),
             },
             views: views.iter().map(view_record).collect(),
-            points: points.iter().map(point_record).collect(),
+            points: point_records(points),
             front: Vec::new(),
             knee: None,
         };
@@ -462,25 +463,5 @@ fn step(views: &[ProfileView]) -> Option<f64> {
     match views {
         [first, second, ..] => Some(second.seconds? - first.seconds?),
         _ => None,
-    }
-}
-
-fn view_record(view: &ProfileView) -> ViewRecord {
-    let (x, y, z) = view.pose.position;
-    ViewRecord {
-        name: view.name.clone(),
-        seconds: view.seconds,
-        camera: [x, y, z, view.pose.yaw, view.pose.pitch],
-        instant: view.instant.to_rfc3339(),
-        reference: None,
-    }
-}
-
-fn point_record(point: &Point) -> PointRecord {
-    PointRecord {
-        label: point.label(),
-        unranked: point.is_unranked(),
-        settings: point.settings.iter().cloned().collect::<BTreeMap<_, _>>(),
-        ..PointRecord::default()
     }
 }

@@ -109,6 +109,9 @@ pub struct PointRecord {
     pub label: String,
     /// Settings by name; none for the scene as written.
     pub settings: BTreeMap<String, String>,
+    /// The values of all settings that the profile sweeps: those of `settings`, and else the scene's own, where it has one.
+    #[serde(default)]
+    pub values: BTreeMap<String, String>,
     /// Whether it takes no part in the front: another renderer, or the control.
     #[serde(default)]
     pub unranked: bool,

@@ -3,7 +3,7 @@
 //! The names are those of a scene file. Which there are follows from the reflected types, as in the settings panel of the
 //! flight, so that a new field can be swept without a line here.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use bevy::reflect::{Access, PartialReflect, TypeRegistry};
 use ron::extensions::Extensions;
@@ -184,6 +184,31 @@ pub fn list(scene: &Scene) -> Vec<SettingInfo> {
     found
 }
 
+/// The values that `scene` has of the settings in `names`, as they can be set. A lighting that differs between species has none.
+pub fn values<'a>(scene: &Scene, names: impl IntoIterator<Item = &'a str>) -> BTreeMap<String, String> {
+    let mut names = names.into_iter().peekable();
+    // The list takes its time.
+    let settings = if names.peek().is_some() { list(scene) } else { Vec::new() };
+    let value = |name: &str| {
+        if name == "quality.levels" {
+            return Some(levels_to_ron(&scene.quality.levels));
+        }
+        let own = settings.iter().find(|setting| setting.name == name)?;
+        let of_species = |other: &&SettingInfo| {
+            other.name.strip_prefix("species.").is_some_and(|rest| rest.ends_with(&format!(".{name}")))
+        };
+        settings.iter().filter(of_species).all(|other| other.value == own.value).then(|| own.value.clone())
+    };
+    names.filter_map(|name| Some((name.to_owned(), value(name)?))).collect()
+}
+
+/// Levels of detail as a scene file has them; `[]` where the quality's distances decide.
+pub fn levels_to_ron(levels: &[QualityLevel]) -> String {
+    let level =
+        |level: &QualityLevel| format!("(draw: \"{}\", until: {}, fade: {})", level.draw, level.until, level.fade);
+    format!("[{}]", levels.iter().map(level).collect::<Vec<_>>().join(", "))
+}
+
 /// Sets one setting in `scene`, and checks the scene.
 ///
 /// # Errors
@@ -244,10 +269,20 @@ pub fn set(scene: &mut Scene, name: &str, value: &str) -> Result<(), SettingErro
 fn unknown(scene: &Scene, name: &str) -> SettingError {
     let settings = list(scene);
     let names: Vec<&str> = settings.iter().map(|setting| setting.name.as_str()).collect();
-    // `near_distance` for `quality.near_distance`.
-    let bare = names.iter().find(|known| known.rsplit('.').next() == Some(name)).copied();
-    let nearest = bare.or_else(|| nearest(name, &names)).map(str::to_owned);
+    // `near_distance` or `lod.near_distance` for `quality.near_distance`, `shadow.map_size` for `quality.shadow_map_size`.
+    let ending = |wanted: &str| names.iter().find(|known| last_part(known) == wanted).copied();
+    let endings: Vec<&str> = names.iter().map(|known| last_part(known)).collect();
+    let nearest = ending(last_part(name))
+        .or_else(|| ending(&name.replace('.', "_")))
+        .or_else(|| nearest(name, &names))
+        .or_else(|| ending(nearest(last_part(name), &endings)?))
+        .map(str::to_owned);
     SettingError::Unknown { name: name.to_owned(), nearest }
+}
+
+/// What is behind the last dot of a name.
+fn last_part(name: &str) -> &str {
+    name.rsplit('.').next().unwrap_or(name)
 }
 
 fn target(scene: &Scene, name: &str) -> Result<Target, SettingError> {
@@ -361,6 +396,10 @@ mod tests {
         for (name, value, words) in [
             ("quality.near_distanc", "1", "did you mean `quality.near_distance`?"),
             ("near_distance", "1", "did you mean `quality.near_distance`?"),
+            // Once these were told no name at all.
+            ("shadow.map_size", "512", "did you mean `quality.shadow_map_size`?"),
+            ("lod.tolerance", "1", "did you mean `quality.tolerance`?"),
+            ("lod.toleranse", "1", "did you mean `quality.tolerance`?"),
             ("lighting.band", "1", "did you mean `lighting.bands`?"),
             ("species.c.lighting", "local", "there is no setting"),
             ("quality.msaa", "1.5", "expected a whole number"),
@@ -378,6 +417,22 @@ mod tests {
             let message = after(name, value).err().unwrap_or_default();
             assert!(message.contains(words), "{name} = {value}: {message}");
         }
+    }
+
+    #[test]
+    fn values_of_a_scene_can_be_set_and_species_that_differ_have_none() -> Result<(), SettingError> {
+        let mut scene = scene();
+        set(&mut scene, "quality.levels", "[(draw: \"model\", until: 9, fade: 2), (draw: \"cloud\")]")?;
+        let found = values(&scene, ["quality.msaa", "quality.levels", "lighting", "style", "control"]);
+        assert_eq!(found.keys().collect::<Vec<_>>(), ["quality.levels", "quality.msaa", "style"], "{found:?}");
+        assert_eq!(found["quality.msaa"], scene.quality.msaa.to_string());
+        for (name, value) in &found {
+            let mut again = scene.clone();
+            set(&mut again, name, value)?;
+            assert_eq!(again.quality, scene.quality, "{name} = {value}");
+        }
+        assert_eq!(levels_to_ron(&[]), "[]");
+        Ok(())
     }
 
     #[test]

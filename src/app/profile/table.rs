@@ -1,6 +1,6 @@
 //! A report in lines for a terminal.
 
-use super::{baseline::BaselineRow, record::ProfileReport};
+use super::{baseline::BaselineRow, error::LEAST_ROUNDS_FOR_RATIO, record::ProfileReport};
 use crate::app::compare::{aligned, figure};
 
 impl ProfileReport {
@@ -36,7 +36,15 @@ impl ProfileReport {
         };
         let rows: Vec<Vec<String>> =
             std::iter::once(header.map(str::to_owned).to_vec()).chain(order.into_iter().map(row)).collect();
-        aligned(&rows)
+        let mut lines = aligned(&rows);
+        let fewest = self.points.iter().map(|point| point.rounds.len()).min().unwrap_or(0);
+        if self.points.len() > 1 && (1..LEAST_ROUNDS_FOR_RATIO as usize).contains(&fewest) {
+            lines.push(format!(
+                "Ratios need {LEAST_ROUNDS_FOR_RATIO} rounds, two in each order: the same command with --resume and --rounds \
+                 {LEAST_ROUNDS_FOR_RATIO} or more adds to these."
+            ));
+        }
+        lines
     }
 }
 
@@ -54,5 +62,23 @@ impl BaselineRow {
             ]
         };
         aligned(&std::iter::once(header).chain(rows.iter().map(row)).collect::<Vec<_>>())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::{PointRecord, Round};
+
+    /// Ratios were "n/a" below four rounds, and nothing said why.
+    #[test]
+    fn how_many_rounds_a_ratio_needs_is_said() {
+        let report = |rounds: usize, points: usize| {
+            let point = PointRecord { rounds: vec![Round::default(); rounds], ..PointRecord::default() };
+            ProfileReport { points: vec![point; points], ..ProfileReport::default() }
+        };
+        let says = |report: ProfileReport| report.lines().iter().any(|line| line.starts_with("Ratios need 4 rounds"));
+        assert!(says(report(1, 2)) && says(report(3, 2)));
+        assert!(!says(report(4, 2)) && !says(report(0, 2)) && !says(report(3, 1)));
     }
 }

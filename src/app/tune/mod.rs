@@ -14,7 +14,7 @@ use std::path::PathBuf;
 use self::ladder::{ladders, neighbours};
 use super::{
     AppError, Combination, ProfileError, ProfileOptions, ProfileReport, ReferenceKind, ReportFiles, Sweep,
-    profile::{LEAST_ROUNDS_FOR_RATIO, check_names, profile_of},
+    profile::{LEAST_ROUNDS_FOR_RATIO, check_names, levels_to_ron, profile_of},
     profiled_scene, set_setting, settings_of,
 };
 use crate::{
@@ -269,13 +269,7 @@ impl Tuned {
         for setting in settings_of(&self.scene) {
             match setting.name.strip_prefix("quality.") {
                 Some("levels") if self.scene.quality.levels.is_empty() => {}
-                Some("levels") => {
-                    let level = |level: &crate::scene::QualityLevel| {
-                        format!("(draw: \"{}\", until: {}, fade: {})", level.draw, level.until, level.fade)
-                    };
-                    let levels: Vec<String> = self.scene.quality.levels.iter().map(level).collect();
-                    lines.push(format!("    levels: [{}],", levels.join(", ")));
-                }
+                Some("levels") => lines.push(format!("    levels: {},", levels_to_ron(&self.scene.quality.levels))),
                 // A scene file leaves out what is automatic.
                 Some(_) if setting.value == super::profile::AUTOMATIC => {}
                 Some(field) => lines.push(format!("    {field}: {},", setting.value)),
