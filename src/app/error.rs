@@ -109,9 +109,7 @@ pub enum AppError {
     #[error("{0}")]
     Interrupted(String),
     /// Some images of several failed; the others are finished.
-    #[error(
-        "{failed} of {total} images failed, the first of them {}; {remedy}", of_file(file, source)
-    )]
+    #[error("{failed} of {total} images failed, the first of them {}; {remedy}", of_file(file, source))]
     SomeFailed {
         /// How many failed.
         failed: usize,

@@ -140,9 +140,7 @@ pub fn merge(options: &MergeOptions, progress: &mut dyn Progress) -> Result<Vec<
     match failures.into_iter().next() {
         None => Ok(done),
         Some((_, error)) if done.is_empty() => Err(error),
-        Some((file, error)) => {
-            Err(AppError::SomeFailed { failed, total, file, source: Box::new(error), remedy: MEND })
-        }
+        Some((file, error)) => Err(AppError::SomeFailed { failed, total, file, source: Box::new(error), remedy: MEND }),
     }
 }
 
@@ -266,7 +264,12 @@ mod tests {
         let view = Viewpoint { position: glam::DVec3::ZERO, yaw: 0.0, pitch: 0.0, field_of_view: 1.0 };
         let shot = Shot { camera: Camera { view, size: (2, 1), near: 0.1 }, fog: None };
         let text = vec![("Scene".to_owned(), scene.to_owned())];
-        let notes = FilmNotes { total, exposure: 1.0, night: ScotopicTint { tint: glam::Vec3::ONE, amount: 0.0, strength: 0.0 }, text };
+        let notes = FilmNotes {
+            total,
+            exposure: 1.0,
+            night: ScotopicTint { tint: glam::Vec3::ONE, amount: 0.0, strength: 0.0 },
+            text,
+        };
         std::fs::create_dir_all(path.parent().unwrap_or(Path::new(".")))?;
         Ok(Film::beginning_at(&shot, first)?.keep(path, &[7; 32], &notes.to_bytes())?)
     }

@@ -182,7 +182,9 @@ mod tests {
             map: Some(image.join("map.png")),
         };
         let message = compare(&options, &mut crate::progress::Silent).err().map(|error| error.to_string());
-        assert!(message.is_some_and(|text| text.contains("map.png") && text.contains("--map") && !text.contains("--out")));
+        assert!(
+            message.is_some_and(|text| text.contains("map.png") && text.contains("--map") && !text.contains("--out"))
+        );
         Ok(())
     }
 }

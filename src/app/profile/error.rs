@@ -118,7 +118,9 @@ pub enum ProfileError {
     #[error("{}: none of its settings is in this profile, so nothing can be compared", .0.display())]
     NothingInCommon(PathBuf),
     /// A search without a reference.
-    #[error("a search needs a reference to count errors from; give --reference full, traced or a folder instead of none")]
+    #[error(
+        "a search needs a reference to count errors from; give --reference full, traced or a folder instead of none"
+    )]
     NoReference,
     /// No setting is good enough.
     #[error("{0}")]

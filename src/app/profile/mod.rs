@@ -185,8 +185,13 @@ pub(super) fn profile_of(
     work.report.scene_fingerprint = source;
     // Until there are references nothing is measured, and nothing written that a report needs.
     work.make_references(&mut contestants, &scene, progress)?;
-    if !work.goes_on && let Some(earlier) = set_aside(&options.out)? {
-        progress.note(&format!("{} keeps the complete report that was there until this one is complete", earlier.display()));
+    if !work.goes_on
+        && let Some(earlier) = set_aside(&options.out)?
+    {
+        progress.note(&format!(
+            "{} keeps the complete report that was there until this one is complete",
+            earlier.display()
+        ));
     }
     let outcome = work.run(&mut contestants, progress);
     work.report.complete = outcome.is_ok();

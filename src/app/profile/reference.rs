@@ -286,7 +286,7 @@ mod tests {
         let file = folder.path().join("0000.png");
         image::RgbImage::new(64, 36).save(&file)?;
         let views = Views::Flight { frames: 1, fps: None, from: None, at: None }.of(&Scene::default(), &|_, _| 0.0)?;
-        assert_eq!(given_files(folder.path(), &views, (64, 36))?, [file.clone()]);
+        assert_eq!(given_files(folder.path(), &views, (64, 36))?, std::slice::from_ref(&file));
         let message = |size| given_files(folder.path(), &views, size).err().map(|error| error.to_string());
         assert!(message((32, 18)).is_some_and(|text| text.contains("0000.png has 64x36 pixels, not 32x18")));
         std::fs::write(&file, "no image")?;
