@@ -162,9 +162,8 @@ fn compare_images(options: &canopy::app::CompareOptions, arguments: &cli::Compar
 }
 
 fn profile_scene(options: &canopy::app::ProfileOptions, arguments: &cli::Profile, quiet: bool) -> anyhow::Result<()> {
-    use canopy::{
-        app::{BaselineRow, against, cautions, check_baseline, profile, profiled_scene, read_report, settings_of},
-        progress::Progress,
+    use canopy::app::{
+        BaselineRow, against, cautions, check_baseline, profile, profiled_scene, read_report, settings_of,
     };
     if arguments.list_settings {
         let settings = settings_of(&profiled_scene(&options.scene, &options.overrides)?);
@@ -182,7 +181,7 @@ fn profile_scene(options: &canopy::app::ProfileOptions, arguments: &cli::Profile
     let mut bars = Bars::new(quiet);
     let (report, files) = profile(options, &mut bars)?;
     if let Some((path, baseline)) = &baseline {
-        cautions(&report, baseline, path).iter().for_each(|caution| bars.warn(caution));
+        cautions(&report, baseline, path).iter().for_each(|caution| bars.caution(caution));
     }
     drop(bars);
     if !quiet {

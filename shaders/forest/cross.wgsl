@@ -297,9 +297,9 @@ fn isotropic_fraction(variant: u32, level: f32) -> f32 {
     return mix((*fraction)[finer / 4u][finer % 4u], (*fraction)[coarser / 4u][coarser % 4u], fract(at));
 }
 
-// A bilinear lookup in the mip whose texels are as large as pixels is a mean over two pixels, which takes a fifth of a crown's contrast. One
-// mip finer it is a mean over one pixel, as the samples of a full model are.
-const SHARPER: f32 = 1.0;
+// A bilinear lookup in the mip whose texels are as large as pixels is a mean over two pixels, which takes a fifth of a crown's contrast. A whole
+// mip finer it would be a mean over one pixel, but shimmer twice as much more (docs/measurements/levels-of-detail.md).
+const SHARPER: f32 = 0.5;
 
 // Mip level of the textures: the mean of the two axes' levels. The larger one, which samplers use, would blur a plane
 // seen at an angle along its whole height. The little aliasing that remains affects leaves, whose coverage is right at

@@ -13,6 +13,11 @@ pub struct Bars {
 }
 
 impl Bars {
+    /// Prints a warning above the bars.
+    pub fn caution(&mut self, message: &str) {
+        self.warn(message);
+    }
+
     /// Progress for a user who may have asked for quiet.
     pub fn new(quiet: bool) -> Self {
         Self { bar: ProgressBar::hidden(), quiet }
