@@ -272,7 +272,8 @@ fn a_cross_with_more_upright_planes_is_nearer_to_the_model_from_between_them() {
     };
     for degrees in [0.0, 90.0, 180.0] {
         let [_, two, four] = errors(degrees);
-        assert!((two - four).abs() < 1e-3, "{degrees} degrees: {two} with two, {four} with four");
+        // The same plane but for its neighbours' edges.
+        assert!((two - four).abs() < 0.005 * two, "{degrees} degrees: {two} with two, {four} with four");
     }
     for degrees in [45.0, 135.0, 225.0] {
         let [one, two, four] = errors(degrees);
