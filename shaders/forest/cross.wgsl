@@ -297,8 +297,8 @@ fn isotropic_fraction(variant: u32, level: f32) -> f32 {
     return mix((*fraction)[finer / 4u][finer % 4u], (*fraction)[coarser / 4u][coarser % 4u], fract(at));
 }
 
-// A bilinear lookup in the mip whose texels are as large as pixels is a mean over two pixels, which takes a fifth of a crown's contrast. A whole
-// mip finer it would be a mean over one pixel, but shimmer twice as much more (docs/measurements/levels-of-detail.md).
+// How many mips finer than one whose texels are as large as pixels. There, a bilinear lookup is a mean over two pixels, and a fifth of a crown's
+// contrast is lost. One mip finer, it is a mean over one pixel, but crowns shimmer (docs/measurements/levels-of-detail.md).
 const SHARPER: f32 = 0.5;
 
 // Mip level of the textures: the mean of the two axes' levels. The larger one, which samplers use, would blur a plane

@@ -43,8 +43,8 @@ struct Variant {
     roughness: f32,
     // 1 if the foliage's normals are realigned to point out of the crown, else 0.
     realigned: f32,
-    // Indirect light of the key light (indirect_sun in transfer.wgsl) in the mean over its leaves: the component of the
-    // second band towards the zenith, the first coefficient, and its colour.
+    // For billboard clouds: indirect light of the key light (indirect_sun in transfer.wgsl) in the mean over its leaves, as the component
+    // of the second band towards the zenith, the first coefficient, and its colour.
     indirect_sun_zenith: f32,
     indirect_sun_mean: f32,
     indirect_sun_color: vec3<f32>,

@@ -162,6 +162,26 @@ pub enum AppError {
 /// What [`AppError::SomeFailed`] says where `--resume` goes on.
 pub(super) const RESUME: &str = "the same command with --resume renders these alone";
 
+/// How a command on several files ends, of which `finished` are done: an error where any failed.
+///
+/// # Errors
+/// [`AppError::SomeFailed`] with `remedy`; the first failure itself where nothing was finished.
+pub(super) fn outcome(
+    failures: Vec<(PathBuf, AppError)>,
+    finished: usize,
+    remedy: &'static str,
+) -> Result<(), AppError> {
+    let failed = failures.len();
+    match failures.into_iter().next() {
+        None => Ok(()),
+        Some((_, error)) if finished == 0 => Err(error),
+        Some((file, error)) => {
+            let (total, source) = (finished + failed, Box::new(error));
+            Err(AppError::SomeFailed { failed, total, file, source, remedy })
+        }
+    }
+}
+
 /// `error` with the name of `file` before it, unless it begins with it.
 pub(super) fn of_file(file: &Path, error: &AppError) -> String {
     let (file, error) = (file.display().to_string(), error.to_string());

@@ -14,14 +14,7 @@ pub fn fingerprint(scene: &Scene) -> String {
     let mut bare = scene.clone();
     let mut hasher = blake3::Hasher::new();
     bare.file = None;
-    for path in paths(&mut bare) {
-        hash(&mut hasher, path);
-        *path = PathBuf::new();
-    }
-    if let Some(palette) = bare.style.palette_mut().filter(|palette| Palette::is_file(palette)) {
-        hash(&mut hasher, Path::new(palette.as_str()));
-        palette.clear();
-    }
+    take_files(&mut hasher, &mut bare);
     hasher.update(format!("{} {bare:?}", env!("CARGO_PKG_VERSION")).as_bytes());
     hasher.finalize().to_hex()[..32].to_owned()
 }
@@ -31,20 +24,28 @@ pub fn fingerprint(scene: &Scene) -> String {
 pub fn source_fingerprint(scene: &Scene, overrides: &Overrides) -> String {
     let mut bare = scene.clone();
     let mut hasher = blake3::Hasher::new();
-    match bare.file.take() {
-        Some(file) => hash(&mut hasher, &file),
-        None => {
-            hasher.update(format!("{bare:?}").as_bytes());
-        }
+    let file = bare.file.take();
+    if let Some(file) = &file {
+        hash(&mut hasher, file);
     }
-    for path in paths(&mut bare) {
-        hash(&mut hasher, path);
-    }
-    if let Some(palette) = bare.style.palette_mut().filter(|palette| Palette::is_file(palette)) {
-        hash(&mut hasher, Path::new(palette.as_str()));
+    take_files(&mut hasher, &mut bare);
+    if file.is_none() {
+        hasher.update(format!("{bare:?}").as_bytes());
     }
     hasher.update(format!("{overrides:?}").as_bytes());
     hasher.finalize().to_hex()[..32].to_owned()
+}
+
+/// Hashes the files that `scene` names, and takes their names out of it.
+fn take_files(hasher: &mut blake3::Hasher, scene: &mut Scene) {
+    for path in paths(scene) {
+        hash(hasher, path);
+        *path = PathBuf::new();
+    }
+    if let Some(palette) = scene.style.palette_mut().filter(|palette| Palette::is_file(palette)) {
+        hash(hasher, Path::new(palette.as_str()));
+        palette.clear();
+    }
 }
 
 fn hash(hasher: &mut blake3::Hasher, path: &Path) {

@@ -7,7 +7,7 @@ use bevy::render::renderer::RenderDevice;
 use super::{
     Frame, RenderOptions, RenderPlan, RenderReport, Renderer, adapter,
     beside::{Choice, Panels},
-    error::{AppError, RESUME, of_file},
+    error::{AppError, RESUME, of_file, outcome},
     plan::PlanRequest,
     rendered_image::RenderedImage,
 };
@@ -86,15 +86,8 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
         progress.advance(1);
     }
     progress.end();
-    let (finished, failed) = (report.files.len(), failures.len());
-    match failures.into_iter().next() {
-        None => Ok(report),
-        Some((_, error)) if finished == 0 => Err(error),
-        Some((file, error)) => {
-            let (total, source) = (finished + failed, Box::new(error));
-            Err(AppError::SomeFailed { failed, total, file, source, remedy: RESUME })
-        }
-    }
+    outcome(failures, report.files.len(), RESUME)?;
+    Ok(report)
 }
 
 /// Checks whether the images can be written.

@@ -6,7 +6,7 @@ use std::{
 };
 
 use super::{
-    error::{AppError, of_file},
+    error::{AppError, of_file, outcome},
     film_notes::FilmNotes,
     plan::PlanError,
     reference::save,
@@ -136,12 +136,8 @@ pub fn merge(options: &MergeOptions, progress: &mut dyn Progress) -> Result<Vec<
         progress.advance(1);
     }
     progress.end();
-    let failed = failures.len();
-    match failures.into_iter().next() {
-        None => Ok(done),
-        Some((_, error)) if done.is_empty() => Err(error),
-        Some((file, error)) => Err(AppError::SomeFailed { failed, total, file, source: Box::new(error), remedy: MEND }),
-    }
+    outcome(failures, done.len(), MEND)?;
+    Ok(done)
 }
 
 /// The parts of each image.

@@ -12,7 +12,7 @@ use glam::DVec3;
 use super::{
     Frame, LeafModel, LightGroup, Part, ReferenceOptions, RenderPlan,
     camera::NEAR,
-    error::{AppError, RESUME, of_file},
+    error::{AppError, RESUME, of_file, outcome},
     film_notes::FilmNotes,
     interrupt,
     notes::notes,
@@ -97,14 +97,8 @@ pub fn reference(options: &ReferenceOptions, progress: &mut dyn Progress) -> Res
             }
         }
     }
-    let failed = failures.len();
-    match failures.into_iter().next() {
-        None => Ok(files),
-        Some((_, error)) if files.is_empty() => Err(error),
-        Some((file, error)) => {
-            Err(AppError::SomeFailed { failed, total: count, file, source: Box::new(error), remedy: RESUME })
-        }
-    }
+    outcome(failures, files.len(), RESUME)?;
+    Ok(files)
 }
 
 /// What of the light is traced.

@@ -28,10 +28,10 @@ use crate::{
 pub(crate) const COVER_TEXEL: f64 = 8.0;
 /// The most texels of a cover map: those of wider forests are larger.
 pub(crate) const MOST_COVER_TEXELS: u32 = 1 << 24;
-/// Extent of a plant without any surface, metres.
-const NO_PLANT: PlantSize = PlantSize { radius: 0.1, height: 0.1 };
-/// Radius of the ground under a plant without width, metres.
-const LEAST_RADIUS: f32 = 0.008;
+/// Size of a plant without any surface, metres.
+const NO_PLANT: PlantSize = PlantSize { radius: 0.08, height: 0.1 };
+/// The least size of a plant that has some, metres.
+const LEAST: PlantSize = PlantSize { radius: 0.008, height: 0.01 };
 
 /// A built scene.
 pub struct Stage {
@@ -290,8 +290,10 @@ pub(crate) fn cover(stand: &PackedStand, plants: &[BakedPlant]) -> Result<CoverM
 
 /// What the plant covers of the ground.
 fn crown(plant: &BakedPlant) -> PlantSize {
-    let height = plant.plant.bounds().map_or(NO_PLANT.height, |bounds| bounds.max.y);
-    PlantSize { radius: plant.plant.covered_radius().max(LEAST_RADIUS), height: height.max(0.01) }
+    plant.plant.bounds().map_or(NO_PLANT, |bounds| PlantSize {
+        radius: plant.plant.covered_radius().max(LEAST.radius),
+        height: bounds.max.y.max(LEAST.height),
+    })
 }
 
 fn bake(

@@ -518,7 +518,7 @@ mod tests {
         assert!(slender.transmittance(0.5, 0.3) < layer.transmittance(0.5, 0.3));
     }
 
-    /// Crowns of few leaves let light through, whose colour it keeps.
+    /// Thin crowns let more of the sun and of the sky through.
     #[test]
     fn thin_crowns_are_brighter_below() {
         let light = light(50.0);

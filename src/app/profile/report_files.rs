@@ -78,8 +78,8 @@ pub(super) fn set_aside(folder: &Path) -> Result<Option<PathBuf>, AppError> {
     struct Known {
         complete: bool,
     }
-    let files = ReportFiles::in_folder(folder);
-    let known = fs::read(&files.json).ok().and_then(|bytes| serde_json::from_slice::<Known>(&bytes).ok());
+    let report = ReportFiles::in_folder(folder);
+    let known = files::read_ordinary(&report.json).ok().and_then(|bytes| serde_json::from_slice::<Known>(&bytes).ok());
     if !known.is_some_and(|known| known.complete) {
         return Ok(None);
     }
@@ -87,7 +87,7 @@ pub(super) fn set_aside(folder: &Path) -> Result<Option<PathBuf>, AppError> {
     let failed = |source: io::Error| AppError::Write { path: earlier.clone(), source };
     remove(&earlier).map_err(failed)?;
     fs::create_dir_all(&earlier).map_err(failed)?;
-    let own = files.all().map(Path::to_owned).into_iter().chain(FOLDERS.map(|name| folder.join(name)));
+    let own = report.all().map(Path::to_owned).into_iter().chain(FOLDERS.map(|name| folder.join(name)));
     for path in own.filter(|path| path.exists()) {
         fs::rename(&path, earlier.join(path.file_name().unwrap_or_default())).map_err(failed)?;
     }

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 
 use self::ladder::{ladders, neighbours};
 use super::{
-    AppError, Combination, ProfileError, ProfileOptions, ProfileReport, ReferenceKind, ReportFiles, Sweep,
+    AppError, Combination, ProfileError, ProfileOptions, ProfileReport, ReferenceKind, Sweep,
     profile::{LEAST_ROUNDS_FOR_RATIO, check_names, levels_to_ron, profile_of},
     profiled_scene, set_setting, settings_of,
 };
@@ -92,7 +92,7 @@ pub fn tune(options: &TuneOptions, progress: &mut dyn Progress) -> Result<Tuned,
             step + 1,
             sweeps.iter().map(|sweep| sweep.values.len()).sum::<usize>()
         ));
-        let (report, _) = measure_step(&centre, step_options(options, &centre, sweeps, step), step, progress)?;
+        let report = measure_step(&centre, step_options(options, &centre, sweeps, step), step, progress)?;
         let candidates = candidates(&report)?;
         let now = candidates[0].1;
         let best = best(&candidates, options.goal);
@@ -142,13 +142,15 @@ fn measure_step(
     options: ProfileOptions,
     step: usize,
     progress: &mut dyn Progress,
-) -> Result<(ProfileReport, ReportFiles), AppError> {
-    match profile_of(centre.clone(), String::new(), &options, progress) {
+) -> Result<ProfileReport, AppError> {
+    let mut measure = |options: &ProfileOptions| profile_of(centre.clone(), String::new(), options, progress);
+    let (report, _) = match measure(&options) {
         Err(AppError::Profile(ProfileError::Another(_))) if step > 0 => {
-            profile_of(centre.clone(), String::new(), &ProfileOptions { resume: false, ..options }, progress)
+            measure(&ProfileOptions { resume: false, ..options })?
         }
-        outcome => outcome,
-    }
+        outcome => outcome?,
+    };
+    Ok(report)
 }
 
 fn no_answer(goal: Goal, now: Measured, candidates: &[(usize, Measured)]) -> String {

@@ -81,7 +81,7 @@ pub struct VariantUniform {
     pub roughness: f32,
     /// 1 if the foliage's normals are realigned to point out of the crown, else 0.
     pub realigned: f32,
-    /// Mean indirect light of the key light over its leaves: the component of SH band 1 towards the zenith.
+    /// For billboard clouds, mean indirect light of the key light over its leaves: the component of SH band 1 towards the zenith.
     pub indirect_sun_zenith: f32,
     /// The first coefficient (band 0) of the same.
     pub indirect_sun_mean: f32,
