@@ -108,10 +108,12 @@ fn folder_of(path: &Path) -> &Path {
 
 fn temporary(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
     tempfile::Builder::new().prefix(".canopy-").suffix(".tmp").tempfile_in(folder).map_err(|error| {
-        let kind = error.kind();
-        // The temporary name says nothing to anyone, the caller names the file: the system's reason alone.
-        let reason = error.get_ref().and_then(|named| named.source()).map(ToString::to_string);
-        reason.map_or(error, |reason| io::Error::new(kind, reason))
+        // The temporary name says nothing to anyone: the caller names the file.
+        let text = error.to_string();
+        match text.split_once(" at path ") {
+            Some((reason, _)) => io::Error::new(error.kind(), reason.to_owned()),
+            None => error,
+        }
     })
 }
 
