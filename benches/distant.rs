@@ -90,22 +90,26 @@ fn main() -> anyhow::Result<()> {
 
 fn cases() -> anyhow::Result<Vec<Case>> {
     let demo = Scene::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/scenes/demo.ron"))?;
-    let at = demo.place.time;
-    let mut cases = vec![Case { name: "demo-noon", scene: demo, at, bands: [(0.38, 0.6), (0.6, 0.8), (0.8, 1.0)] }];
+    let hour = |text: &str| text.parse::<LocalTime>();
+    let demos = [
+        ("demo-noon", demo.place.time),
+        ("demo-low-sun", hour("2026-06-21T19:20-04:00")?),
+        ("demo-dusk", hour("2026-06-21T20:40-04:00")?),
+    ];
+    let bands = [(0.38, 0.6), (0.6, 0.8), (0.8, 1.0)];
+    let mut cases: Vec<Case> =
+        demos.into_iter().map(|(name, at)| Case { name, scene: demo.clone(), at, bands }).collect();
     let Some(data) = std::env::var_os("CANOPY_DATA").map(PathBuf::from) else {
-        eprintln!("note: CANOPY_DATA is not set, so the stand of given trees is left out");
+        eprintln!("note: CANOPY_DATA is not set, so the stands of given trees are left out");
         return Ok(cases);
     };
-    let species: Vec<String> = [("oak", 14, 22), ("aspen", 12, 20), ("pine", 14, 24)]
-        .into_iter()
-        .map(|(name, low, high)| {
-            let file = data.join("trees").join(format!("{name}-medium.glb")).display().to_string();
-            format!("(name: \"{name}\", plant: Gltf(files: [{file:?}]), height: ({low}, {high}))")
-        })
-        .collect();
-    let stand = |position: &str, yaw: u32, pitch: i32| {
+    let species = |name: &str, low: u32, high: u32| {
+        let file = data.join("trees").join(format!("{name}-medium.glb")).display().to_string();
+        format!("(name: \"{name}\", plant: Gltf(files: [{file:?}]), height: ({low}, {high}))")
+    };
+    let stand = |species: &[String], stems: u32, position: &str, yaw: u32, pitch: i32| {
         let text = format!(
-            "(terrain: Noise(size: 1600, seed: 3), species: [{}], trees: Scattered(stems_per_hectare: 200, min_distance: 3, \
+            "(terrain: Noise(size: 1600, seed: 3), species: [{}], trees: Scattered(stems_per_hectare: {stems}, min_distance: 3, \
              area: (west: -500, south: -400, east: 500, north: 500)), place: (latitude: 48, longitude: 9, time: \
              \"2026-06-21T13:00+01:00\"), camera: (start: (position: {position}, yaw: {yaw}, pitch: {pitch})), quality: \
              (near_distance: 5, shadow_distance: 800))",
@@ -114,11 +118,24 @@ fn cases() -> anyhow::Result<Vec<Case>> {
         Scene::parse(&text, Path::new("stand.ron"))
     };
     let bands = [(0.45, 0.6), (0.6, 0.8), (0.8, 1.0)];
-    let along = stand("(0, 30, -300)", 0, -8)?;
-    let evening: LocalTime = "2026-06-21T19:00+01:00".parse()?;
-    cases.push(Case { name: "stand-noon", at: along.place.time, scene: along.clone(), bands });
-    cases.push(Case { name: "stand-low-sun", scene: along, at: evening, bands });
-    cases.push(Case { name: "stand-against-the-sun", scene: stand("(300, 30, 0)", 290, -6)?, at: evening, bands });
+    let (noon, evening, dusk) =
+        (hour("2026-06-21T13:00+01:00")?, hour("2026-06-21T19:00+01:00")?, hour("2026-06-21T20:15+01:00")?);
+    let mixed = [species("oak", 14, 22), species("aspen", 12, 20), species("pine", 14, 24)];
+    let pines = [species("pine", 12, 22)];
+    // Along a slope, and towards the evening's sun.
+    let (along, against) = (("(0, 30, -300)", 0, -8), ("(300, 30, 0)", 290, -6));
+    for (name, species, stems, (position, yaw, pitch), at) in [
+        ("stand-noon", &mixed[..], 200, along, noon),
+        ("stand-low-sun", &mixed[..], 200, along, evening),
+        ("stand-against-the-sun", &mixed[..], 200, against, evening),
+        ("stand-dusk", &mixed[..], 200, along, dusk),
+        ("pines-noon", &pines[..], 400, along, noon),
+        ("pines-low-sun", &pines[..], 400, along, evening),
+        ("pines-against-the-sun", &pines[..], 400, against, evening),
+        ("pines-dusk", &pines[..], 400, along, dusk),
+    ] {
+        cases.push(Case { name, scene: stand(species, stems, position, yaw, pitch)?, at, bands });
+    }
     Ok(cases)
 }
 

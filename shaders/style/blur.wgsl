@@ -2,10 +2,14 @@
 // layer, else 0.
 
 struct BlurJob {
-    // From one point to the next, in texels: 3/8 of the standard deviation.
+    // From one point of the Gaussian to the next, in texels of the source.
     step: vec2<f32>,
     // Texels of the source along the sides of a texel of the target.
     scale: vec2<f32>,
+    // From one point to the next, in standard deviations.
+    spacing: f32,
+    // Points on either side.
+    reach: i32,
     first_layer: u32,
 }
 
@@ -27,25 +31,41 @@ fn vertex(@builtin(vertex_index) index: u32) -> Corner {
     return Corner(vec4(uv * 2.0 - 1.0, 0.0, 1.0));
 }
 
-const REACH: i32 = 8;
+fn weight(point: i32) -> f32 {
+    let x = f32(point) * job.spacing;
+    return exp(-0.5 * x * x);
+}
+
+fn value(at: vec2<f32>, size: vec2<f32>) -> vec4<f32> {
+#ifdef IDENTITIES
+    let texel = vec2<i32>(clamp(at, vec2(0.0), size - 1.0));
+    let layer = textureLoad(source, texel, 0).x - job.first_layer;
+    return select(vec4(0.0), vec4(1.0), vec4(layer) == vec4(0u, 1u, 2u, 3u));
+#else
+    return textureSampleLevel(source, linear_sampler, at / size, 0.0);
+#endif
+}
 
 @fragment
 fn fragment(in: Corner) -> @location(0) vec4<f32> {
     let size = vec2<f32>(textureDimensions(source));
-    var sum = vec4(0.0);
-    var weights = 0.0;
-    for (var i = -REACH; i <= REACH; i += 1) {
-        let x = 0.375 * f32(i);
-        let weight = exp(-0.5 * x * x);
-        let at = in.clip.xy * job.scale + f32(i) * job.step;
+    let center = in.clip.xy * job.scale;
+    var sum = value(center, size);
+    var weights = 1.0;
 #ifdef IDENTITIES
-        let texel = vec2<i32>(clamp(at, vec2(0.0), size - 1.0));
-        let layer = textureLoad(source, texel, 0).x - job.first_layer;
-        sum += weight * select(vec4(0.0), vec4(1.0), vec4(layer) == vec4(0u, 1u, 2u, 3u));
-#else
-        sum += weight * textureSampleLevel(source, linear_sampler, at / size, 0.0);
-#endif
-        weights += weight;
+    for (var i = 1; i <= job.reach; i += 1) {
+        let offset = f32(i) * job.step;
+        sum += weight(i) * (value(center + offset, size) + value(center - offset, size));
+        weights += 2.0 * weight(i);
     }
+#else
+    // Two points a lookup: between texels a bilinear lookup is the weighted mean of both [Rákos 2010].
+    for (var i = 1; i <= job.reach; i += 2) {
+        let both = weight(i) + weight(i + 1);
+        let offset = (f32(i) + weight(i + 1) / both) * job.step;
+        sum += both * (value(center + offset, size) + value(center - offset, size));
+        weights += 2.0 * both;
+    }
+#endif
     return sum / weights;
 }

@@ -31,32 +31,72 @@ fn cascade_of(distance: f32) -> i32 {
     return index;
 }
 
-// Light by the blurred depth test [Luft 2006, eq. 5]: the map's depths under a Gaussian of 5 x 5 points, then the smooth step over
-// the band of +-`style.shadow_softness` metres.
-fn soft_light(relative: vec3<f32>, normal: vec3<f32>) -> f32 {
+// The map's depth around a position, under a Gaussian of 5 x 5 points.
+struct Around {
+    // Mean depth.
+    depth: f32,
+    // Mean distance in depth of what is nearer to the light, and its share; 0 where nothing is.
+    blocked: f32,
+    share: f32,
+}
+
+// `step` between points, in texels. A point is nearer to the light than `depth` if it is so by more than `allowance` a texel.
+fn depths_around(index: i32, center: vec2<f32>, step: f32, depth: f32, allowance: f32) -> Around {
+    let last = vec2<i32>(textureDimensions(shadow_map)) - 1;
+    var sum = 0.0;
+    var weights = 0.0;
+    var blocked = 0.0;
+    var share = 0.0;
+    for (var y = -2; y <= 2; y += 1) {
+        for (var x = -2; x <= 2; x += 1) {
+            let offset = vec2(f32(x), f32(y));
+            let texel = clamp(vec2<i32>(center + offset * step), vec2(0), last);
+            let weight = exp2(-0.4 * dot(offset, offset));
+            let found = textureLoad(shadow_map, texel, index, 0);
+            sum += weight * found;
+            weights += weight;
+            // The map's depth is reversed: nearer to the light is greater.
+            let nearer = weight * f32(found - depth > allowance * step * length(offset));
+            blocked += nearer * (found - depth);
+            share += nearer;
+        }
+    }
+    return Around(sum / weights, blocked / max(share, 1e-6), share / weights);
+}
+
+// Metres above the ground below which a position takes the shadow of what is near as sharp as it is.
+const CONTACT_HEIGHT: f32 = 0.5;
+// Softnesses between ground and caster from which on the shadow is as soft as it may be.
+const CONTACT_REACH: f32 = 4.0;
+
+// Light by the blurred depth test [Luft 2006, eq. 5]: the map's depths under a Gaussian, then the smooth step over the band of
+// +-`style.shadow_softness` metres. On the ground the Gaussian and the band narrow towards the foot of what casts, as a penumbra does [Fernando 2005]:
+// under a wide one a trunk is lost, whose depth near its foot differs from the ground's by less than the band.
+fn soft_light(relative: vec3<f32>, normal: vec3<f32>, height: f32) -> f32 {
     let index = cascade_of(length(relative));
     let cascade = shadow.cascades[index];
     let map = map_position(index, relative, normal, 2.0);
-    let size = textureDimensions(shadow_map);
-    let center = map.xy * vec2<f32>(size);
+    let center = map.xy * vec2<f32>(textureDimensions(shadow_map));
     // A quarter of the band, as wide as the softness is deep.
     let step = max(0.5 * style.shadow_softness / max(cascade.texel, 1e-4), 1.0) * 0.5;
-    var sum = 0.0;
-    var weights = 0.0;
-    for (var y = -2; y <= 2; y += 1) {
-        for (var x = -2; x <= 2; x += 1) {
-            let at = center + vec2(f32(x), f32(y)) * step;
-            let texel = clamp(vec2<i32>(at), vec2(0), vec2<i32>(size) - 1);
-            let weight = exp2(-0.4 * f32(x * x + y * y));
-            sum += weight * textureLoad(shadow_map, texel, index, 0);
-            weights += weight;
-        }
-    }
     let m = cascade.map_from_relative;
     let per_metre = length(vec3(m[0].z, m[1].z, m[2].z));
-    let delta = max(style.shadow_softness * per_metre, 1e-6);
-    // The map's depth is reversed: nearer to the light is greater. Half the band keeps lit surfaces lit.
-    let lit = smoothstep(-delta, delta, map.z - sum / weights + 0.5 * delta);
+    var delta = max(style.shadow_softness * per_metre, 1e-6);
+    // The slope of the surface in the light's space: its own parts that are nearer to the light do not count.
+    let facing = max(abs(dot(normal, light.key_direction)), 0.05);
+    let slope = sqrt(1.0 - min(facing * facing, 1.0)) / facing;
+    let allowance = slope * cascade.texel * per_metre;
+    var around = depths_around(index, center, step, map.z, allowance);
+    if height < CONTACT_HEIGHT && around.share > 0.0 {
+        let sharpness = mix(saturate(around.blocked / (CONTACT_REACH * delta)), 1.0, saturate(height / CONTACT_HEIGHT));
+        let narrow = max(step * sharpness, 0.5);
+        if narrow < step {
+            around = depths_around(index, center, narrow, map.z, allowance);
+            delta *= narrow / step;
+        }
+    }
+    // Half the band keeps lit surfaces lit.
+    let lit = smoothstep(-delta, delta, map.z - around.depth + 0.5 * delta);
     return mix(1.0, lit, cascade_weight(length(relative)));
 }
 
@@ -78,7 +118,7 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let facing = dot(normal, light.key_direction);
     let ground = sample_ground(relative);
     let open = terrain_visibility(ground, stored.w);
-    let shade = 1.0 - soft_light(relative, normal) * open;
+    let shade = 1.0 - soft_light(relative, normal, stored.w) * open;
     let diffuse = 0.5 + 0.5 * facing;
     let lit = diffuse * mix(0.6, 1.0, ambient);
     return vec4(lit, shade * direct_share(), landscape_depth(length(relative)), ambient);

@@ -7,16 +7,17 @@ use canopy::{
     app::{RenderedImage, Renderer},
     assets::Stage,
     bake::lighting::BakedLighting,
+    light::{Observer, SunPosition},
     render::components::{CanopyCamera, CanopyStyle},
     style::{LineNormals, Lines, Style, Toon, Watercolour},
 };
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use super::{NIGHT, NOON, SIZE, again, draw, renderer, showing};
 use crate::support::{
     gpu::gpu,
     image::{difference, keep},
-    stage::{PLACE, build, grove, quality, trees_at, view},
+    stage::{PLACE, build, grove, instant, project, quality, trees_at, view},
 };
 
 /// One tree near the camera, with normals of its implicit surface.
@@ -304,6 +305,42 @@ fn strokes_on_a_leaf_are_seen_near_in_all_styles_and_in_no_photograph() {
         assert_eq!(far, 0, "{name}");
     }
     assert_eq!(darker(CanopyStyle::default(), 0.24, "photograph"), 0);
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+/// The depths of a trunk near its foot and of the ground differ by less than the band of the blurred depth test, so that shadows of lone
+/// trees lay apart from them.
+#[test]
+fn a_soft_shadow_begins_at_the_foot_of_its_trunk() {
+    let gpu = gpu();
+    let stage = trees_at(&[DVec2::ZERO], 1).stage;
+    let size = (640, 480);
+    let mut renderer = match Renderer::new(size, None, 1) {
+        Ok(renderer) => renderer,
+        Err(error) => panic!("{error}"),
+    };
+    renderer.show(&stage);
+    renderer.set_style(watercolour(|w| {
+        (w.granulation, w.flow, w.dabs, w.sketch, w.edges) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    }));
+    // The sun in the east: the shadow lies to the left.
+    let at = "2026-06-21T09:00+01:00";
+    let view = view(&stage, (0.0, 4.0, 14.0), 0.0, -8.0);
+    let picture = draw(&mut renderer, &stage, &view, at);
+    keep(&picture, "watercolour-foot");
+    let sun = SunPosition::at(instant(at), &Observer::new(48.0, 9.0, 0.0).unwrap()).unwrap().direction().as_dvec3();
+    // The ground in the shadow of the trunk so far above it; negative: as far on the lit side.
+    let ground = |metres: f64| {
+        let point = DVec3::new(-sun.x / sun.y * metres, stage.terrain.height(0.0, 0.0), -sun.z / sun.y * metres);
+        let place = project(&view, size, point).unwrap();
+        let (column, row) = (place.x.round() as u32, place.y.round() as u32);
+        brightness(&picture, column - 2..column + 3, row - 1..row + 2)
+    };
+    for metres in [0.7, 1.2, 1.8] {
+        let (shade, light) = (ground(metres), ground(-metres));
+        println!("{metres} m: {shade:.0} in the shadow, {light:.0} beside it");
+        assert!(shade < light - 25.0, "{metres} m: {shade} in the shadow, {light} on the lit side");
+    }
     assert_eq!(gpu.messages(), Vec::<String>::new());
 }
 

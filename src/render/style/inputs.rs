@@ -18,7 +18,7 @@ use glam::Vec4;
 use half::f16;
 
 use super::{
-    deviations::Deviations,
+    deviations::{Deviations, MOST_POINTS, Points},
     targets::{MapKey, StyleTargets},
     uniforms::{BlurUniform, LayerUniform, StyleUniform},
 };
@@ -137,17 +137,26 @@ fn write_blurs(gpu: &Gpu, buffer: &Buffer, deviations: &Deviations, key: &MapKey
         (deviations.lights, key.color_divisor),
         (deviations.dabs, 1),
     ];
-    let maps = maps.map(|(deviation, divisor)| (deviation, divisor, 0));
-    let slices = (0..key.layers.div_ceil(4)).map(|slice| (deviations.shapes, 1, 4 * slice));
-    for (index, (deviation, divisor, first_layer)) in maps.into_iter().chain(slices).enumerate() {
-        // The shader's points are 3/8 of the deviation apart.
-        let step = 0.375 * deviation * key.size.1 as f32 / 720.0;
+    let maps = maps.map(|(deviation, divisor)| (deviation, divisor, None));
+    let slices = (0..key.layers.div_ceil(4)).map(|slice| (deviations.shapes, 1, Some(4 * slice)));
+    for (index, (deviation, divisor, layers)) in maps.into_iter().chain(slices).enumerate() {
+        let deviation = deviation * key.size.1 as f32 / 720.0;
         let coarse = key.coarse(divisor);
         let ratio = [key.size.0 as f32 / coarse.0 as f32, key.size.1 as f32 / coarse.1 as f32];
+        // Along the first axis each point of an identifier costs a lookup, of a map every other one.
+        let across = Points::of(deviation, if layers.is_some() { MOST_POINTS / 2 } else { MOST_POINTS });
+        let along = Points::of(deviation / ratio[1], MOST_POINTS);
         // The first axis leads to the size of the target, the second stays at it.
-        let axes = [([step, 0.0], ratio), ([0.0, step / ratio[1]], [1.0; 2])];
-        for (axis, (step, scale)) in axes.into_iter().enumerate() {
-            let uniform = BlurUniform { step, scale, first_layer, padding: 0 };
+        let axes = [(across, [across.texels, 0.0], ratio), (along, [0.0, along.texels], [1.0; 2])];
+        for (axis, (points, step, scale)) in axes.into_iter().enumerate() {
+            let uniform = BlurUniform {
+                step,
+                scale,
+                spacing: points.deviations,
+                reach: points.reach,
+                first_layer: layers.unwrap_or(0),
+                padding: 0,
+            };
             let slot = (2 * index + axis) as u64;
             if slot < MOST_BLURS {
                 gpu.queue.write_buffer(buffer, slot * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));

@@ -116,10 +116,14 @@ pub struct ParticleViewUniform {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct BlurUniform {
-    /// From one point to the next, in texels.
+    /// From one point of the Gaussian to the next, in texels of the source.
     pub step: [f32; 2],
     /// Texels of the source along the sides of a texel of the target.
     pub scale: [f32; 2],
+    /// From one point to the next, in standard deviations.
+    pub spacing: f32,
+    /// Points on either side.
+    pub reach: i32,
     /// First of the four layers, for identifiers.
     pub first_layer: u32,
     /// WGSL rounds the size up to 8 bytes.
