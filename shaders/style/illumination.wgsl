@@ -67,7 +67,7 @@ fn depths_around(index: i32, center: vec2<f32>, step: f32, depth: f32, allowance
 // Metres above the ground below which a position takes the shadow of what is near as sharp as it is.
 const CONTACT_HEIGHT: f32 = 0.5;
 // Softnesses between ground and caster from which on the shadow is as soft as it may be.
-const CONTACT_REACH: f32 = 4.0;
+const CONTACT_REACH: f32 = 8.0;
 
 // Light by the blurred depth test [Luft 2006, eq. 5]: the map's depths under a Gaussian, then the smooth step over the band of
 // +-`style.shadow_softness` metres. On the ground the Gaussian and the band narrow towards the foot of what casts, as a penumbra does [Fernando 2005]:
@@ -87,14 +87,12 @@ fn soft_light(relative: vec3<f32>, normal: vec3<f32>, height: f32) -> f32 {
     let slope = sqrt(1.0 - min(facing * facing, 1.0)) / facing;
     let allowance = slope * cascade.texel * per_metre;
     var around = depths_around(index, center, step, map.z, allowance);
-    if height < CONTACT_HEIGHT && around.share > 0.0 {
-        let sharpness = mix(saturate(around.blocked / (CONTACT_REACH * delta)), 1.0, saturate(height / CONTACT_HEIGHT));
-        let narrow = max(step * sharpness, 0.5);
-        if narrow < step {
-            around = depths_around(index, center, narrow, map.z, allowance);
-            delta *= narrow / step;
-        }
-    }
+    // Without a branch: lavapipe (Mesa 22.3) fails on one that has a loop of lookups in it.
+    let distance = saturate(around.blocked / (CONTACT_REACH * delta));
+    let width = select(1.0, mix(distance * distance, 1.0, saturate(height / CONTACT_HEIGHT)), around.share > 0.0);
+    let narrow = max(step * width, min(step, 0.5));
+    around = depths_around(index, center, narrow, map.z, allowance);
+    delta *= narrow / step;
     // Half the band keeps lit surfaces lit.
     let lit = smoothstep(-delta, delta, map.z - around.depth + 0.5 * delta);
     return mix(1.0, lit, cascade_weight(length(relative)));

@@ -62,6 +62,8 @@ struct Pigment {
 const PAPER_ON_SHAPE: f32 = 0.22;
 const RIM: f32 = 0.38;
 const LUMINANCE: vec3<f32> = vec3(0.2126, 0.7152, 0.0722);
+// Threshold of the layer of shadows: what is two pixels wide, as the shadow of a trunk, is painted.
+const SHADOW: f32 = 0.34;
 // The washes of dark and medium foliage.
 const GLAZE: Layer = Layer(0.5, 0.10, 0.9, 1.0);
 
@@ -189,8 +191,8 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     // The layer of shadows.
     let shade = soft.y + 0.10 * middle + 0.16 * (height - 0.5);
     let half_edge = 0.10 + 0.3 * style.wetness;
-    let shadow = smoothstep(0.42 - half_edge, 0.42 + half_edge, shade);
-    let shadow_rim = shadow * (1.0 - smoothstep(0.42, 0.85, shade));
+    let shadow = smoothstep(SHADOW - half_edge, SHADOW + half_edge, shade);
+    let shadow_rim = shadow * (1.0 - smoothstep(SHADOW, 2.0 * SHADOW, shade));
     let shadow_paint = ramp(i32(arrayLength(&layers)), airiness(soft.z));
     let shadow_density = 0.85 + 0.35 * style.edges * shadow_rim + style.granulation * (0.5 - height) + 0.3 * style.flow * broad;
     color = glaze(color, shadow_paint.rgb, max(shadow_density, 0.0), shadow * style.shadow * shadow_paint.a * mix(1.0, 0.45, foliage));
