@@ -8,8 +8,6 @@ struct BlurJob {
     scale: vec2<f32>,
     // From one point to the next, in standard deviations.
     spacing: f32,
-    // Points on either side.
-    reach: i32,
     first_layer: u32,
 }
 
@@ -30,6 +28,13 @@ fn vertex(@builtin(vertex_index) index: u32) -> Corner {
     let uv = vec2(f32((index << 1u) & 2u), f32(index & 2u));
     return Corner(vec4(uv * 2.0 - 1.0, 0.0, 1.0));
 }
+
+// Points on either side. Their number is fixed, as a branch on uniforms alone is slow (docs/decisions/0002-no-branch-on-uniforms-alone.md).
+#ifdef IDENTITIES
+const POINTS: i32 = 8;
+#else
+const POINTS: i32 = 10;
+#endif
 
 fn weight(point: i32) -> f32 {
     let x = f32(point) * job.spacing;
@@ -53,16 +58,16 @@ fn fragment(in: Corner) -> @location(0) vec4<f32> {
     var sum = value(center, size);
     var weights = 1.0;
 #ifdef IDENTITIES
-    for (var i = 1; i <= job.reach; i += 1) {
+    for (var i = 1; i <= POINTS; i += 1) {
         let offset = f32(i) * job.step;
         sum += weight(i) * (value(center + offset, size) + value(center - offset, size));
         weights += 2.0 * weight(i);
     }
 #else
     // Two points a lookup: between texels a bilinear lookup is the weighted mean of both [Rákos 2010].
-    for (var i = 1; i <= job.reach; i += 2) {
+    for (var i = 1; i < POINTS; i += 2) {
         let both = weight(i) + weight(i + 1);
-        let offset = (f32(i) + weight(i + 1) / both) * job.step;
+        let offset = (f32(i) + weight(i + 1) / max(both, 1e-30)) * job.step;
         sum += both * (value(center + offset, size) + value(center - offset, size));
         weights += 2.0 * both;
     }

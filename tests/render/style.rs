@@ -17,7 +17,7 @@ use super::{NIGHT, NOON, SIZE, again, draw, renderer, showing};
 use crate::support::{
     gpu::gpu,
     image::{difference, keep},
-    stage::{PLACE, build, grove, instant, project, quality, trees_at, view},
+    stage::{PLACE, build, grove, instant, project, quality, trees_at, trees_of_quality, view},
 };
 
 /// One tree near the camera, with normals of its implicit surface.
@@ -313,7 +313,9 @@ fn strokes_on_a_leaf_are_seen_near_in_all_styles_and_in_no_photograph() {
 #[test]
 fn a_soft_shadow_begins_at_the_foot_of_its_trunk() {
     let gpu = gpu();
-    let stage = trees_at(&[DVec2::ZERO], 1).stage;
+    // Texels of 6 cm: a trunk is several of them wide.
+    let quality = "quality: (shadow_map_size: 2048, cascades: 2, shadow_distance: 60, near_distance: 67, msaa: 1)";
+    let stage = trees_of_quality(&[DVec2::ZERO], quality).stage;
     let size = (640, 480);
     let mut renderer = match Renderer::new(size, None, 1) {
         Ok(renderer) => renderer,
@@ -325,7 +327,7 @@ fn a_soft_shadow_begins_at_the_foot_of_its_trunk() {
     }));
     // The sun in the east: the shadow lies to the left.
     let at = "2026-06-21T09:00+01:00";
-    let view = view(&stage, (0.0, 4.0, 14.0), 0.0, -8.0);
+    let view = view(&stage, (0.0, 2.5, 5.0), 0.0, -20.0);
     let picture = draw(&mut renderer, &stage, &view, at);
     keep(&picture, "watercolour-foot");
     let sun = SunPosition::at(instant(at), &Observer::new(48.0, 9.0, 0.0).unwrap()).unwrap().direction().as_dvec3();
@@ -336,7 +338,7 @@ fn a_soft_shadow_begins_at_the_foot_of_its_trunk() {
         let (column, row) = (place.x.round() as u32, place.y.round() as u32);
         brightness(&picture, column - 2..column + 3, row - 1..row + 2)
     };
-    for metres in [0.7, 1.2, 1.8] {
+    for metres in [0.4, 0.7, 1.0] {
         let (shade, light) = (ground(metres), ground(-metres));
         println!("{metres} m: {shade:.0} in the shadow, {light:.0} beside it");
         assert!(shade < light - 25.0, "{metres} m: {shade} in the shadow, {light} on the lit side");

@@ -44,32 +44,31 @@ pub fn divisor(deviation: f32) -> u32 {
     }
 }
 
-/// The points at which a Gaussian is taken: every texel up to three standard deviations, and at most [`MOST_POINTS`] on either side, which then
-/// lie farther apart.
+/// How far apart the points are at which a Gaussian is taken: a texel, or more where their number does not reach to three standard
+/// deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Points {
-    /// From one to the next, in texels; at least 1.
+pub struct Spacing {
+    /// In texels; at least 1.
     pub texels: f32,
-    /// The same in standard deviations.
+    /// In standard deviations.
     pub deviations: f32,
-    /// On either side; 0 where nothing is blurred.
-    pub reach: i32,
 }
 
-/// The most points on either side of a Gaussian's middle. Maps are looked up between two points, identifiers at each.
-pub const MOST_POINTS: i32 = 16;
+/// Points on either side of a Gaussian's middle: of maps, which are looked up between two points, and of identifiers, which are looked up at
+/// each. `POINTS` of `shaders/style/blur.wgsl`.
+pub const MAP_POINTS: u32 = 10;
+pub const IDENTITY_POINTS: u32 = 8;
 
-impl Points {
-    /// Those of a Gaussian of `deviation` texels, of which `most` are on either side.
-    pub fn of(deviation: f32, most: i32) -> Self {
+impl Spacing {
+    /// That of a Gaussian of `deviation` texels with so many points on either side.
+    pub fn of(deviation: f32, points: u32) -> Self {
         // Not so for what is not a number either.
         if deviation > LEAST {
             let deviation = deviation.min(GREATEST);
-            let texels = (REACH * deviation / most as f32).max(1.0);
-            let reach = (REACH * deviation / texels).ceil().min(most as f32);
-            Self { texels, deviations: texels / deviation, reach: reach as i32 }
+            let texels = (REACH * deviation / points as f32).max(1.0);
+            Self { texels, deviations: texels / deviation }
         } else {
-            Self { texels: 1.0, deviations: 0.0, reach: 0 }
+            Self { texels: 1.0, deviations: 1.0 / LEAST }
         }
     }
 }
@@ -85,18 +84,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn points_of_a_gaussian_are_texels_up_to_three_deviations() {
-        assert_eq!(Points::of(1.5, 16), Points { texels: 1.0, deviations: 1.0 / 1.5, reach: 5 });
-        assert_eq!(Points::of(16.0, 16), Points { texels: 3.0, deviations: 3.0 / 16.0, reach: 16 });
+    fn points_of_a_gaussian_are_texels_until_they_do_not_reach_far_enough() {
+        assert_eq!(Spacing::of(1.5, 10), Spacing { texels: 1.0, deviations: 1.0 / 1.5 });
+        assert_eq!(Spacing::of(20.0, 10), Spacing { texels: 6.0, deviations: 0.3 });
         for nothing in [0.0, 1e-20, -1.0, f32::NAN] {
-            assert_eq!(Points::of(nothing, 16), Points { texels: 1.0, deviations: 0.0, reach: 0 });
+            // The next point has a weight of exp(-50).
+            assert_eq!(Spacing::of(nothing, 10), Spacing { texels: 1.0, deviations: 10.0 });
         }
         for deviation in [0.11, 0.3, 5.34, 1e9, f32::INFINITY] {
-            let points = Points::of(deviation, 8);
-            assert!(
-                points.texels.is_finite() && points.deviations.is_finite() && (1..=8).contains(&points.reach),
-                "{points:?}"
-            );
+            let spacing = Spacing::of(deviation, 8);
+            assert!(spacing.texels.is_finite() && (0.0..10.0).contains(&spacing.deviations), "{spacing:?}");
         }
     }
 

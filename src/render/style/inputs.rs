@@ -18,7 +18,7 @@ use glam::Vec4;
 use half::f16;
 
 use super::{
-    deviations::{Deviations, MOST_POINTS, Points},
+    deviations::{Deviations, IDENTITY_POINTS, MAP_POINTS, Spacing},
     targets::{MapKey, StyleTargets},
     uniforms::{BlurUniform, LayerUniform, StyleUniform},
 };
@@ -143,20 +143,12 @@ fn write_blurs(gpu: &Gpu, buffer: &Buffer, deviations: &Deviations, key: &MapKey
         let deviation = deviation * key.size.1 as f32 / 720.0;
         let coarse = key.coarse(divisor);
         let ratio = [key.size.0 as f32 / coarse.0 as f32, key.size.1 as f32 / coarse.1 as f32];
-        // Along the first axis each point of an identifier costs a lookup, of a map every other one.
-        let across = Points::of(deviation, if layers.is_some() { MOST_POINTS / 2 } else { MOST_POINTS });
-        let along = Points::of(deviation / ratio[1], MOST_POINTS);
+        let across = Spacing::of(deviation, if layers.is_some() { IDENTITY_POINTS } else { MAP_POINTS });
+        let along = Spacing::of(deviation / ratio[1], MAP_POINTS);
         // The first axis leads to the size of the target, the second stays at it.
         let axes = [(across, [across.texels, 0.0], ratio), (along, [0.0, along.texels], [1.0; 2])];
-        for (axis, (points, step, scale)) in axes.into_iter().enumerate() {
-            let uniform = BlurUniform {
-                step,
-                scale,
-                spacing: points.deviations,
-                reach: points.reach,
-                first_layer: layers.unwrap_or(0),
-                padding: 0,
-            };
+        for (axis, (spacing, step, scale)) in axes.into_iter().enumerate() {
+            let uniform = BlurUniform { step, scale, spacing: spacing.deviations, first_layer: layers.unwrap_or(0) };
             let slot = (2 * index + axis) as u64;
             if slot < MOST_BLURS {
                 gpu.queue.write_buffer(buffer, slot * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));

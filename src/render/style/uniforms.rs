@@ -122,12 +122,8 @@ pub struct BlurUniform {
     pub scale: [f32; 2],
     /// From one point to the next, in standard deviations.
     pub spacing: f32,
-    /// Points on either side.
-    pub reach: i32,
     /// First of the four layers, for identifiers.
     pub first_layer: u32,
-    /// WGSL rounds the size up to 8 bytes.
-    pub padding: u32,
 }
 
 /// Lines of the picture for which lengths in pixels are stated.
