@@ -259,6 +259,7 @@ fn gpu_structs_are_what_the_shaders_think() {
             camera,
             focal_length_pixels,
             mean_cover,
+            openness,
             noise_block,
             forest_surface,
             crown_albedo

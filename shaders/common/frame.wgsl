@@ -12,6 +12,8 @@ struct Frame {
     focal_length_pixels: f32,
     // Mean canopy cover where the terrain is known, 0..1.
     mean_cover: f32,
+    // How open the camera's place is: the fraction of the light on open ground that reaches it, 0..1.
+    openness: f32,
     // The camera's block of the ground's noise: column and row, modulo 2^32.
     noise_block: vec2<i32>,
     // The forest as a surface: distances at which it begins and at which no tree is drawn, and its height, metres.

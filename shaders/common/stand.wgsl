@@ -3,10 +3,10 @@
 #define_import_path canopy::stand
 
 #import canopy::constants::{STAND_COVERS, STAND_DEPTHS}
-#import canopy::frame::{stand_texture, sky_sampler}
+#import canopy::frame::{frame, stand_texture, sky_sampler}
 
 struct StandLight {
-    // Transmittance of the neighbouring crowns for the light of the sky that the own crown leaves.
+    // Transmittance of the neighbouring crowns for the light of the sky that the own crown leaves, of what is seen.
     sky_transmittance: vec3<f32>,
     // Their transmittance for the key light.
     key_transmittance: f32,
@@ -16,6 +16,11 @@ struct StandLight {
     upwelling: vec3<f32>,
 }
 
+// What is seen from the open has an open way to the eye. Crowns that would hide the sky around that way would have hidden it from the eye
+// too, so that it gets more light of the sky than the mean of its depth, which the table has. This part of the optical depth lies in such
+// crowns. From within the stand, the way to the eye says nothing about the sky above.
+const SEEN_PART: f32 = 0.4;
+
 // In the row of a depth; the last row is the ground's. The table has five blocks, one below the other: transmittances at
 // leaves, downwelling radiance, upwelling radiance at leaves, transmittances and upwelling radiance at trunks.
 fn look_up(cover: f32, row: f32, transmittances: f32, upwelling: f32) -> StandLight {
@@ -23,7 +28,7 @@ fn look_up(cover: f32, row: f32, transmittances: f32, upwelling: f32) -> StandLi
     let v = (row + 0.5) / (5.0 * (STAND_DEPTHS + 1.0));
     let first = textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 0.2 * transmittances), 0.0);
     var stand: StandLight;
-    stand.sky_transmittance = first.rgb;
+    stand.sky_transmittance = pow(max(first.rgb, vec3(1e-6)), vec3(1.0 - SEEN_PART * frame.openness));
     stand.key_transmittance = first.a;
     stand.downwelling = textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 0.2), 0.0).rgb;
     stand.upwelling = textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 0.2 * upwelling), 0.0).rgb;

@@ -14,7 +14,7 @@ use bevy::{
 };
 
 use crate::render::{
-    components::{CanopyCamera, CanopyOrigin, Daylight, Forest, ForestUpdates, Ground},
+    components::{CameraOpenness, CanopyCamera, CanopyOrigin, Daylight, Forest, ForestUpdates, Ground},
     exposure::{CameraExposure, StandTotals},
     forest::{DrawnForest, DrawnForests},
     report::FrameReport,
@@ -68,7 +68,7 @@ pub(super) fn expose_cameras(
     drawn: Option<Res<DrawnForests>>,
     forests: Query<(Entity, &Forest, &InheritedVisibility)>,
     grounds: Query<(Entity, &Ground, &GlobalTransform, &InheritedVisibility)>,
-    cameras: Query<(Entity, &GlobalTransform, Option<&Exposure>), With<CanopyCamera>>,
+    cameras: Query<(Entity, &GlobalTransform, Option<&Exposure>, Option<&CameraOpenness>), With<CanopyCamera>>,
 ) {
     let Some(daylight) = daylight else { return };
     // A forest that arrives over several frames counts once it is drawn, and what it replaces until then.
@@ -91,7 +91,7 @@ pub(super) fn expose_cameras(
     let exposure = cache.exposure(&daylight, totals);
     let ground = grounds.iter().filter(|(.., visibility)| visibility.get()).min_by_key(|(entity, ..)| *entity);
     let origin = origin.map_or_else(CanopyOrigin::default, |origin| *origin);
-    for (camera, place, current) in &cameras {
+    for (camera, place, current, openness) in &cameras {
         let at = origin.0 + place.translation().as_dvec3();
         let found = match ground {
             Some((_, ground, moved, _)) => exposure.at(ground, at - moved.translation().as_dvec3()),
@@ -102,6 +102,10 @@ pub(super) fn expose_cameras(
         }
         if current.is_none_or(|current| current.ev100 != found.ev100) {
             commands.entity(camera).insert(Exposure { ev100: found.ev100 });
+        }
+        let open = CameraOpenness(found.share);
+        if openness.is_none_or(|openness| *openness != open) {
+            commands.entity(camera).insert(open);
         }
     }
 }

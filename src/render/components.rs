@@ -42,7 +42,7 @@ pub const TONEMAPPING: Tonemapping = Tonemapping::BlenderFilmic;
 /// It requires a [`Camera3d`]; an explicit one in the same bundle brings Bevy's own default tone curve.
 #[derive(Component, Clone, Copy, Debug, Default, ExtractComponent, Reflect)]
 #[reflect(Component, Default)]
-#[require(Camera3d, Hdr, Exposure, Tonemapping = TONEMAPPING, ViewOptions)]
+#[require(Camera3d, Hdr, Exposure, Tonemapping = TONEMAPPING, ViewOptions, CameraOpenness)]
 #[component(on_add = set_tone_curve)]
 pub struct CanopyCamera;
 
@@ -318,6 +318,18 @@ impl Default for ViewOptions {
     }
 }
 
+/// How open the place of a camera is: the fraction of the light on open ground that reaches it between the trees, 0..1. Canopy sets it
+/// together with the exposure.
+#[derive(Component, Clone, Copy, Debug, PartialEq, ExtractComponent, Reflect)]
+#[reflect(Component, Default)]
+pub struct CameraOpenness(pub f32);
+
+impl Default for CameraOpenness {
+    fn default() -> Self {
+        Self(1.0)
+    }
+}
+
 /// The filter of cameras that Canopy's photographic passes draw: those without a style.
 pub type Photographed = (With<CanopyCamera>, Without<DrawnStyle>);
 
@@ -334,9 +346,11 @@ impl Plugin for ComponentsPlugin {
         app.add_plugins((
             ExtractComponentPlugin::<CanopyCamera>::default(),
             ExtractComponentPlugin::<ViewOptions>::default(),
+            ExtractComponentPlugin::<CameraOpenness>::default(),
             ExtractComponentPlugin::<CanopyStyle>::default(),
         ))
         .register_type::<(CanopyCamera, CanopyOrigin, SunShadowSettings, ViewOptions, CastsCanopyShadow)>()
+        .register_type::<CameraOpenness>()
         .register_type::<(Forest, Ground, GroundDrape, TreeLists, CanopyStyle)>()
         .register_type::<(LightUpdates, ForestUpdates)>()
         .init_resource::<CanopyOrigin>()

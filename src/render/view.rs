@@ -30,7 +30,7 @@ use bevy::{
 use glam::{DVec3, Mat4, Vec2};
 
 use super::{
-    components::{CanopyCamera, DrawnStyle, ViewOptions},
+    components::{CameraOpenness, CanopyCamera, DrawnStyle, ViewOptions},
     extract::ExtractedScene,
     sets::CanopyRenderSystems,
 };
@@ -95,6 +95,8 @@ pub struct PreparedView {
     pub zoom: f32,
     /// Factor from radiance to the attachment's values.
     pub exposure: f32,
+    /// How open the camera's place is, 0..1 ([`CameraOpenness`]).
+    pub openness: f32,
     /// Options of the camera.
     pub options: ViewOptions,
     /// Whether it is drawn in a style, without the photographic passes.
@@ -128,6 +130,7 @@ fn prepare_view(
             &ExtractedCamera,
             &Msaa,
             Option<&ViewOptions>,
+            Option<&CameraOpenness>,
             Has<MotionVectorPrepass>,
             Has<DeferredPrepass>,
             Has<DrawnStyle>,
@@ -146,7 +149,9 @@ fn prepare_view(
             views.len()
         );
     }
-    let Some((entity, view, camera, msaa, options, motion_vectors, deferred, styled)) = views.into_iter().next() else {
+    let Some((entity, view, camera, msaa, options, openness, motion_vectors, deferred, styled)) =
+        views.into_iter().next()
+    else {
         return;
     };
     if motion_vectors {
@@ -186,6 +191,11 @@ fn prepare_view(
         focal_pixels: 0.5 * size.y * view.clip_from_view.y_axis.y.abs(),
         zoom: view.clip_from_view.y_axis.y.abs() * (0.5 * NOMINAL_FIELD_OF_VIEW).tan(),
         exposure: camera.exposure,
+        // What is not a number counts as the open.
+        openness: match openness {
+            Some(CameraOpenness(share)) if *share < 1.0 => share.max(0.0),
+            _ => 1.0,
+        },
         options: options.copied().unwrap_or_default(),
         styled,
     });

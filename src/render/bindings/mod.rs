@@ -221,7 +221,7 @@ fn prepare_bind_group(
         camera: [x, view.camera.y as f32, z],
         focal_length_pixels: view.focal_pixels,
         mean_cover: placement.mean_cover,
-        padding: 0.0,
+        openness: view.openness,
         noise_block: [block_x, block_z],
         forest_surface: forest_surface(scene.ground.as_ref().map(|(_, ground, _)| ground), view.focal_pixels),
         crown_albedo: placement.crown_albedo.to_array(),

@@ -20,8 +20,8 @@ pub struct FrameUniform {
     pub focal_length_pixels: f32,
     /// Mean canopy cover where the terrain is known, 0..1.
     pub mean_cover: f32,
-    /// WGSL aligns vectors of two to 8 bytes.
-    pub padding: f32,
+    /// How open the camera's place is, 0..1.
+    pub openness: f32,
     /// The camera's block of the ground's noise: column and row, modulo 2³².
     pub noise_block: [i32; 2],
     /// The forest as a surface: distances at which it begins and at which no tree is drawn, and its height above the ground, metres.
