@@ -3,7 +3,7 @@
 #define_import_path canopy::sun_visibility
 
 #import canopy::constants::MAX_CASCADES
-#import canopy::frame::{frame, light, shadow, shadow_map, shadow_sampler, ground_texture, sky_sampler}
+#import canopy::frame::{frame, light, shadow, shadow_map, shadow_sampler, ground_texture, openness_texture, sky_sampler}
 
 // The ground map's values below a point.
 struct GroundSample {
@@ -21,6 +21,12 @@ fn sample_ground(relative: vec3<f32>) -> GroundSample {
     let uv = (relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;
     let texel = textureSampleLevel(ground_texture, sky_sampler, uv, 0.0);
     return GroundSample(texel.x, texel.y, texel.z, texel.w);
+}
+
+// The fraction of the sky's light that arrives where relief hides a part of the sky: on leaves, and on level ground (w).
+fn sky_openness(relative: vec3<f32>) -> vec4<f32> {
+    let uv = (relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;
+    return textureSampleLevel(openness_texture, sky_sampler, uv, 0.0);
 }
 
 // Light that clears the terrain: a penumbra that widens with the distance to the ridge is approximated by one of

@@ -8,7 +8,7 @@
 #import canopy::output::finish
 #import canopy::sky::sky_transfer
 #import canopy::stand::{stand_light, in_stand_by_transfer, evaluate_two_bands}
-#import canopy::sun_visibility::{sample_ground, terrain_visibility, cascaded_visibility}
+#import canopy::sun_visibility::{sample_ground, sky_openness, terrain_visibility, cascaded_visibility}
 #ifdef STYLED
 #import canopy::constants::WOOD_LAYER
 #import canopy::instance::{Crown, crown_of}
@@ -176,7 +176,8 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.lobe_room = variants[variant].lobe_room;
     surface.gloss_isotropy = max(surface.isotropic_fraction, variants[variant].realigned * (1.0 - published));
     let ground = sample_ground(in.relative);
-    let stand = stand_light(ground.surrounding_cover * variants[variant].cover_weight, 1.0 - look.relative_height);
+    var stand = stand_light(ground.surrounding_cover * variants[variant].cover_weight, 1.0 - look.relative_height);
+    stand.sky_transmittance *= sky_openness(in.relative).rgb;
     let open = terrain_visibility(ground, look.height);
 #ifdef TRANSFER
     let stored = textureSampleLevel(light_textures, texture_sampler, in.uv, cloud_variants[variant].light_layer, level) * LIGHT_SCALE;

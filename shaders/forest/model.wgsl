@@ -5,7 +5,7 @@
 #import canopy::lighting::{Surface, shade, shade_matt, exitant, exitant_matt, transferred_key_light, even_sky, leaf_transmission}
 #import canopy::output::finish
 #import canopy::stand::{StandLight, stand_light, trunk_light}
-#import canopy::sun_visibility::{sample_ground, terrain_visibility, cascaded_visibility, LeafSample, cascaded_leaf_visibility}
+#import canopy::sun_visibility::{sample_ground, sky_openness, terrain_visibility, cascaded_visibility, LeafSample, cascaded_leaf_visibility}
 
 #ifdef LAYERED
 #import canopy::lighting::key_light
@@ -144,7 +144,8 @@ fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index
     out.threshold = level_threshold(level_distance(packed, tree));
 #ifdef TRANSFER
     let ground = sample_ground(position.relative);
-    let stand = light_at(ground.surrounding_cover, 1.0 - look.relative_height);
+    var stand = light_at(ground.surrounding_cover, 1.0 - look.relative_height);
+    stand.sky_transmittance *= sky_openness(position.relative).rgb;
     let sky = light_in_stand(vertex, tree.yaw_code, stand);
     out.front_sky = sky.front;
     out.back_sky = sky.back;
@@ -292,7 +293,8 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
 #else
     surface.ambient_visibility = with_indirect_ambient(look.ambient_visibility, part.ambient_term);
     let neighbours = ground.surrounding_cover * part.cover_weight;
-    let stand = light_at(neighbours, 1.0 - look.relative_height);
+    var stand = light_at(neighbours, 1.0 - look.relative_height);
+    stand.sky_transmittance *= sky_openness(in.relative).rgb;
 #ifdef LAYERED
     var under_sky = surface;
     under_sky.transmission *= sky_factors.y / max(sky_factors.x, 1e-3);

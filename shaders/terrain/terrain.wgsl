@@ -6,7 +6,7 @@
 #import canopy::lighting::{LUMINANCE, Surface, shade_matt, even_sky}
 #import canopy::output::finish
 #import canopy::stand::{ground_light, stand_light}
-#import canopy::sun_visibility::{GroundSample, sample_ground, terrain_visibility, cascaded_visibility}
+#import canopy::sun_visibility::{GroundSample, sample_ground, sky_openness, terrain_visibility, cascaded_visibility}
 #ifdef SOFT_SHADOW
 #import canopy::sun_visibility::soft_cascaded_visibility
 #endif
@@ -245,7 +245,10 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.ambient_visibility = mix(seen.color.ambient_visibility, 0.85, seen.far);
     let shade_cover = select(seen.ground.surrounding_cover, 0.0, seen.outside);
 
-    let stand = ground_light(shade_cover);
+    var stand = ground_light(shade_cover);
+    // Forest that is seen as a surface has the light of leaves.
+    let openness = sky_openness(in.relative);
+    stand.sky_transmittance *= mix(vec3(openness.w), openness.rgb, seen.far);
     var visibility = select(terrain_visibility(seen.ground, 0.0), 1.0, seen.outside);
     if visibility > 0.0 {
 #ifdef SOFT_SHADOW

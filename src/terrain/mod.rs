@@ -4,7 +4,8 @@
 //! read::read_terrain (GeoTIFF, ESRI ASCII, .hgt, PNG) --+
 //!                                                       +--> HeightField --> Terrain: height, normal, slope
 //! noise::NoiseTerrain::height_field --------------------+                      |-> tiles: levels of detail to draw
-//!                                                                              +-> sun_horizon: shadow of the relief
+//!                                                                              |-> sun_horizon: shadow of the relief
+                                                                              +-> relief_horizon: what of the sky it hides
 //! ```
 //!
 //! The local frame of everything here: metres, origin at the centre of the field, x east, z south, heights above the
@@ -21,6 +22,7 @@ mod holes;
 pub mod noise;
 mod projection;
 pub mod read;
+pub mod relief_horizon;
 pub mod sun_horizon;
 mod surface;
 pub mod tiles;

@@ -56,6 +56,7 @@ pub fn frame_layout() -> BindGroupLayoutDescriptor {
                 sampler(SamplerBindingType::Comparison),
                 texture_2d(TextureSampleType::Float { filterable: true }),
                 texture_2d(TextureSampleType::Float { filterable: true }),
+                texture_2d(TextureSampleType::Float { filterable: true }),
             ),
         ),
     )
@@ -83,6 +84,8 @@ pub struct SharedTextures {
     pub ground: TextureView,
     /// Light inside a stand.
     pub stand_light: TextureView,
+    /// The fraction of the sky's light that arrives where relief hides a part of the sky, over the same area as `ground`.
+    pub sky_openness: TextureView,
 }
 
 impl FromWorld for SharedTextures {
@@ -100,7 +103,7 @@ impl FromWorld for SharedTextures {
             view_formats: &[],
         });
         let layers = TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..Default::default() };
-        Self { sky: texel(), shadow_maps: depth.create_view(&layers), ground: texel(), stand_light: texel() }
+        Self { sky: texel(), shadow_maps: depth.create_view(&layers), ground: texel(), stand_light: texel(), sky_openness: texel() }
     }
 }
 
@@ -252,6 +255,7 @@ fn prepare_bind_group(
             &buffers.shadow_sampler,
             &textures.ground,
             &textures.stand_light,
+            &textures.sky_openness,
         )),
     );
     group.0 = Some((view.entity, made));

@@ -1,0 +1,151 @@
+//! A texture of the terrain seen from above, over the same area as the [ground map](super::ground_map): the fraction of the sky's light that
+//! arrives where relief hides a part of the sky.
+
+use std::sync::Arc;
+
+use bevy::{
+    ecs::{
+        resource::Resource,
+        system::{Res, ResMut},
+        world::{FromWorld, World},
+    },
+    render::renderer::{RenderDevice, RenderQueue},
+};
+use glam::{DVec2, Vec4};
+use half::f16;
+use rayon::prelude::*;
+
+use crate::{
+    light::SkyOpenness,
+    render::{
+        bindings::SharedTextures,
+        components::{Daylight, LightUpdates},
+        extract::ExtractedScene,
+        follow::{Followed, Follower},
+        light_table::LightTable,
+        report::FrameReport,
+    },
+    terrain::{
+        Terrain,
+        relief_horizon::{AZIMUTHS, Horizon, horizons},
+    },
+};
+
+/// Texels along the longer side of the terrain's data.
+const LONGEST_SIDE: f64 = 64.0;
+/// The most texels along the longer side of a map that reaches beyond them.
+const MOST_SIDE: f64 = 128.0;
+/// Metres within which relief counts.
+const FARTHEST: f64 = 12_000.0;
+
+/// The fraction of the sky's light on leaves (RGB) and on level ground (A).
+#[derive(Resource)]
+pub struct SkyOpennessMap {
+    table: LightTable<(ReliefKey, Daylight)>,
+    horizons: Follower<ReliefKey, Arc<Vec<Horizon>>>,
+}
+
+/// What horizons depend on. Terrains are compared by address.
+#[derive(Clone)]
+struct ReliefKey {
+    terrain: Arc<Terrain>,
+    /// Metres beyond the data that the map reaches.
+    surroundings: f64,
+}
+
+impl PartialEq for ReliefKey {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.terrain, &other.terrain) && self.surroundings == other.surroundings
+    }
+}
+
+impl ReliefKey {
+    fn is_level(&self) -> bool {
+        let (low, high) = self.terrain.min_max_height();
+        low == high
+    }
+
+    fn extent(&self) -> DVec2 {
+        self.terrain.extent() + 2.0 * self.surroundings
+    }
+
+    /// Columns and rows.
+    fn size(&self) -> (u32, u32) {
+        if self.is_level() {
+            return (1, 1);
+        }
+        let extent = self.extent();
+        let texel = (self.terrain.extent().max_element() / LONGEST_SIDE).max(extent.max_element() / MOST_SIDE);
+        ((extent.x / texel).ceil().max(1.0) as u32, (extent.y / texel).ceil().max(1.0) as u32)
+    }
+
+    fn horizons(&self) -> Vec<Horizon> {
+        if self.is_level() {
+            return vec![[0.0; AZIMUTHS]];
+        }
+        let (columns, rows) = self.size();
+        horizons(&self.terrain, self.extent(), columns as usize, rows as usize, FARTHEST)
+    }
+}
+
+impl FromWorld for SkyOpennessMap {
+    fn from_world(world: &mut World) -> Self {
+        Self::open(world.resource::<RenderDevice>(), world.resource::<RenderQueue>())
+    }
+}
+
+impl SkyOpennessMap {
+    /// The map without a ground: the whole sky is seen.
+    fn open(device: &RenderDevice, queue: &RenderQueue) -> Self {
+        let table = LightTable::new(device, "canopy_sky_openness", (1, 1));
+        table.write(queue, &[[f16::ONE; 4]]);
+        Self { table, horizons: Follower::default() }
+    }
+}
+
+/// Updates the map and passes it to all passes.
+pub fn prepare_sky_openness(
+    scene: Res<ExtractedScene>,
+    device: Res<RenderDevice>,
+    queue: Res<RenderQueue>,
+    report: Res<FrameReport>,
+    mut map: ResMut<SkyOpennessMap>,
+    mut textures: ResMut<SharedTextures>,
+) {
+    update(&mut map, &scene, &device, &queue, &report);
+    textures.sky_openness = map.table.view().clone();
+}
+
+fn update(
+    map: &mut SkyOpennessMap,
+    scene: &ExtractedScene,
+    device: &RenderDevice,
+    queue: &RenderQueue,
+    report: &FrameReport,
+) {
+    let Some((_, ground, _)) = &scene.ground else {
+        // A despawned ground is freed.
+        if map.horizons.key().is_some() {
+            *map = SkyOpennessMap::open(device, queue);
+        }
+        return;
+    };
+    let Some(daylight) = &scene.daylight else { return };
+    let surroundings = if ground.surroundings.is_finite() { ground.surroundings.clamp(0.0, 1e6) } else { 0.0 };
+    let wanted = ReliefKey { terrain: ground.terrain.clone(), surroundings };
+    let key = wanted.clone();
+    let followed =
+        map.horizons.follow(&wanted, LightUpdates::Blocking, |_| false, move || Arc::new(key.horizons()));
+    let Some(horizons) = map.horizons.value().cloned() else { return };
+    map.table.resize(device, wanted.size());
+    let uploaded = map.table.update(queue, (wanted, daylight.clone()), || {
+        let sky = SkyOpenness::new(&daylight.0, AZIMUTHS);
+        let texel = |horizon: &Horizon| -> [f16; 4] { Vec4::to_array(&sky.behind(horizon)).map(f16::from_f32) };
+        horizons.par_iter().map(texel).collect::<Vec<_>>()
+    });
+    match (followed, uploaded) {
+        (Followed::Same, false) => report.skipped("sky behind relief", "light and terrain have not changed"),
+        (Followed::Same, true) => report.ran("sky behind relief", format!("{} cells", horizons.len())),
+        _ => report.ran("sky behind relief", format!("{} cells, with their horizons", horizons.len())),
+    }
+}
