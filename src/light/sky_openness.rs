@@ -73,8 +73,13 @@ mod tests {
 
     fn light(elevation: f64) -> LightState {
         let atmosphere = Atmosphere::new(AtmosphereParams::default()).unwrap();
-        LightState::new(&atmosphere, SunPosition::from_degrees(90.0, elevation).unwrap(), None, &LightSettings::default())
-            .unwrap()
+        LightState::new(
+            &atmosphere,
+            SunPosition::from_degrees(90.0, elevation).unwrap(),
+            None,
+            &LightSettings::default(),
+        )
+        .unwrap()
     }
 
     #[test]

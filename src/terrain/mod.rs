@@ -5,7 +5,7 @@
 //!                                                       +--> HeightField --> Terrain: height, normal, slope
 //! noise::NoiseTerrain::height_field --------------------+                      |-> tiles: levels of detail to draw
 //!                                                                              |-> sun_horizon: shadow of the relief
-                                                                              +-> relief_horizon: what of the sky it hides
+//!                                                                              +-> relief_horizon: what of the sky it hides
 //! ```
 //!
 //! The local frame of everything here: metres, origin at the centre of the field, x east, z south, heights above the

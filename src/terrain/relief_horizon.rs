@@ -80,6 +80,8 @@ mod tests {
     fn level_ground_has_no_horizon() {
         let level = HeightField::new(3, 3, DVec2::splat(100.0), vec![250.0; 9]).unwrap();
         let terrain = Terrain::new(level, None, Surroundings::Mirror);
-        assert!(horizons(&terrain, DVec2::splat(200.0), 4, 4, 12_000.0).iter().flatten().all(|tangent| *tangent == 0.0));
+        assert!(
+            horizons(&terrain, DVec2::splat(200.0), 4, 4, 12_000.0).iter().flatten().all(|tangent| *tangent == 0.0)
+        );
     }
 }

@@ -103,7 +103,13 @@ impl FromWorld for SharedTextures {
             view_formats: &[],
         });
         let layers = TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..Default::default() };
-        Self { sky: texel(), shadow_maps: depth.create_view(&layers), ground: texel(), stand_light: texel(), sky_openness: texel() }
+        Self {
+            sky: texel(),
+            shadow_maps: depth.create_view(&layers),
+            ground: texel(),
+            stand_light: texel(),
+            sky_openness: texel(),
+        }
     }
 }
 

@@ -134,8 +134,7 @@ fn update(
     let surroundings = if ground.surroundings.is_finite() { ground.surroundings.clamp(0.0, 1e6) } else { 0.0 };
     let wanted = ReliefKey { terrain: ground.terrain.clone(), surroundings };
     let key = wanted.clone();
-    let followed =
-        map.horizons.follow(&wanted, LightUpdates::Blocking, |_| false, move || Arc::new(key.horizons()));
+    let followed = map.horizons.follow(&wanted, LightUpdates::Blocking, |_| false, move || Arc::new(key.horizons()));
     let Some(horizons) = map.horizons.value().cloned() else { return };
     map.table.resize(device, wanted.size());
     let uploaded = map.table.update(queue, (wanted, daylight.clone()), || {
