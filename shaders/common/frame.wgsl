@@ -98,7 +98,7 @@ struct Shadow {
 @group(0) @binding(6) var shadow_sampler: sampler_comparison;
 @group(0) @binding(7) var ground_texture: texture_2d<f32>;
 @group(0) @binding(8) var stand_texture: texture_2d<f32>;
-// The fraction of the sky's light that arrives where relief hides a part of the sky: on leaves, and on level ground (w). It lies as the ground's does.
+// The fraction of the sky's light that arrives where relief hides a part of the sky. It lies as the ground's texture does.
 @group(0) @binding(9) var openness_texture: texture_2d<f32>;
 
 // Camera-relative position, metres, of what is seen at `uv` (0..1, v down) with a reversed `depth`; for the sky (0), a point on its ray.

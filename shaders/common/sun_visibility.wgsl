@@ -23,10 +23,10 @@ fn sample_ground(relative: vec3<f32>) -> GroundSample {
     return GroundSample(texel.x, texel.y, texel.z, texel.w);
 }
 
-// The fraction of the sky's light that arrives where relief hides a part of the sky: on leaves, and on level ground (w).
-fn sky_openness(relative: vec3<f32>) -> vec4<f32> {
+// The fraction of the sky's light that arrives where relief hides a part of the sky.
+fn sky_openness(relative: vec3<f32>) -> vec3<f32> {
     let uv = (relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;
-    return textureSampleLevel(openness_texture, sky_sampler, uv, 0.0);
+    return textureSampleLevel(openness_texture, sky_sampler, uv, 0.0).rgb;
 }
 
 // Light that clears the terrain: a penumbra that widens with the distance to the ridge is approximated by one of

@@ -177,7 +177,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.gloss_isotropy = max(surface.isotropic_fraction, variants[variant].realigned * (1.0 - published));
     let ground = sample_ground(in.relative);
     var stand = stand_light(ground.surrounding_cover * variants[variant].cover_weight, 1.0 - look.relative_height);
-    stand.sky_transmittance *= sky_openness(in.relative).rgb;
+    stand.sky_transmittance *= sky_openness(in.relative);
     let open = terrain_visibility(ground, look.height);
 #ifdef TRANSFER
     let stored = textureSampleLevel(light_textures, texture_sampler, in.uv, cloud_variants[variant].light_layer, level) * LIGHT_SCALE;

@@ -253,7 +253,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let ground = sample_ground(in.relative);
     let by_transfer = variants[variant].radiance_transfer == 1u;
     var stand = stand_light(ground.surrounding_cover * variants[variant].cover_weight, 1.0 - look.relative_height);
-    stand.sky_transmittance *= sky_openness(in.relative).rgb;
+    stand.sky_transmittance *= sky_openness(in.relative);
     var visibility = terrain_visibility(ground, look.height);
 #ifdef TRANSFER
     let light_layer = cross_variants[variant].first_light_layer + in.layer.x - cross_variants[variant].first_layer;

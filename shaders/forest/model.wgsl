@@ -145,7 +145,7 @@ fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index
 #ifdef TRANSFER
     let ground = sample_ground(position.relative);
     var stand = light_at(ground.surrounding_cover, 1.0 - look.relative_height);
-    stand.sky_transmittance *= sky_openness(position.relative).rgb;
+    stand.sky_transmittance *= sky_openness(position.relative);
     let sky = light_in_stand(vertex, tree.yaw_code, stand);
     out.front_sky = sky.front;
     out.back_sky = sky.back;
@@ -294,7 +294,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.ambient_visibility = with_indirect_ambient(look.ambient_visibility, part.ambient_term);
     let neighbours = ground.surrounding_cover * part.cover_weight;
     var stand = light_at(neighbours, 1.0 - look.relative_height);
-    stand.sky_transmittance *= sky_openness(in.relative).rgb;
+    stand.sky_transmittance *= sky_openness(in.relative);
 #ifdef LAYERED
     var under_sky = surface;
     under_sky.transmission *= sky_factors.y / max(sky_factors.x, 1e-3);

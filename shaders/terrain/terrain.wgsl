@@ -246,9 +246,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let shade_cover = select(seen.ground.surrounding_cover, 0.0, seen.outside);
 
     var stand = ground_light(shade_cover);
-    // Forest that is seen as a surface has the light of leaves.
-    let openness = sky_openness(in.relative);
-    stand.sky_transmittance *= mix(vec3(openness.w), openness.rgb, seen.far);
+    stand.sky_transmittance *= sky_openness(in.relative);
     var visibility = select(terrain_visibility(seen.ground, 0.0), 1.0, seen.outside);
     if visibility > 0.0 {
 #ifdef SOFT_SHADOW

@@ -1,22 +1,22 @@
 //! How much of the sky's light arrives where relief hides a part of the sky.
 
-use std::f32::consts::{FRAC_PI_2, PI, TAU};
+use std::f32::consts::{FRAC_PI_2, TAU};
 
-use glam::{Vec3, Vec4};
+use glam::Vec3;
 
 use super::LightState;
-use crate::math::luminance;
 
 /// Bands of elevation, and parts of a direction's sector, in which the sky is summed up.
 const BANDS: usize = 45;
 const PARTS: usize = 4;
 
-/// Sums of the sky's light by direction and elevation. The relief in front of it has the radiance of level ground.
+/// Sums of the sky's light by direction and elevation, weighted as level ground does, or a closed canopy, whose crowns hide the low sky from
+/// each other. The relief in front of it has the radiance of level ground.
 #[derive(Clone, Debug)]
 pub struct SkyOpenness {
     /// For each direction: what relief takes away up to each band's lower end, and up to the zenith.
-    hidden: Vec<[Vec4; BANDS + 1]>,
-    total: Vec4,
+    hidden: Vec<[Vec3; BANDS + 1]>,
+    total: Vec3,
 }
 
 impl SkyOpenness {
@@ -25,22 +25,20 @@ impl SkyOpenness {
         let surroundings = light.surroundings();
         let directions = directions.max(1);
         let (height, width) = (FRAC_PI_2 / BANDS as f32, TAU / (directions * PARTS) as f32);
-        // Of leaves, which look in all directions, per channel; of level ground, the luminance.
-        let weighted = |radiance: Vec3, sin: f32| radiance.extend(luminance(radiance) * sin);
-        let mut total = Vec4::ZERO;
+        let mut total = Vec3::ZERO;
         let hidden = (0..directions)
             .map(|direction| {
-                let mut sums = [Vec4::ZERO; BANDS + 1];
+                let mut sums = [Vec3::ZERO; BANDS + 1];
                 for band in 0..BANDS {
                     let (sin, cos) = ((band as f32 + 0.5) * height).sin_cos();
-                    let solid_angle = cos * height * width;
+                    let weight = sin * cos * height * width;
                     sums[band + 1] = sums[band];
                     for part in 0..PARTS {
                         let within = (part as f32 + 0.5) / PARTS as f32 - 0.5;
                         let (east, north) = (TAU * (direction as f32 + within) / directions as f32).sin_cos();
                         let sky = surroundings.radiance(Vec3::new(cos * east, sin, -cos * north));
-                        total += weighted(sky, sin) * solid_angle;
-                        sums[band + 1] += weighted(sky - surroundings.ground, sin) * solid_angle;
+                        total += sky * weight;
+                        sums[band + 1] += (sky - surroundings.ground) * weight;
                     }
                 }
                 sums
@@ -49,18 +47,16 @@ impl SkyOpenness {
         Self { hidden, total }
     }
 
-    /// The fraction of the sky's light that arrives, per channel on leaves, and on level ground (w), behind a horizon of these tangents, one a
-    /// direction; 0..=1. 1 under a black sky.
-    pub fn behind(&self, horizon: &[f32]) -> Vec4 {
-        let lost: Vec4 = self.hidden.iter().zip(horizon).map(|(sums, tangent)| hidden_to(sums, tangent.atan())).sum();
+    /// The fraction of the sky's light, per channel, that arrives behind a horizon of these tangents, one a direction; 0..=1. 1 under a black sky.
+    pub fn behind(&self, horizon: &[f32]) -> Vec3 {
+        let lost: Vec3 = self.hidden.iter().zip(horizon).map(|(sums, tangent)| hidden_to(sums, tangent.atan())).sum();
         let open = |lost: f32, total: f32| if total > 0.0 { (1.0 - lost / total).clamp(0.0, 1.0) } else { 1.0 };
-        let (lost, total) = (lost.to_array(), self.total.to_array());
-        Vec4::from_array(std::array::from_fn(|channel| open(lost[channel], total[channel])))
+        Vec3::from_array(std::array::from_fn(|channel| open(lost[channel], self.total[channel])))
     }
 }
 
 /// What is hidden up to an elevation in radians.
-fn hidden_to(sums: &[Vec4; BANDS + 1], elevation: f32) -> Vec4 {
+fn hidden_to(sums: &[Vec3; BANDS + 1], elevation: f32) -> Vec3 {
     let at = (elevation / FRAC_PI_2).clamp(0.0, 1.0) * BANDS as f32;
     let band = (at as usize).min(BANDS - 1);
     sums[band].lerp(sums[band + 1], at - band as f32)
@@ -68,6 +64,8 @@ fn hidden_to(sums: &[Vec4; BANDS + 1], elevation: f32) -> Vec4 {
 
 #[cfg(test)]
 mod tests {
+    use std::f32::consts::PI;
+
     use super::*;
     use crate::light::{Atmosphere, AtmosphereParams, LightSettings, SunPosition};
 
@@ -86,13 +84,12 @@ mod tests {
     fn an_open_place_has_all_light_and_a_pit_that_of_the_ground() {
         let light = light(40.0);
         let sky = SkyOpenness::new(&light, 16);
-        assert_eq!(sky.behind(&[0.0; 16]), Vec4::ONE);
+        assert_eq!(sky.behind(&[0.0; 16]), Vec3::ONE);
         let pit = sky.behind(&[1e9; 16]);
-        let even = light.ground_radiance * 2.0 * PI;
+        let even = light.ground_radiance * PI;
         for channel in 0..3 {
             assert!((pit[channel] * sky.total[channel] / even[channel] - 1.0).abs() < 0.01, "{pit}");
         }
-        assert!((0.0..1.0).contains(&pit.w));
     }
 
     #[test]
@@ -105,8 +102,6 @@ mod tests {
         };
         let (east, west) = (ridge(4), ridge(12));
         assert!(east.x + 0.05 < west.x && west.x < 1.0, "{east} and {west}");
-        // What lies low weighs less on the ground than on leaves.
-        assert!(east.w > east.y, "{east}");
     }
 
     #[test]

@@ -11,7 +11,7 @@ use bevy::{
     },
     render::renderer::{RenderDevice, RenderQueue},
 };
-use glam::{DVec2, Vec4};
+use glam::DVec2;
 use half::f16;
 use rayon::prelude::*;
 
@@ -38,7 +38,7 @@ const MOST_SIDE: f64 = 128.0;
 /// Metres within which relief counts.
 const FARTHEST: f64 = 12_000.0;
 
-/// The fraction of the sky's light on leaves (RGB) and on level ground (A).
+/// The fraction of the sky's light, per channel.
 #[derive(Resource)]
 pub struct SkyOpennessMap {
     table: LightTable<(ReliefKey, Daylight)>,
@@ -139,7 +139,7 @@ fn update(
     map.table.resize(device, wanted.size());
     let uploaded = map.table.update(queue, (wanted, daylight.clone()), || {
         let sky = SkyOpenness::new(&daylight.0, AZIMUTHS);
-        let texel = |horizon: &Horizon| -> [f16; 4] { Vec4::to_array(&sky.behind(horizon)).map(f16::from_f32) };
+        let texel = |horizon: &Horizon| sky.behind(horizon).extend(1.0).to_array().map(f16::from_f32);
         horizons.par_iter().map(texel).collect::<Vec<_>>()
     });
     match (followed, uploaded) {
