@@ -287,8 +287,10 @@ fn gpu_structs_are_what_the_shaders_think() {
             scotopic_tint,
             scotopic_amount,
             star_frame,
-            sky_axis,
+            ground_radiance,
             star_seed,
+            shaded_hue,
+            sky_axis,
         }
     );
     twin!(layouts, "Cascade", CascadeUniform { map_from_relative, texel, radius });

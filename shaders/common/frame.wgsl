@@ -58,9 +58,13 @@ struct Light {
     scotopic_amount: f32,
     // World axes to the stars' frame.
     star_frame: mat3x3<f32>,
+    // Radiance of open, level ground.
+    ground_radiance: vec3<f32>,
+    star_seed: u32,
+    // Colour of the fraction of light that is left without the key light, relative to that of its luminance.
+    shaded_hue: vec3<f32>,
     // Unit vector to the sun in the ground plane (x, z).
     sky_axis: vec2<f32>,
-    star_seed: u32,
 }
 
 // Position of the ground map: u = (x - origin.x) * inverse_size.x in camera-relative metres.

@@ -1,19 +1,27 @@
 // Light inside a stand of trees: the transmittance of neighbouring crowns for sky and sun, and their scattered light.
-// The table comes from src/light/stand.rs, multiplied by the exposure.
+// The table comes from src/light/stand.rs, its radiance multiplied by the exposure.
 #define_import_path canopy::stand
 
 #import canopy::constants::{STAND_COVERS, STAND_DEPTHS}
-#import canopy::frame::{frame, stand_texture, sky_sampler}
+#import canopy::frame::{frame, light, stand_texture, sky_sampler}
 
 struct StandLight {
-    // Transmittance of the neighbouring crowns for the light of the sky that the own crown leaves, of what is seen.
+    // Transmittance of relief and neighbouring crowns for the light of the sky that the own crown leaves, of what is seen.
     sky_transmittance: vec3<f32>,
-    // Their transmittance for the key light.
+    // The crowns' transmittance for the key light.
     key_transmittance: f32,
     // Downwelling radiance that they scatter.
     downwelling: vec3<f32>,
-    // Upwelling radiance, less `sky_transmittance` times that of the ground around a lone tree.
+    // Upwelling radiance, less `sky_transmittance` times that of the ground around a lone tree, which the sky's harmonics have.
     upwelling: vec3<f32>,
+}
+
+// What relief leaves of the light.
+struct Relief {
+    // Fraction of the sky's light.
+    sky: vec3<f32>,
+    // Visibility of the key light, 0..1.
+    key: f32,
 }
 
 // What is seen from the open has an open way to the eye. Crowns that would hide the sky around that way would have hidden it from the eye
@@ -21,33 +29,40 @@ struct StandLight {
 // crowns. From within the stand, the way to the eye says nothing about the sky above.
 const SEEN_PART: f32 = 0.4;
 
-// In the row of a depth; the last row is the ground's. The table has five blocks, one below the other: transmittances at
-// leaves, downwelling radiance, upwelling radiance at leaves, transmittances and upwelling radiance at trunks.
-fn look_up(cover: f32, row: f32, transmittances: f32, upwelling: f32) -> StandLight {
+// What relief leaves of scattered radiance. `table` has it in the open, and the fraction of its luminance without the key light.
+fn behind_relief(table: vec4<f32>, relief: Relief) -> vec3<f32> {
+    let shaded = min(light.shaded_hue * table.a, vec3(1.0));
+    return table.rgb * ((1.0 - shaded) * relief.key + shaded * relief.sky);
+}
+
+// In the row of a depth; the last row is the ground's. The table has four blocks, one below the other: transmittances at leaves, downwelling
+// radiance, upwelling radiance, transmittances at trunks.
+fn look_up(cover: f32, row: f32, transmittances: f32, relief: Relief) -> StandLight {
     let u = (clamp(cover, 0.0, 1.0) * (STAND_COVERS - 1.0) + 0.5) / STAND_COVERS;
-    let v = (row + 0.5) / (5.0 * (STAND_DEPTHS + 1.0));
-    let first = textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 0.2 * transmittances), 0.0);
+    let v = (row + 0.5) / (4.0 * (STAND_DEPTHS + 1.0));
+    let first = textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 0.25 * transmittances), 0.0);
     var stand: StandLight;
-    stand.sky_transmittance = pow(max(first.rgb, vec3(1e-6)), vec3(1.0 - SEEN_PART * frame.openness));
+    stand.sky_transmittance = relief.sky * pow(max(first.rgb, vec3(1e-6)), vec3(1.0 - SEEN_PART * frame.openness));
     stand.key_transmittance = first.a;
-    stand.downwelling = textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 0.2), 0.0).rgb;
-    stand.upwelling = textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 0.2 * upwelling), 0.0).rgb;
+    stand.downwelling = behind_relief(textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 0.25), 0.0), relief);
+    let upwelling = behind_relief(textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 0.5), 0.0), relief);
+    stand.upwelling = upwelling - stand.sky_transmittance * light.ground_radiance;
     return stand;
 }
 
 // The light on leaves for a canopy cover of `cover`, at a depth of 0 (the tops) to 1 (the ground).
-fn stand_light(cover: f32, depth: f32) -> StandLight {
-    return look_up(cover, clamp(depth, 0.0, 1.0) * (STAND_DEPTHS - 1.0), 0.0, 2.0);
+fn stand_light(cover: f32, depth: f32, relief: Relief) -> StandLight {
+    return look_up(cover, clamp(depth, 0.0, 1.0) * (STAND_DEPTHS - 1.0), 0.0, relief);
 }
 
 // The same on wood.
-fn trunk_light(cover: f32, depth: f32) -> StandLight {
-    return look_up(cover, clamp(depth, 0.0, 1.0) * (STAND_DEPTHS - 1.0), 3.0, 4.0);
+fn trunk_light(cover: f32, depth: f32, relief: Relief) -> StandLight {
+    return look_up(cover, clamp(depth, 0.0, 1.0) * (STAND_DEPTHS - 1.0), 3.0, relief);
 }
 
 // The light on the ground.
-fn ground_light(cover: f32) -> StandLight {
-    return look_up(cover, STAND_DEPTHS, 0.0, 2.0);
+fn ground_light(cover: f32, relief: Relief) -> StandLight {
+    return look_up(cover, STAND_DEPTHS, 0.0, relief);
 }
 
 // Spherical harmonics of the first two bands in a direction, not below zero: the first coefficient, and the second

@@ -4,6 +4,7 @@
 
 #import canopy::constants::MAX_CASCADES
 #import canopy::frame::{frame, light, shadow, shadow_map, shadow_sampler, ground_texture, openness_texture, sky_sampler}
+#import canopy::stand::Relief
 
 // The ground map's values below a point.
 struct GroundSample {
@@ -23,17 +24,18 @@ fn sample_ground(relative: vec3<f32>) -> GroundSample {
     return GroundSample(texel.x, texel.y, texel.z, texel.w);
 }
 
-// The fraction of the sky's light that arrives where relief hides a part of the sky.
-fn sky_openness(relative: vec3<f32>) -> vec3<f32> {
-    let uv = (relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;
-    return textureSampleLevel(openness_texture, sky_sampler, uv, 0.0).rgb;
-}
-
 // Light that clears the terrain: a penumbra that widens with the distance to the ridge is approximated by one of
 // fixed height, the sun's disc over a kilometre. It lies below the horizon, because open ground is its own
 // horizon: centred on it, the penumbra would halve the light there.
 fn terrain_visibility(ground: GroundSample, height_above_ground: f32) -> f32 {
     return smoothstep(-6.0, 0.0, height_above_ground - ground.shadow_height);
+}
+
+// What relief leaves of the light at a point.
+fn relief_at(relative: vec3<f32>, ground: GroundSample, height_above_ground: f32) -> Relief {
+    let uv = (relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;
+    let sky = textureSampleLevel(openness_texture, sky_sampler, uv, 0.0).rgb;
+    return Relief(sky, terrain_visibility(ground, height_above_ground));
 }
 
 // Metres.

@@ -8,7 +8,7 @@
 #import canopy::output::finish
 #import canopy::sky::sky_transfer
 #import canopy::stand::{stand_light, in_stand_by_transfer, evaluate_two_bands}
-#import canopy::sun_visibility::{sample_ground, sky_openness, terrain_visibility, cascaded_visibility}
+#import canopy::sun_visibility::{sample_ground, relief_at, cascaded_visibility}
 #ifdef STYLED
 #import canopy::constants::WOOD_LAYER
 #import canopy::instance::{Crown, crown_of}
@@ -176,16 +176,15 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.lobe_room = variants[variant].lobe_room;
     surface.gloss_isotropy = max(surface.isotropic_fraction, variants[variant].realigned * (1.0 - published));
     let ground = sample_ground(in.relative);
-    var stand = stand_light(ground.surrounding_cover * variants[variant].cover_weight, 1.0 - look.relative_height);
-    stand.sky_transmittance *= sky_openness(in.relative);
-    let open = terrain_visibility(ground, look.height);
+    let relief = relief_at(in.relative, ground, look.height);
+    let stand = stand_light(ground.surrounding_cover * variants[variant].cover_weight, 1.0 - look.relative_height, relief);
 #ifdef TRANSFER
     let stored = textureSampleLevel(light_textures, texture_sampler, in.uv, cloud_variants[variant].light_layer, level) * LIGHT_SCALE;
     let side = in.right * stored.x + in.up * stored.y + in.front * stored.z;
     // The second band is not relative to the mean here.
     let around = in_stand_by_transfer(sky_transfer(stored.w, side), vec3(stored.w), vec3(side.y / max(stored.w, 1e-3)), stand);
     let zenith = variants[variant].indirect_sun_zenith * light.key_direction.y;
-    let indirect = evaluate_two_bands(variants[variant].indirect_sun_mean, zenith) * stand.key_transmittance * open;
+    let indirect = evaluate_two_bands(variants[variant].indirect_sun_mean, zenith) * stand.key_transmittance * relief.key;
     let indirect_sun = light.key_illuminance * variants[variant].indirect_sun_color * indirect;
     var sky = (1.0 + surface.transmission) * (around + indirect_sun);
 #ifdef PLAIN_TOO
@@ -196,7 +195,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.ambient_visibility = with_indirect_ambient(properties.b, ambient_term);
     let sky = even_sky(surface, stand);
 #endif
-    var visibility = open;
+    var visibility = relief.key;
     if visibility > 0.0 {
         let cascades = cascaded_visibility(in.relative, normal, SHADOW_BIAS, in.clip.xy);
         visibility *= mix(1.0, cascades.visibility, cascades.weight);

@@ -9,7 +9,7 @@
 #import canopy::output::finish
 #import canopy::sky::sky_transfer
 #import canopy::stand::{stand_light, in_stand_by_transfer}
-#import canopy::sun_visibility::{sample_ground, sky_openness, terrain_visibility, cascaded_visibility}
+#import canopy::sun_visibility::{sample_ground, relief_at, cascaded_visibility}
 #ifdef STYLED
 #import canopy::constants::WOOD_LAYER
 #import canopy::style_surface::{StyledSurface, styled_surface, crown_surface, individual}
@@ -252,9 +252,9 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.gloss_isotropy = max(surface.isotropic_fraction, variants[variant].realigned * (1.0 - published));
     let ground = sample_ground(in.relative);
     let by_transfer = variants[variant].radiance_transfer == 1u;
-    var stand = stand_light(ground.surrounding_cover * variants[variant].cover_weight, 1.0 - look.relative_height);
-    stand.sky_transmittance *= sky_openness(in.relative);
-    var visibility = terrain_visibility(ground, look.height);
+    let relief = relief_at(in.relative, ground, look.height);
+    let stand = stand_light(ground.surrounding_cover * variants[variant].cover_weight, 1.0 - look.relative_height, relief);
+    var visibility = relief.key;
 #ifdef TRANSFER
     let light_layer = cross_variants[variant].first_light_layer + in.layer.x - cross_variants[variant].first_layer;
     let stored = textureSampleLevel(light_textures, texture_sampler, in.uv, light_layer, level) * LIGHT_SCALE;

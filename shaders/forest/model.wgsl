@@ -4,8 +4,8 @@
 #import canopy::instance::{view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_distance, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, leaf_visibility, crown_of, depth_in_crown}
 #import canopy::lighting::{Surface, shade, shade_matt, exitant, exitant_matt, transferred_key_light, even_sky, leaf_transmission}
 #import canopy::output::finish
-#import canopy::stand::{StandLight, stand_light, trunk_light}
-#import canopy::sun_visibility::{sample_ground, sky_openness, terrain_visibility, cascaded_visibility, LeafSample, cascaded_leaf_visibility}
+#import canopy::stand::{Relief, StandLight, stand_light, trunk_light}
+#import canopy::sun_visibility::{sample_ground, relief_at, cascaded_visibility, LeafSample, cascaded_leaf_visibility}
 
 #ifdef LAYERED
 #import canopy::lighting::key_light
@@ -117,11 +117,11 @@ struct Varying {
 }
 
 // The light in the stand on this part.
-fn light_at(cover: f32, depth: f32) -> StandLight {
+fn light_at(cover: f32, depth: f32, relief: Relief) -> StandLight {
 #ifdef FOLIAGE
-    return stand_light(cover, depth);
+    return stand_light(cover, depth, relief);
 #else
-    return trunk_light(cover, depth);
+    return trunk_light(cover, depth, relief);
 #endif
 }
 
@@ -144,14 +144,14 @@ fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index
     out.threshold = level_threshold(level_distance(packed, tree));
 #ifdef TRANSFER
     let ground = sample_ground(position.relative);
-    var stand = light_at(ground.surrounding_cover, 1.0 - look.relative_height);
-    stand.sky_transmittance *= sky_openness(position.relative);
+    let relief = relief_at(position.relative, ground, look.height);
+    let stand = light_at(ground.surrounding_cover, 1.0 - look.relative_height, relief);
     let sky = light_in_stand(vertex, tree.yaw_code, stand);
     out.front_sky = sky.front;
     out.back_sky = sky.back;
 #ifndef SUN_HARMONICS
     let to_light = rotate(light.key_direction, vec2(tree.yaw.x, -tree.yaw.y));
-    let indirect = indirect_sun(vertex, to_light) * (stand.key_transmittance * terrain_visibility(ground, look.height));
+    let indirect = indirect_sun(vertex, to_light) * (stand.key_transmittance * relief.key);
     out.front_sky += indirect;
     out.back_sky += indirect;
 #endif
@@ -268,6 +268,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
 #endif
     surface.normal = normal;
     let ground = sample_ground(in.relative);
+    let relief = relief_at(in.relative, ground, look.height);
 #ifdef LAYERED
     let tissue = Tissue(
         select(part.front_reflected, part.back_reflected, behind),
@@ -293,8 +294,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
 #else
     surface.ambient_visibility = with_indirect_ambient(look.ambient_visibility, part.ambient_term);
     let neighbours = ground.surrounding_cover * part.cover_weight;
-    var stand = light_at(neighbours, 1.0 - look.relative_height);
-    stand.sky_transmittance *= sky_openness(in.relative);
+    let stand = light_at(neighbours, 1.0 - look.relative_height, relief);
 #ifdef LAYERED
     var under_sky = surface;
     under_sky.transmission *= sky_factors.y / max(sky_factors.x, 1e-3);
@@ -303,7 +303,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let sky = even_sky(surface, stand);
 #endif
 #endif
-    var visibility = terrain_visibility(ground, look.height);
+    var visibility = relief.key;
     var lit_side = normal;
 #ifdef FOLIAGE
     // A leaf that is lit from behind must not shade itself: its light arrives on the other side.

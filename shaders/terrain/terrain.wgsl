@@ -5,8 +5,8 @@
 #import canopy::ground_color::{GroundColor, ground_color}
 #import canopy::lighting::{LUMINANCE, Surface, shade_matt, even_sky}
 #import canopy::output::finish
-#import canopy::stand::{ground_light, stand_light}
-#import canopy::sun_visibility::{GroundSample, sample_ground, sky_openness, terrain_visibility, cascaded_visibility}
+#import canopy::stand::{Relief, ground_light, stand_light}
+#import canopy::sun_visibility::{GroundSample, sample_ground, relief_at, cascaded_visibility}
 #ifdef SOFT_SHADOW
 #import canopy::sun_visibility::soft_cascaded_visibility
 #endif
@@ -245,9 +245,10 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.ambient_visibility = mix(seen.color.ambient_visibility, 0.85, seen.far);
     let shade_cover = select(seen.ground.surrounding_cover, 0.0, seen.outside);
 
-    var stand = ground_light(shade_cover);
-    stand.sky_transmittance *= sky_openness(in.relative);
-    var visibility = select(terrain_visibility(seen.ground, 0.0), 1.0, seen.outside);
+    let within = relief_at(in.relative, seen.ground, 0.0);
+    let relief = Relief(within.sky, select(within.key, 1.0, seen.outside));
+    let stand = ground_light(shade_cover, relief);
+    var visibility = relief.key;
     if visibility > 0.0 {
 #ifdef SOFT_SHADOW
         let cascades = soft_cascaded_visibility(in.relative, seen.normal, in.clip.xy);
@@ -257,7 +258,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         // Beyond the maps: the fraction of light that passes between the crowns.
         let passed = mix(stand.key_transmittance, cascades.visibility, cascades.weight);
         // A canopy is rough: in low light its crowns shade each other near their tops, as those of drawn trees do.
-        visibility *= mix(passed, stand_light(seen.cover, CROWN_DEPTH).key_transmittance, seen.far);
+        visibility *= mix(passed, stand_light(seen.cover, CROWN_DEPTH, relief).key_transmittance, seen.far);
     }
     return finish(in.relative, shade_matt(surface, visibility, even_sky(surface, stand)), 1.0);
 }

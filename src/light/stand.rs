@@ -124,6 +124,10 @@ pub struct StandSample {
     pub downwelling: Vec3,
     /// Upwelling radiance: from leaves and ground below.
     pub upwelling: Vec3,
+    /// The downwelling radiance where relief hides the key light.
+    pub shaded_downwelling: Vec3,
+    /// The upwelling radiance there.
+    pub shaded_upwelling: Vec3,
 }
 
 /// Table of the light in a stand at one instant, over covers and depths.
@@ -140,12 +144,13 @@ pub struct StandLight {
 type Ring = (f32, Vec3);
 
 impl StandLight {
-    /// Computes the table for a light and the stand's trees, with some 150,000 exponentials. Finite and never negative
+    /// Computes the table for a light and the stand's trees, with some 250,000 exponentials. Finite and never negative
     /// for any light.
     pub fn new(light: &LightState, trees: &StandTrees) -> Self {
         let open = albedo(light);
         let rings = rings(light);
         let sun = Sun { sine: light.key_direction.y, illuminance: light.key_illuminance };
+        let hidden_sun = Sun { illuminance: Vec3::ZERO, ..sun };
         let own = (0..DEPTHS).map(|row| OwnSky::new(&trees.own_crown(), row as f32 / (DEPTHS - 1) as f32));
         let own: Vec<OwnSky> = own.collect();
         let mut samples = vec![StandSample::default(); COVERS * (DEPTHS + 1)];
@@ -153,30 +158,34 @@ impl StandLight {
         for column in 0..COVERS {
             let cover = column as f32 / (COVERS - 1) as f32;
             let layer = Layer::new(cover, trees);
-            let streams = Streams::new(&layer, &rings, &sun, trees, open.lerp(FLOOR, cover));
+            let ground = open.lerp(FLOOR, cover);
+            let streams = Streams::new(&layer, &rings, &sun, trees, ground);
+            let shaded = Streams::new(&layer, &rings, &hidden_sun, trees, ground);
             for row in 0..=DEPTHS {
                 let depth = (row as f32 / (DEPTHS - 1) as f32).min(1.0);
-                let (downwelling, upwelling) = streams.at((depth / layer.length).min(1.0));
-                let sample = match own.get(row) {
-                    Some(own) => StandSample {
-                        sky_transmittance: own.of_leaves(&layer, &rings),
-                        trunk_sky_transmittance: own.of_trunk(&layer, &rings),
-                        sun_transmittance: layer.neighbour_transmittance(depth, sun.sine),
-                        downwelling,
-                        upwelling,
-                    },
+                let within = (depth / layer.length).min(1.0);
+                let (downwelling, upwelling) = streams.at(within);
+                let (shaded_downwelling, shaded_upwelling) = shaded.at(within);
+                let (sky_transmittance, trunk_sky_transmittance, sun_transmittance) = match own.get(row) {
+                    Some(own) => (
+                        own.of_leaves(&layer, &rings),
+                        own.of_trunk(&layer, &rings),
+                        layer.neighbour_transmittance(depth, sun.sine),
+                    ),
                     None => {
-                        let sky_transmittance = layer.sky_flux_transmittance(&rings);
-                        StandSample {
-                            sky_transmittance,
-                            trunk_sky_transmittance: sky_transmittance,
-                            sun_transmittance: layer.transmittance(1.0, sun.sine),
-                            downwelling,
-                            upwelling,
-                        }
+                        let sky = layer.sky_flux_transmittance(&rings);
+                        (sky, sky, layer.transmittance(1.0, sun.sine))
                     }
                 };
-                samples[row * COVERS + column] = sample;
+                samples[row * COVERS + column] = StandSample {
+                    sky_transmittance,
+                    trunk_sky_transmittance,
+                    sun_transmittance,
+                    downwelling,
+                    upwelling,
+                    shaded_downwelling,
+                    shaded_upwelling,
+                };
                 if row < DEPTHS {
                     shares[row * COVERS + column] = streams.share_ln((depth / layer.length).min(1.0));
                 }
@@ -232,6 +241,8 @@ fn mix(a: &StandSample, b: &StandSample, t: f32) -> StandSample {
         sun_transmittance: a.sun_transmittance + (b.sun_transmittance - a.sun_transmittance) * t,
         downwelling: a.downwelling.lerp(b.downwelling, t),
         upwelling: a.upwelling.lerp(b.upwelling, t),
+        shaded_downwelling: a.shaded_downwelling.lerp(b.shaded_downwelling, t),
+        shaded_upwelling: a.shaded_upwelling.lerp(b.shaded_upwelling, t),
     }
 }
 
@@ -458,6 +469,22 @@ mod tests {
             // Sums over rings against a finer quadrature.
             assert!(up < 0.01, "{up}");
         }
+    }
+
+    #[test]
+    fn behind_relief_there_is_the_light_of_the_sky_alone() {
+        let lit = light(12.0);
+        let mut unlit = lit.clone();
+        unlit.ground_radiance = albedo(&lit) / PI * lit.sky_illuminance;
+        unlit.key_illuminance = Vec3::ZERO;
+        let [shaded, dark] = [&lit, &unlit].map(|light| StandLight::new(light, &leaves(0.1, 0.1)));
+        for (a, b) in shaded.samples().iter().zip(dark.samples()) {
+            let near = |a: Vec3, b: Vec3| (a - b).abs().max_element() <= 1e-4 * b.max_element();
+            assert!(near(a.shaded_downwelling, b.downwelling) && near(a.shaded_upwelling, b.upwelling), "{a:?}, {b:?}");
+            assert!(a.shaded_downwelling.cmple(a.downwelling).all() && a.shaded_upwelling.cmple(a.upwelling).all());
+        }
+        let deep = shaded.at(0.7, 0.3);
+        assert!(deep.shaded_downwelling.y < 0.9 * deep.downwelling.y, "{deep:?}");
     }
 
     #[test]

@@ -3,7 +3,10 @@
 use glam::{Mat3, Vec3};
 
 use super::uniforms::LightUniform;
-use crate::light::{LightState, sh::cosine_coefficient, sun::SUN_ANGULAR_RADIUS};
+use crate::{
+    light::{LightState, sh::cosine_coefficient, sun::SUN_ANGULAR_RADIUS},
+    math::color::luminance,
+};
 
 /// The largest value that is written to a half-float target.
 const BRIGHTEST: f32 = 6.0e4;
@@ -45,12 +48,44 @@ pub fn light_uniform(light: &LightState, exposure: f32) -> LightUniform {
         scotopic_tint: finite(light.scotopic.tint),
         scotopic_amount: light.scotopic.amount,
         star_frame: star_frame(rotation),
-        sky_axis: [axis.x, axis.y],
+        ground_radiance: finite(light.ground_radiance * exposure),
         star_seed: light.night.stars.seed,
+        shaded_hue: finite(shaded_hue(light)),
         padding: 0,
+        sky_axis: [axis.x, axis.y],
+        end_padding: [0; 2],
     }
+}
+
+/// The fraction of the light on open ground that is left in shade, per channel, relative to that of its luminance; white without light.
+fn shaded_hue(light: &LightState) -> Vec3 {
+    let lit = light.sky_illuminance + light.key_illuminance * light.key_direction.y.max(0.0);
+    let fraction = luminance(light.sky_illuminance) / luminance(lit);
+    let hue = light.sky_illuminance / (lit * fraction);
+    if hue.is_finite() { hue } else { Vec3::ONE }
 }
 
 fn star_frame(rotation: Mat3) -> [[f32; 4]; 3] {
     [rotation.x_axis, rotation.y_axis, rotation.z_axis].map(|axis| axis.extend(0.0).to_array())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::light::{Atmosphere, AtmosphereParams, LightSettings, SunPosition};
+
+    #[test]
+    fn the_hue_of_shade_times_its_luminance_is_the_light_of_the_sky() {
+        let air = Atmosphere::new(AtmosphereParams::default()).unwrap();
+        for elevation in [60.0, 5.0, -0.2, -30.0] {
+            let sun = SunPosition::from_degrees(200.0, elevation).unwrap();
+            let mut light = LightState::new(&air, sun, None, &LightSettings::default()).unwrap();
+            let lit = light.sky_illuminance + light.key_illuminance * light.key_direction.y.max(0.0);
+            let shaded = lit * shaded_hue(&light) * (luminance(light.sky_illuminance) / luminance(lit));
+            assert!((shaded / light.sky_illuminance - 1.0).abs().max_element() < 1e-5, "{shaded}");
+            light.sky_illuminance = Vec3::ZERO;
+            light.key_illuminance = Vec3::ZERO;
+            assert_eq!(shaded_hue(&light), Vec3::ONE);
+        }
+    }
 }

@@ -72,12 +72,18 @@ pub struct LightUniform {
     pub scotopic_amount: f32,
     /// Rotation from the world into the stars' frame, by columns of four.
     pub star_frame: [[f32; 4]; 3],
-    /// Unit vector to the sun in the ground plane (x, z).
-    pub sky_axis: [f32; 2],
+    /// Radiance of open, level ground.
+    pub ground_radiance: [f32; 3],
     /// Seed of the star field.
     pub star_seed: u32,
-    /// WGSL rounds the size up to 16 bytes.
+    /// Colour of the fraction of light that is left without the key light, relative to that of its luminance.
+    pub shaded_hue: [f32; 3],
+    /// WGSL aligns the next member to 8 bytes.
     pub padding: u32,
+    /// Unit vector to the sun in the ground plane (x, z).
+    pub sky_axis: [f32; 2],
+    /// WGSL rounds the size up to 16 bytes.
+    pub end_padding: [u32; 2],
 }
 
 /// `Cascade` of `frame.wgsl`.

@@ -20,9 +20,10 @@ use half::f16;
 
 use crate::{
     light::{
-        LightState, StandLight, StandTrees,
-        stand::{COVERS, DEPTHS, StandSample},
+        StandLight, StandTrees,
+        stand::{COVERS, DEPTHS},
     },
+    math::color::luminance,
     render::{
         bindings::{SharedPlacement, SharedTextures},
         components::{Daylight, LightUpdates},
@@ -37,8 +38,9 @@ use crate::{
 };
 
 /// Blocks of the texture, one below the other: transmittances at leaves, downwelling radiance, upwelling radiance at leaves,
-/// transmittances and upwelling radiance at trunks.
-const BLOCKS: usize = 5;
+/// transmittances at trunks. The fourth channel has the key light's transmittance, or the fraction of the radiance's luminance that is left where
+/// relief hides the key light.
+const BLOCKS: usize = 4;
 /// The largest value that is written.
 const BRIGHTEST: f32 = 6.0e4;
 
@@ -111,7 +113,7 @@ fn upload_stand_light(
     let compute = move || StandLight::new(&key.daylight.0, &key.trees);
     let followed = light.follow(&wanted, scene.light_updates, |old| wanted.is_near(old), compute);
     let (Some(key), Some(light)) = (light.key(), light.value()) else { return };
-    let uploaded = table.update(&queue, (key.clone(), view.exposure), || texels(&key.daylight.0, light, view.exposure));
+    let uploaded = table.update(&queue, (key.clone(), view.exposure), || texels(light, view.exposure));
     match followed {
         Followed::Waited => report.ran("stand light", "computed for a new light"),
         Followed::Taken => report.ran("stand light", "computed in the background"),
@@ -122,20 +124,17 @@ fn upload_stand_light(
 }
 
 /// Half floats, block by block.
-fn texels(light: &LightState, stand: &StandLight, exposure: f32) -> Vec<[f16; 4]> {
+fn texels(stand: &StandLight, exposure: f32) -> Vec<[f16; 4]> {
     let samples = stand.samples();
-    let lit = |radiance: Vec3| (radiance * exposure).extend(0.0);
-    let through = |sky: fn(&StandSample) -> Vec3| samples.iter().map(move |at| sky(at).extend(at.sun_transmittance));
-    let upwelling = |sky: fn(&StandSample) -> Vec3| {
-        samples.iter().map(move |at| lit(at.upwelling - sky(at) * light.ground_radiance))
+    let lit = |all: Vec3, shaded: Vec3| {
+        let fraction = luminance(shaded) / luminance(all);
+        (all * exposure).extend(if fraction.is_finite() { fraction.min(1.0) } else { 1.0 })
     };
-    let (leaves, trunk): (fn(&StandSample) -> Vec3, fn(&StandSample) -> Vec3) =
-        (|at| at.sky_transmittance, |at| at.trunk_sky_transmittance);
-    let mut texels: Vec<Vec4> = through(leaves).collect();
-    texels.extend(samples.iter().map(|sample| lit(sample.downwelling)));
-    texels.extend(upwelling(leaves));
-    texels.extend(through(trunk));
-    texels.extend(upwelling(trunk));
-    let half = |value: f32| f16::from_f32(value.clamp(-BRIGHTEST, BRIGHTEST));
+    let mut texels: Vec<Vec4> = Vec::with_capacity(BLOCKS * samples.len());
+    texels.extend(samples.iter().map(|at| at.sky_transmittance.extend(at.sun_transmittance)));
+    texels.extend(samples.iter().map(|at| lit(at.downwelling, at.shaded_downwelling)));
+    texels.extend(samples.iter().map(|at| lit(at.upwelling, at.shaded_upwelling)));
+    texels.extend(samples.iter().map(|at| at.trunk_sky_transmittance.extend(at.sun_transmittance)));
+    let half = |value: f32| f16::from_f32(value.min(BRIGHTEST));
     texels.iter().map(|texel| texel.to_array().map(half)).collect()
 }
