@@ -290,6 +290,7 @@ fn gpu_structs_are_what_the_shaders_think() {
             ground_radiance,
             star_seed,
             shaded_hue,
+            level_radiance,
             sky_axis,
         }
     );

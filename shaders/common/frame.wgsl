@@ -63,6 +63,8 @@ struct Light {
     star_seed: u32,
     // Colour of the fraction of light that is left without the key light, relative to that of its luminance.
     shaded_hue: vec3<f32>,
+    // Luminance of white, level ground in the light of the whole sky.
+    level_radiance: f32,
     // Unit vector to the sun in the ground plane (x, z).
     sky_axis: vec2<f32>,
 }
@@ -102,8 +104,9 @@ struct Shadow {
 @group(0) @binding(6) var shadow_sampler: sampler_comparison;
 @group(0) @binding(7) var ground_texture: texture_2d<f32>;
 @group(0) @binding(8) var stand_texture: texture_2d<f32>;
-// The fraction of the sky's light that arrives where relief hides a part of the sky. It lies as the ground's texture does.
-@group(0) @binding(9) var openness_texture: texture_2d<f32>;
+// What relief hides of the sky's light, in two blocks, one below the other, that lie as the ground's texture does: the mean radiance over all
+// directions, over `Light::level_radiance`, with the fraction of the sky's light that is left on level ground; its mean direction.
+@group(0) @binding(9) var hidden_sky_texture: texture_2d<f32>;
 
 // Camera-relative position, metres, of what is seen at `uv` (0..1, v down) with a reversed `depth`; for the sky (0), a point on its ray.
 fn relative_position(uv: vec2<f32>, depth: f32) -> vec3<f32> {

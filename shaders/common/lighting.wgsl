@@ -47,8 +47,8 @@ fn sphere_cosine(cosine: f32) -> f32 {
 // evenly.
 fn even_sky(surface: Surface, stand: StandLight) -> vec3<f32> {
     let n = surface.normal;
-    let through = surface.transmission * in_stand(sky_irradiance(-n), -n.y, stand);
-    return (in_stand(sky_irradiance(n), n.y, stand) + through) * surface.ambient_visibility;
+    let through = surface.transmission * in_stand(sky_irradiance(-n), -n, stand);
+    return (in_stand(sky_irradiance(n), n, stand) + through) * surface.ambient_visibility;
 }
 
 // Fraction of the reflected light that has been inside a leaf (its subsurface albedo over its albedo), for a specular

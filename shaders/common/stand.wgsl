@@ -6,20 +6,27 @@
 #import canopy::frame::{frame, light, stand_texture, sky_sampler}
 
 struct StandLight {
-    // Transmittance of relief and neighbouring crowns for the light of the sky that the own crown leaves, of what is seen.
+    // Transmittance of the neighbouring crowns for the light of the sky that the own crown leaves, of what is seen.
     sky_transmittance: vec3<f32>,
-    // The crowns' transmittance for the key light.
+    // Their transmittance for the key light.
     key_transmittance: f32,
     // Downwelling radiance that they scatter.
     downwelling: vec3<f32>,
     // Upwelling radiance, less `sky_transmittance` times that of the ground around a lone tree, which the sky's harmonics have.
     upwelling: vec3<f32>,
+    // Of the sky's light that relief hides: the mean radiance over all directions, and the mean direction of its luminance.
+    hidden: vec3<f32>,
+    hidden_direction: vec3<f32>,
 }
 
-// What relief leaves of the light.
+// What relief does to the light.
 struct Relief {
-    // Fraction of the sky's light.
-    sky: vec3<f32>,
+    // Of the sky's light that it hides: the mean radiance over all directions.
+    hidden: vec3<f32>,
+    // The fraction of the sky's light that it leaves on level ground, 0..1.
+    level_fraction: f32,
+    // Mean direction of the luminance that it hides: the closer to one direction that comes from, the closer to 1 is its length.
+    direction: vec3<f32>,
     // Visibility of the key light, 0..1.
     key: f32,
 }
@@ -32,7 +39,7 @@ const SEEN_PART: f32 = 0.4;
 // What relief leaves of scattered radiance. `table` has it in the open, and the fraction of its luminance without the key light.
 fn behind_relief(table: vec4<f32>, relief: Relief) -> vec3<f32> {
     let shaded = min(light.shaded_hue * table.a, vec3(1.0));
-    return table.rgb * ((1.0 - shaded) * relief.key + shaded * relief.sky);
+    return table.rgb * ((1.0 - shaded) * relief.key + shaded * relief.level_fraction);
 }
 
 // In the row of a depth; the last row is the ground's. The table has four blocks, one below the other: transmittances at leaves, downwelling
@@ -42,11 +49,13 @@ fn look_up(cover: f32, row: f32, transmittances: f32, relief: Relief) -> StandLi
     let v = (row + 0.5) / (4.0 * (STAND_DEPTHS + 1.0));
     let first = textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 0.25 * transmittances), 0.0);
     var stand: StandLight;
-    stand.sky_transmittance = relief.sky * pow(max(first.rgb, vec3(1e-6)), vec3(1.0 - SEEN_PART * frame.openness));
+    stand.sky_transmittance = pow(max(first.rgb, vec3(1e-6)), vec3(1.0 - SEEN_PART * frame.openness));
     stand.key_transmittance = first.a;
     stand.downwelling = behind_relief(textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 0.25), 0.0), relief);
     let upwelling = behind_relief(textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 0.5), 0.0), relief);
     stand.upwelling = upwelling - stand.sky_transmittance * light.ground_radiance;
+    stand.hidden = relief.hidden;
+    stand.hidden_direction = relief.direction;
     return stand;
 }
 
@@ -71,16 +80,27 @@ fn evaluate_two_bands(mean: f32, band: f32) -> f32 {
     return max(0.28209479 * mean + 0.48860251 * band, 0.0);
 }
 
-// Irradiance over pi on what has a unit normal of the height `y`, and `open` without neighbours.
-fn in_stand(open: vec3<f32>, y: f32, stand: StandLight) -> vec3<f32> {
-    let scattered = 0.5 * ((1.0 + y) * stand.downwelling + (1.0 - y) * stand.upwelling);
-    return max(stand.sky_transmittance * open + scattered, vec3(0.0));
+// Irradiance over pi that relief hides from a unit normal: HiddenLight::from_normal of src/light/hidden_sky.rs.
+fn hidden_from(normal: vec3<f32>, stand: StandLight) -> vec3<f32> {
+    let along = dot(normal, stand.hidden_direction);
+    let lobe = 1.0 + 2.0 * along + 0.625 * (3.0 * along * along - dot(stand.hidden_direction, stand.hidden_direction));
+    return stand.hidden * max(lobe, 0.0);
 }
 
-// The same on a side whose first coefficient of transfer is `mean`, and whose second band has the component `zenith`
-// (relative to `mean`) towards the zenith: a hemisphere of radiance 1 has the coefficients sqrt(pi) and 0.4886 pi.
-fn in_stand_by_transfer(open: vec3<f32>, mean: vec3<f32>, zenith: vec3<f32>, stand: StandLight) -> vec3<f32> {
+// Irradiance over pi on what has a unit normal, and `open` without relief and neighbours.
+fn in_stand(open: vec3<f32>, normal: vec3<f32>, stand: StandLight) -> vec3<f32> {
+    let scattered = 0.5 * ((1.0 + normal.y) * stand.downwelling + (1.0 - normal.y) * stand.upwelling);
+    return max(stand.sky_transmittance * max(open - hidden_from(normal, stand), vec3(0.0)) + scattered, vec3(0.0));
+}
+
+// The same on a side whose first coefficient of transfer is `mean`, and whose second band is `band`: a vector for each channel, relative to
+// `mean`. `hidden_direction` is that of the stand in the vectors' frame. Light of the mean radiance 1 over all directions has the first
+// coefficient sqrt(4 pi), and if it comes from one direction, the second band sqrt(12 pi) there; a hemisphere of radiance 1 has the coefficients
+// sqrt(pi) and 0.4886 pi.
+fn in_stand_by_transfer(open: vec3<f32>, mean: vec3<f32>, band: mat3x3<f32>, hidden_direction: vec3<f32>, stand: StandLight) -> vec3<f32> {
+    let zenith = vec3(band[0].y, band[1].y, band[2].y);
     let even = 1.7724539 * (stand.downwelling + stand.upwelling);
     let scattered = even + 1.5349901 * zenith * (stand.downwelling - stand.upwelling);
-    return max(stand.sky_transmittance * max(open, vec3(0.0)) + mean * scattered, vec3(0.0));
+    let hidden = mean * stand.hidden * max(3.5449077 + 6.1399602 * (hidden_direction * band), vec3(0.0));
+    return max(stand.sky_transmittance * max(open - hidden, vec3(0.0)) + mean * scattered, vec3(0.0));
 }

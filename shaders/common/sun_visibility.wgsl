@@ -3,7 +3,7 @@
 #define_import_path canopy::sun_visibility
 
 #import canopy::constants::MAX_CASCADES
-#import canopy::frame::{frame, light, shadow, shadow_map, shadow_sampler, ground_texture, openness_texture, sky_sampler}
+#import canopy::frame::{frame, light, shadow, shadow_map, shadow_sampler, ground_texture, hidden_sky_texture, sky_sampler}
 #import canopy::stand::Relief
 
 // The ground map's values below a point.
@@ -31,11 +31,14 @@ fn terrain_visibility(ground: GroundSample, height_above_ground: f32) -> f32 {
     return smoothstep(-6.0, 0.0, height_above_ground - ground.shadow_height);
 }
 
-// What relief leaves of the light at a point.
+// What relief does to the light at a point.
 fn relief_at(relative: vec3<f32>, ground: GroundSample, height_above_ground: f32) -> Relief {
     let uv = (relative.xz - shadow.ground.origin) * shadow.ground.inverse_size;
-    let sky = textureSampleLevel(openness_texture, sky_sampler, uv, 0.0).rgb;
-    return Relief(sky, terrain_visibility(ground, height_above_ground));
+    let edge = 1.0 / f32(textureDimensions(hidden_sky_texture).y);
+    let v = 0.5 * clamp(uv.y, edge, 1.0 - edge);
+    let hidden = textureSampleLevel(hidden_sky_texture, sky_sampler, vec2(uv.x, v), 0.0);
+    let direction = textureSampleLevel(hidden_sky_texture, sky_sampler, vec2(uv.x, v + 0.5), 0.0).xyz;
+    return Relief(hidden.rgb * light.level_radiance, hidden.a, direction, terrain_visibility(ground, height_above_ground));
 }
 
 // Metres.

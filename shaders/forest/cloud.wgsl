@@ -182,7 +182,9 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let stored = textureSampleLevel(light_textures, texture_sampler, in.uv, cloud_variants[variant].light_layer, level) * LIGHT_SCALE;
     let side = in.right * stored.x + in.up * stored.y + in.front * stored.z;
     // The second band is not relative to the mean here.
-    let around = in_stand_by_transfer(sky_transfer(stored.w, side), vec3(stored.w), vec3(side.y / max(stored.w, 1e-3)), stand);
+    let band = side / max(stored.w, 1e-3);
+    let open = sky_transfer(stored.w, side);
+    let around = in_stand_by_transfer(open, vec3(stored.w), mat3x3(band, band, band), stand.hidden_direction, stand);
     let zenith = variants[variant].indirect_sun_zenith * light.key_direction.y;
     let indirect = evaluate_two_bands(variants[variant].indirect_sun_mean, zenith) * stand.key_transmittance * relief.key;
     let indirect_sun = light.key_illuminance * variants[variant].indirect_sun_color * indirect;

@@ -261,7 +261,8 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let side = in.right * stored.x + in.up * stored.y + in.front * stored.z;
     // The second band is not relative to the mean here.
     let open = sky_transfer(stored.w, side);
-    let around = in_stand_by_transfer(open, vec3(stored.w), vec3(side.y / max(stored.w, 1e-3)), stand);
+    let band = side / max(stored.w, 1e-3);
+    let around = in_stand_by_transfer(open, vec3(stored.w), mat3x3(band, band, band), stand.hidden_direction, stand);
     var sky = (1.0 + surface.transmission) * around;
 #ifdef PLAIN_TOO
     surface.ambient_visibility = with_indirect_ambient(properties.b, ambient_term);

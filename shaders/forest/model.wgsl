@@ -146,11 +146,12 @@ fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index
     let ground = sample_ground(position.relative);
     let relief = relief_at(position.relative, ground, look.height);
     let stand = light_at(ground.surrounding_cover, 1.0 - look.relative_height, relief);
-    let sky = light_in_stand(vertex, tree.yaw_code, stand);
+    let to_plant = vec2(tree.yaw.x, -tree.yaw.y);
+    let sky = light_in_stand(vertex, tree.yaw_code, rotate(stand.hidden_direction, to_plant), stand);
     out.front_sky = sky.front;
     out.back_sky = sky.back;
 #ifndef SUN_HARMONICS
-    let to_light = rotate(light.key_direction, vec2(tree.yaw.x, -tree.yaw.y));
+    let to_light = rotate(light.key_direction, to_plant);
     let indirect = indirect_sun(vertex, to_light) * (stand.key_transmittance * relief.key);
     out.front_sky += indirect;
     out.back_sky += indirect;

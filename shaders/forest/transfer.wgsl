@@ -56,47 +56,49 @@ fn irradiance_by_word(word: u32, stride: u32, scale: vec4<f32>, light: u32) -> v
     return vec3(dot(red, light_by_yaw[light]), dot(green, light_by_yaw[light + 1u]), dot(blue, light_by_yaw[light + 2u]));
 }
 
-// Means of both sides, and the component of their second band towards the zenith, relative to them.
+// Means of both sides, and the vectors of their second band, one for each channel, relative to them, in the plant's frame.
 struct Means {
     front: vec3<f32>,
-    front_zenith: vec3<f32>,
+    front_band: mat3x3<f32>,
     back: vec3<f32>,
-    back_zenith: vec3<f32>,
+    back_band: mat3x3<f32>,
 }
 
 fn means(vertex: u32) -> Means {
     let first = vertex * transfer.vertex_words;
     let codes = first + transfer.mean_words;
     let words = transfer.side_words;
-    let scale = transfer.scale[0].y;
     var out: Means;
 #ifdef TRANSFER_COLOR
     out.front = vec3(mean_at(first, 0u), mean_at(first, 1u), mean_at(first, 2u));
-    out.front_zenith = vec3(zenith(codes), zenith(codes + words), zenith(codes + 2u * words)) * scale;
+    out.front_band = mat3x3(band(codes), band(codes + words), band(codes + 2u * words));
     out.back = vec3(mean_at(first, 3u), mean_at(first, 4u), mean_at(first, 5u));
-    out.back_zenith = vec3(zenith(codes + 3u * words), zenith(codes + 4u * words), zenith(codes + 5u * words)) * scale;
+    out.back_band = mat3x3(band(codes + 3u * words), band(codes + 4u * words), band(codes + 5u * words));
 #else
     out.front = vec3(mean_at(first, 0u));
-    out.front_zenith = vec3(zenith(codes) * scale);
+    let front = band(codes);
+    out.front_band = mat3x3(front, front, front);
     out.back = vec3(mean_at(first, 1u));
-    out.back_zenith = vec3(zenith(codes + words) * scale);
+    let back = band(codes + words);
+    out.back_band = mat3x3(back, back, back);
 #endif
     return out;
 }
 
-// The third coefficient of a side and channel, relative to what 127 stands for.
-fn zenith(word: u32) -> f32 {
-    return unpack4x8snorm(coefficients[word]).y;
+// The vector of the second band of a side and channel whose first codes are in `word`.
+fn band(word: u32) -> vec3<f32> {
+    let codes = unpack4x8snorm(coefficients[word]).xyz * transfer.scale[0].xyz;
+    return vec3(-codes.x, codes.y, -codes.z);
 }
 
-// Irradiance of the surroundings on both sides of a vertex of a tree in a stand.
-fn light_in_stand(vertex: u32, yaw: u32, stand: StandLight) -> Sides {
+// Irradiance of the surroundings on both sides of a vertex of a tree in a stand. `hidden_direction`: that of the stand in the plant's frame.
+fn light_in_stand(vertex: u32, yaw: u32, hidden_direction: vec3<f32>, stand: StandLight) -> Sides {
     let open = light_sides(vertex, yaw);
     let own = means(vertex);
     var sides: Sides;
-    sides.front = in_stand_by_transfer(open.front, own.front, own.front_zenith, stand);
+    sides.front = in_stand_by_transfer(open.front, own.front, own.front_band, hidden_direction, stand);
 #ifdef FOLIAGE
-    sides.back = in_stand_by_transfer(open.back, own.back, own.back_zenith, stand);
+    sides.back = in_stand_by_transfer(open.back, own.back, own.back_band, hidden_direction, stand);
 #endif
     return sides;
 }

@@ -246,7 +246,8 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let shade_cover = select(seen.ground.surrounding_cover, 0.0, seen.outside);
 
     let within = relief_at(in.relative, seen.ground, 0.0);
-    let relief = Relief(within.sky, select(within.key, 1.0, seen.outside));
+    let key = select(within.key, 1.0, seen.outside);
+    let relief = Relief(within.hidden, within.level_fraction, within.direction, key);
     let stand = ground_light(shade_cover, relief);
     var visibility = relief.key;
     if visibility > 0.0 {

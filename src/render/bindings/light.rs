@@ -51,7 +51,7 @@ pub fn light_uniform(light: &LightState, exposure: f32) -> LightUniform {
         ground_radiance: finite(light.ground_radiance * exposure),
         star_seed: light.night.stars.seed,
         shaded_hue: finite(shaded_hue(light)),
-        padding: 0,
+        level_radiance: luminance(light.sky_illuminance) / std::f32::consts::PI * exposure,
         sky_axis: [axis.x, axis.y],
         end_padding: [0; 2],
     }

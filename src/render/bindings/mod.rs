@@ -85,7 +85,7 @@ pub struct SharedTextures {
     /// Light inside a stand.
     pub stand_light: TextureView,
     /// The fraction of the sky's light that arrives where relief hides a part of the sky, over the same area as `ground`.
-    pub sky_openness: TextureView,
+    pub hidden_sky: TextureView,
 }
 
 impl FromWorld for SharedTextures {
@@ -108,7 +108,7 @@ impl FromWorld for SharedTextures {
             shadow_maps: depth.create_view(&layers),
             ground: texel(),
             stand_light: texel(),
-            sky_openness: texel(),
+            hidden_sky: texel(),
         }
     }
 }
@@ -261,7 +261,7 @@ fn prepare_bind_group(
             &buffers.shadow_sampler,
             &textures.ground,
             &textures.stand_light,
-            &textures.sky_openness,
+            &textures.hidden_sky,
         )),
     );
     group.0 = Some((view.entity, made));

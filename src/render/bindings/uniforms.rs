@@ -78,8 +78,8 @@ pub struct LightUniform {
     pub star_seed: u32,
     /// Colour of the fraction of light that is left without the key light, relative to that of its luminance.
     pub shaded_hue: [f32; 3],
-    /// WGSL aligns the next member to 8 bytes.
-    pub padding: u32,
+    /// Luminance of white, level ground in the light of the whole sky.
+    pub level_radiance: f32,
     /// Unit vector to the sun in the ground plane (x, z).
     pub sky_axis: [f32; 2],
     /// WGSL rounds the size up to 16 bytes.

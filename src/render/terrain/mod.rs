@@ -11,10 +11,10 @@
 
 mod drape;
 mod ground_map;
+mod hidden_sky;
 mod layout;
 mod pass;
 mod pipeline;
-mod sky_openness;
 mod tile_cache;
 mod tiles;
 mod vertex;
@@ -42,7 +42,7 @@ impl Plugin for TerrainPassPlugin {
         let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
         render_app
             .init_gpu_resource::<GroundMap>()
-            .init_gpu_resource::<sky_openness::SkyOpennessMap>()
+            .init_gpu_resource::<hidden_sky::HiddenSkyMap>()
             .init_gpu_resource::<tiles::GpuTerrain>()
             .init_gpu_resource::<pipeline::TerrainPipeline>()
             .init_gpu_resource::<SpecializedRenderPipelines<pipeline::TerrainPipeline>>()
@@ -51,8 +51,7 @@ impl Plugin for TerrainPassPlugin {
             .add_systems(
                 Render,
                 (
-                    (ground_map::prepare_ground_map, sky_openness::prepare_sky_openness)
-                        .in_set(CanopyRenderSystems::Light),
+                    (ground_map::prepare_ground_map, hidden_sky::prepare_hidden_sky).in_set(CanopyRenderSystems::Light),
                     tiles::prepare_tiles.in_set(CanopyRenderSystems::Cull),
                     pipeline::prepare_pipeline.in_set(CanopyRenderSystems::Pipelines),
                 ),

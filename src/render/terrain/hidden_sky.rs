@@ -1,5 +1,5 @@
-//! A texture of the terrain seen from above, over the same area as the [ground map](super::ground_map): the fraction of the sky's light that
-//! arrives where relief hides a part of the sky.
+//! A texture of the terrain seen from above, over the same area as the [ground map](super::ground_map): what relief hides of the
+//! sky's light.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use half::f16;
 use rayon::prelude::*;
 
 use crate::{
-    light::SkyOpenness,
+    light::{HiddenLight, HiddenSky},
     render::{
         bindings::SharedTextures,
         components::{Daylight, LightUpdates},
@@ -38,9 +38,9 @@ const MOST_SIDE: f64 = 128.0;
 /// Metres within which relief counts.
 const FARTHEST: f64 = 12_000.0;
 
-/// The fraction of the sky's light, per channel.
+/// The texels of [`HiddenLight`]: two blocks, one below the other.
 #[derive(Resource)]
-pub struct SkyOpennessMap {
+pub struct HiddenSkyMap {
     table: LightTable<(ReliefKey, Daylight)>,
     horizons: Follower<ReliefKey, Arc<Vec<Horizon>>>,
 }
@@ -88,36 +88,37 @@ impl ReliefKey {
     }
 }
 
-impl FromWorld for SkyOpennessMap {
+impl FromWorld for HiddenSkyMap {
     fn from_world(world: &mut World) -> Self {
         Self::open(world.resource::<RenderDevice>(), world.resource::<RenderQueue>())
     }
 }
 
-impl SkyOpennessMap {
-    /// The map without a ground: the whole sky is seen.
+impl HiddenSkyMap {
+    /// The map without a ground: nothing is hidden.
     fn open(device: &RenderDevice, queue: &RenderQueue) -> Self {
-        let table = LightTable::new(device, "canopy_sky_openness", (1, 1));
-        table.write(queue, &[[f16::ONE; 4]]);
+        let table = LightTable::new(device, "canopy_hidden_sky", (1, 2));
+        let open = HiddenLight { level_fraction: 1.0, ..HiddenLight::default() };
+        table.write(queue, &blocks(&[open]));
         Self { table, horizons: Follower::default() }
     }
 }
 
 /// Updates the map and passes it to all passes.
-pub fn prepare_sky_openness(
+pub fn prepare_hidden_sky(
     scene: Res<ExtractedScene>,
     device: Res<RenderDevice>,
     queue: Res<RenderQueue>,
     report: Res<FrameReport>,
-    mut map: ResMut<SkyOpennessMap>,
+    mut map: ResMut<HiddenSkyMap>,
     mut textures: ResMut<SharedTextures>,
 ) {
     update(&mut map, &scene, &device, &queue, &report);
-    textures.sky_openness = map.table.view().clone();
+    textures.hidden_sky = map.table.view().clone();
 }
 
 fn update(
-    map: &mut SkyOpennessMap,
+    map: &mut HiddenSkyMap,
     scene: &ExtractedScene,
     device: &RenderDevice,
     queue: &RenderQueue,
@@ -126,7 +127,7 @@ fn update(
     let Some((_, ground, _)) = &scene.ground else {
         // A despawned ground is freed.
         if map.horizons.key().is_some() {
-            *map = SkyOpennessMap::open(device, queue);
+            *map = HiddenSkyMap::open(device, queue);
         }
         return;
     };
@@ -136,15 +137,22 @@ fn update(
     let key = wanted.clone();
     let followed = map.horizons.follow(&wanted, LightUpdates::Blocking, |_| false, move || Arc::new(key.horizons()));
     let Some(horizons) = map.horizons.value().cloned() else { return };
-    map.table.resize(device, wanted.size());
+    let (columns, rows) = wanted.size();
+    map.table.resize(device, (columns, 2 * rows));
     let uploaded = map.table.update(queue, (wanted, daylight.clone()), || {
-        let sky = SkyOpenness::new(&daylight.0, AZIMUTHS);
-        let texel = |horizon: &Horizon| sky.behind(horizon).extend(1.0).to_array().map(f16::from_f32);
-        horizons.par_iter().map(texel).collect::<Vec<_>>()
+        let sky = HiddenSky::new(&daylight.0, AZIMUTHS);
+        let hidden: Vec<_> = horizons.par_iter().map(|horizon| sky.behind(horizon)).collect();
+        blocks(&hidden)
     });
     match (followed, uploaded) {
         (Followed::Same, false) => report.skipped("sky behind relief", "light and terrain have not changed"),
         (Followed::Same, true) => report.ran("sky behind relief", format!("{} cells", horizons.len())),
         _ => report.ran("sky behind relief", format!("{} cells, with their horizons", horizons.len())),
     }
+}
+
+/// The first texel of each place, then the second of each.
+fn blocks(hidden: &[HiddenLight]) -> Vec<[f16; 4]> {
+    let block = |index: usize| hidden.iter().map(move |light| light.texels()[index].to_array().map(f16::from_f32));
+    block(0).chain(block(1)).collect()
 }
