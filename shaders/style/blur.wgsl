@@ -60,14 +60,16 @@ fn fragment(in: Corner) -> @location(0) vec4<f32> {
 #ifdef IDENTITIES
     for (var i = 1; i <= POINTS; i += 1) {
         let offset = f32(i) * job.step;
-        sum += weight(i) * (value(center + offset, size) + value(center - offset, size));
-        weights += 2.0 * weight(i);
+        let each = weight(i);
+        sum += each * (value(center + offset, size) + value(center - offset, size));
+        weights += 2.0 * each;
     }
 #else
     // Two points a lookup: between texels a bilinear lookup is the weighted mean of both [Rákos 2010].
     for (var i = 1; i < POINTS; i += 2) {
-        let both = weight(i) + weight(i + 1);
-        let offset = (f32(i) + weight(i + 1) / max(both, 1e-30)) * job.step;
+        let farther = weight(i + 1);
+        let both = weight(i) + farther;
+        let offset = (f32(i) + farther / max(both, 1e-30)) * job.step;
         sum += both * (value(center + offset, size) + value(center - offset, size));
         weights += 2.0 * both;
     }

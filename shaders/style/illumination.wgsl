@@ -35,9 +35,8 @@ fn cascade_of(distance: f32) -> i32 {
 struct Around {
     // Mean depth.
     depth: f32,
-    // Mean distance in depth of what is nearer to the light, and its share; 0 where nothing is.
+    // Mean distance in depth of what is nearer to the light; 0 where nothing is.
     blocked: f32,
-    share: f32,
 }
 
 // `step` between points, in texels. A point is nearer to the light than `depth` if it is so by more than `allowance` a texel.
@@ -46,7 +45,7 @@ fn depths_around(index: i32, center: vec2<f32>, step: f32, depth: f32, allowance
     var sum = 0.0;
     var weights = 0.0;
     var blocked = 0.0;
-    var share = 0.0;
+    var blockers = 0.0;
     for (var y = -2; y <= 2; y += 1) {
         for (var x = -2; x <= 2; x += 1) {
             let offset = vec2(f32(x), f32(y));
@@ -58,10 +57,10 @@ fn depths_around(index: i32, center: vec2<f32>, step: f32, depth: f32, allowance
             // The map's depth is reversed: nearer to the light is greater.
             let nearer = weight * f32(found - depth > allowance * step * length(offset));
             blocked += nearer * (found - depth);
-            share += nearer;
+            blockers += nearer;
         }
     }
-    return Around(sum / weights, blocked / max(share, 1e-6), share / weights);
+    return Around(sum / weights, blocked / max(blockers, 1e-6));
 }
 
 // Metres above the ground below which a position takes the shadow of what is near as sharp as it is.
@@ -89,7 +88,7 @@ fn soft_light(relative: vec3<f32>, normal: vec3<f32>, height: f32) -> f32 {
     var around = depths_around(index, center, step, map.z, allowance);
     // Without a branch: lavapipe (Mesa 22.3) fails on one that has a loop of lookups in it.
     let distance = saturate(around.blocked / (CONTACT_REACH * delta));
-    let width = select(1.0, mix(distance * distance, 1.0, saturate(height / CONTACT_HEIGHT)), around.share > 0.0);
+    let width = select(1.0, mix(distance * distance, 1.0, saturate(height / CONTACT_HEIGHT)), around.blocked > 0.0);
     let narrow = max(step * width, min(step, 0.5));
     around = depths_around(index, center, narrow, map.z, allowance);
     delta *= narrow / step;

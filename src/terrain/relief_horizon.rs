@@ -81,7 +81,7 @@ mod tests {
         let level = HeightField::new(3, 3, DVec2::splat(100.0), vec![250.0; 9]).unwrap();
         let terrain = Terrain::new(level, None, Surroundings::Mirror);
         assert!(
-            horizons(&terrain, DVec2::splat(200.0), 4, 4, 12_000.0).iter().flatten().all(|tangent| *tangent == 0.0)
+            horizons(&terrain, DVec2::splat(200.0), 4, 4, 12_000.0).iter().flatten().all(|tangent| *tangent < 1e-5)
         );
     }
 }

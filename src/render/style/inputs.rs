@@ -139,16 +139,17 @@ fn write_blurs(gpu: &Gpu, buffer: &Buffer, deviations: &Deviations, key: &MapKey
     ];
     let maps = maps.map(|(deviation, divisor)| (deviation, divisor, None));
     let slices = (0..key.layers.div_ceil(4)).map(|slice| (deviations.shapes, 1, Some(4 * slice)));
-    for (index, (deviation, divisor, layers)) in maps.into_iter().chain(slices).enumerate() {
+    for (index, (deviation, divisor, first_layer)) in maps.into_iter().chain(slices).enumerate() {
         let deviation = deviation * key.size.1 as f32 / 720.0;
         let coarse = key.coarse(divisor);
         let ratio = [key.size.0 as f32 / coarse.0 as f32, key.size.1 as f32 / coarse.1 as f32];
-        let across = Spacing::of(deviation, if layers.is_some() { IDENTITY_POINTS } else { MAP_POINTS });
+        let across = Spacing::of(deviation, if first_layer.is_some() { IDENTITY_POINTS } else { MAP_POINTS });
         let along = Spacing::of(deviation / ratio[1], MAP_POINTS);
         // The first axis leads to the size of the target, the second stays at it.
         let axes = [(across, [across.texels, 0.0], ratio), (along, [0.0, along.texels], [1.0; 2])];
         for (axis, (spacing, step, scale)) in axes.into_iter().enumerate() {
-            let uniform = BlurUniform { step, scale, spacing: spacing.deviations, first_layer: layers.unwrap_or(0) };
+            let uniform =
+                BlurUniform { step, scale, spacing: spacing.deviations, first_layer: first_layer.unwrap_or(0) };
             let slot = (2 * index + axis) as u64;
             if slot < MOST_BLURS {
                 gpu.queue.write_buffer(buffer, slot * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));
