@@ -158,9 +158,9 @@ mod tests {
         let pit = sky.behind(&[1e9; DIRECTIONS]);
         let left = luminance(light.ground_radiance) / sky.level_radiance();
         assert!((pit.level_fraction / left - 1.0).abs() < 0.02, "{pit:?} and {left}");
-        let level = pit.from_normal(Vec3::Y).y * sky.level_radiance();
-        let sums = (light.sky_illuminance / PI - light.ground_radiance).y;
-        assert!((level / sums - 1.0).abs() < 0.15, "{level} and {sums}");
+        let level = luminance(pit.from_normal(Vec3::Y)) * sky.level_radiance();
+        let whole = luminance(light.sky_illuminance / PI - light.ground_radiance);
+        assert!((level / whole - 1.0).abs() < 0.15, "{level} and {whole}");
     }
 
     #[test]
