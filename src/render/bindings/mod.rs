@@ -84,7 +84,7 @@ pub struct SharedTextures {
     pub ground: TextureView,
     /// Light inside a stand.
     pub stand_light: TextureView,
-    /// The fraction of the sky's light that arrives where relief hides a part of the sky, over the same area as `ground`.
+    /// What relief hides of the sky's light, over the same area as `ground`.
     pub hidden_sky: TextureView,
 }
 

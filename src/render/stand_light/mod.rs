@@ -37,9 +37,8 @@ use crate::{
     },
 };
 
-/// Blocks of the texture, one below the other: transmittances at leaves, downwelling radiance, upwelling radiance at leaves,
-/// transmittances at trunks. The fourth channel has the key light's transmittance, or the fraction of the radiance's luminance that is left where
-/// relief hides the key light.
+/// Blocks of the texture, one below the other: transmittances at leaves, downwelling radiance, upwelling radiance, transmittances at trunks. The
+/// fourth channel has the key light's transmittance, or the fraction of the radiance's luminance that is left where relief hides the key light.
 const BLOCKS: usize = 4;
 /// The largest value that is written.
 const BRIGHTEST: f32 = 6.0e4;
