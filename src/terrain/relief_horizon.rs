@@ -1,6 +1,6 @@
 //! How high the relief stands around a place: what of the sky it hides.
 //!
-//! Cost: one [`Terrain::height`] per cell, azimuth and step, some 0.1 s for 64² cells on two cores. It depends on the terrain alone.
+//! Cost: one [`Terrain::height`] per cell, azimuth and step, some 2 s for the demo on two cores. It depends on the terrain alone.
 
 use std::f64::consts::TAU;
 
