@@ -16,10 +16,11 @@ use glam::{DVec2, DVec3, Vec3};
 use half::f16;
 use rayon::prelude::*;
 
+use super::map_area::MapArea;
 use crate::{
     render::{
         bindings::{SharedPlacement, SharedTextures},
-        components::{Ground, LightUpdates},
+        components::LightUpdates,
         extract::ExtractedScene,
         follow::{Followed, Follower},
         light_table::LightTable,
@@ -28,7 +29,7 @@ use crate::{
     },
     scatter::{Area, CoverMap, distance_beyond, surroundings_density},
     terrain::{
-        Terrain, TerrainError,
+        TerrainError,
         sun_horizon::{HorizonGrid, sun_horizon_over},
     },
 };
@@ -53,28 +54,22 @@ pub struct GroundMap {
     extent: DVec2,
 }
 
-/// What the map depends on. Terrain and cover are compared by address.
+/// What the map depends on. The cover is compared by address.
 #[derive(Clone)]
 struct MapKey {
-    terrain: Arc<Terrain>,
+    area: MapArea,
     cover: Option<Arc<CoverMap>>,
-    /// Metres beyond the data that the map reaches.
-    surroundings: f64,
     /// Unit vector to the key light.
     light: Vec3,
 }
 
 impl PartialEq for MapKey {
     fn eq(&self, other: &Self) -> bool {
-        self.has_terrain_of(other) && self.has_cover_of(other) && self.light == other.light
+        self.area == other.area && self.has_cover_of(other) && self.light == other.light
     }
 }
 
 impl MapKey {
-    fn has_terrain_of(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.terrain, &other.terrain) && self.surroundings == other.surroundings
-    }
-
     fn has_cover_of(&self, other: &Self) -> bool {
         match (&self.cover, &other.cover) {
             (Some(a), Some(b)) => Arc::ptr_eq(a, b),
@@ -86,24 +81,17 @@ impl MapKey {
     /// Whether the map that was computed for `old` may be drawn meanwhile. The cover of a forest that appears may come
     /// some frames after its trees.
     fn is_near(&self, old: &Self) -> bool {
-        self.has_terrain_of(old) && LightUpdates::is_near(old.light, self.light)
-    }
-
-    /// Size of the map in metres.
-    fn extent(&self) -> DVec2 {
-        self.terrain.extent() + 2.0 * self.surroundings
+        self.area == old.area && LightUpdates::is_near(old.light, self.light)
     }
 
     /// Columns and rows of the map.
     fn size(&self) -> (u32, u32) {
-        let extent = self.extent();
-        let texel = (self.terrain.extent().max_element() / LONGEST_SIDE).max(extent.max_element() / MOST_SIDE);
-        ((extent.x / texel).ceil().max(1.0) as u32, (extent.y / texel).ceil().max(1.0) as u32)
+        self.area.size(LONGEST_SIDE, MOST_SIDE)
     }
 
     /// The middle of a texel, metres from the terrain's centre.
     fn place(&self, column: u32, row: u32) -> DVec2 {
-        let ((columns, rows), extent) = (self.size(), self.extent());
+        let ((columns, rows), extent) = (self.size(), self.area.extent());
         let cell = extent / DVec2::new(f64::from(columns), f64::from(rows));
         (DVec2::new(f64::from(column), f64::from(row)) + 0.5) * cell - 0.5 * extent
     }
@@ -112,20 +100,20 @@ impl MapKey {
     fn content(&self, wide: Option<Arc<CoverMap>>) -> Result<MapContent, TerrainError> {
         let (columns, rows) = self.size();
         let grid = HorizonGrid { columns: columns as usize, rows: rows as usize, max_distance: HORIZON_DISTANCE };
-        let horizon = sun_horizon_over(&self.terrain, self.extent(), &grid, self.light.as_dvec3())?;
+        let horizon = sun_horizon_over(&self.area.terrain, self.area.extent(), &grid, self.light.as_dvec3())?;
         let wide = wide.or_else(|| self.cover.as_ref().map(|cover| Arc::new(cover.widened(SHADING_RADIUS))));
         let mut texels = texels(self, wide.as_deref(), &horizon);
         // Of the data, not of what thins out around it.
-        let half = 0.5 * self.terrain.extent();
+        let half = 0.5 * self.area.terrain.extent();
         let beyond = |index: usize| {
             distance_beyond(&Area { min: -half, max: half }, self.place(index as u32 % columns, index as u32 / columns))
         };
         let of_data = texels.iter().enumerate().filter(|(index, _)| beyond(*index) <= 0.0);
         let (sum, count) = of_data.fold((0.0f32, 0), |(sum, count), (_, texel)| (sum + texel[1].to_f32(), count + 1));
         let mean_cover = sum / count.max(1) as f32;
-        if self.surroundings > 0.0 {
+        if self.area.surroundings > 0.0 {
             for (index, texel) in texels.iter_mut().enumerate() {
-                let drawn = surroundings_density(beyond(index), self.surroundings) as f32;
+                let drawn = surroundings_density(beyond(index), self.area.surroundings) as f32;
                 texel[3] = f16::from_f32(mean_cover * (1.0 - drawn));
             }
         }
@@ -199,10 +187,7 @@ fn update(
         return;
     };
     let Some(daylight) = &scene.daylight else { return };
-    let Ground { terrain, cover, surroundings, .. } = ground;
-    let surroundings = if surroundings.is_finite() { surroundings.clamp(0.0, 1e6) } else { 0.0 };
-    let wanted =
-        MapKey { terrain: terrain.clone(), cover: cover.clone(), surroundings, light: daylight.0.key_direction };
+    let wanted = MapKey { area: MapArea::of(ground), cover: ground.cover.clone(), light: daylight.0.key_direction };
     let known = map.content.key().is_some_and(|key| key.has_cover_of(&wanted));
     let wide = map.content.value().and_then(|content| content.as_ref().ok()?.wide.clone()).filter(|_| known);
     let key = wanted.clone();
@@ -218,7 +203,7 @@ fn update(
     };
     let size = key.size();
     map.table.resize(device, size);
-    map.extent = key.extent();
+    map.extent = key.area.extent();
     map.mean_cover = content.mean_cover;
     map.table.update(queue, key.clone(), || &content.texels);
     let cells = format!("{} × {} cells", size.0, size.1);
@@ -235,7 +220,7 @@ fn texels(key: &MapKey, wide: Option<&CoverMap>, horizon: &[f32]) -> Vec<[f16; 4
     let (columns, rows) = key.size();
     let texel = |column: u32, row: u32| {
         let place = key.place(column, row);
-        let height = key.terrain.height(place.x, place.y) as f32;
+        let height = key.area.terrain.height(place.x, place.y) as f32;
         let clears = horizon.get((row * columns + column) as usize).map_or(0.0, |h| h - height);
         let cover = key.cover.as_ref().map_or(0.0, |cover| cover.at(place));
         let around = wide.map_or(0.0, |cover| cover.at(place));

@@ -11,10 +11,10 @@ use bevy::{
     },
     render::renderer::{RenderDevice, RenderQueue},
 };
-use glam::DVec2;
 use half::f16;
 use rayon::prelude::*;
 
+use super::map_area::MapArea;
 use crate::{
     light::{HiddenLight, HiddenSky},
     render::{
@@ -25,10 +25,7 @@ use crate::{
         light_table::LightTable,
         report::FrameReport,
     },
-    terrain::{
-        Terrain,
-        relief_horizon::{AZIMUTHS, Horizon, horizons},
-    },
+    terrain::relief_horizon::{AZIMUTHS, Horizon, horizons},
 };
 
 /// Texels along the longer side of the terrain's data.
@@ -41,51 +38,26 @@ const FARTHEST: f64 = 12_000.0;
 /// The texels of [`HiddenLight`]: two blocks, one below the other.
 #[derive(Resource)]
 pub struct HiddenSkyMap {
-    table: LightTable<(ReliefKey, Daylight)>,
-    horizons: Follower<ReliefKey, Arc<Vec<Horizon>>>,
+    table: LightTable<(MapArea, Daylight)>,
+    horizons: Follower<MapArea, Arc<Vec<Horizon>>>,
 }
 
-/// What horizons depend on. Terrains are compared by address.
-#[derive(Clone)]
-struct ReliefKey {
-    terrain: Arc<Terrain>,
-    /// Metres beyond the data that the map reaches.
-    surroundings: f64,
+fn is_level(area: &MapArea) -> bool {
+    let (low, high) = area.terrain.min_max_height();
+    low == high
 }
 
-impl PartialEq for ReliefKey {
-    fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.terrain, &other.terrain) && self.surroundings == other.surroundings
-    }
+/// Columns and rows: one place stands for a level terrain.
+fn size(area: &MapArea) -> (u32, u32) {
+    if is_level(area) { (1, 1) } else { area.size(LONGEST_SIDE, MOST_SIDE) }
 }
 
-impl ReliefKey {
-    fn is_level(&self) -> bool {
-        let (low, high) = self.terrain.min_max_height();
-        low == high
+fn relief_of(area: &MapArea) -> Vec<Horizon> {
+    if is_level(area) {
+        return vec![[0.0; AZIMUTHS]];
     }
-
-    fn extent(&self) -> DVec2 {
-        self.terrain.extent() + 2.0 * self.surroundings
-    }
-
-    /// Columns and rows.
-    fn size(&self) -> (u32, u32) {
-        if self.is_level() {
-            return (1, 1);
-        }
-        let extent = self.extent();
-        let texel = (self.terrain.extent().max_element() / LONGEST_SIDE).max(extent.max_element() / MOST_SIDE);
-        ((extent.x / texel).ceil().max(1.0) as u32, (extent.y / texel).ceil().max(1.0) as u32)
-    }
-
-    fn horizons(&self) -> Vec<Horizon> {
-        if self.is_level() {
-            return vec![[0.0; AZIMUTHS]];
-        }
-        let (columns, rows) = self.size();
-        horizons(&self.terrain, self.extent(), columns as usize, rows as usize, FARTHEST)
-    }
+    let (columns, rows) = size(area);
+    horizons(&area.terrain, area.extent(), columns as usize, rows as usize, FARTHEST)
 }
 
 impl FromWorld for HiddenSkyMap {
@@ -132,12 +104,11 @@ fn update(
         return;
     };
     let Some(daylight) = &scene.daylight else { return };
-    let surroundings = if ground.surroundings.is_finite() { ground.surroundings.clamp(0.0, 1e6) } else { 0.0 };
-    let wanted = ReliefKey { terrain: ground.terrain.clone(), surroundings };
-    let key = wanted.clone();
-    let followed = map.horizons.follow(&wanted, LightUpdates::Blocking, |_| false, move || Arc::new(key.horizons()));
+    let wanted = MapArea::of(ground);
+    let area = wanted.clone();
+    let followed = map.horizons.follow(&wanted, LightUpdates::Blocking, |_| false, move || Arc::new(relief_of(&area)));
     let Some(horizons) = map.horizons.value().cloned() else { return };
-    let (columns, rows) = wanted.size();
+    let (columns, rows) = size(&wanted);
     map.table.resize(device, (columns, 2 * rows));
     let uploaded = map.table.update(queue, (wanted, daylight.clone()), || {
         let sky = HiddenSky::new(&daylight.0, AZIMUTHS);

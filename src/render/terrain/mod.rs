@@ -13,6 +13,7 @@ mod drape;
 mod ground_map;
 mod hidden_sky;
 mod layout;
+mod map_area;
 mod pass;
 mod pipeline;
 mod tile_cache;
