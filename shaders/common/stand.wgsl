@@ -83,8 +83,8 @@ fn evaluate_two_bands(mean: f32, band: f32) -> f32 {
 // Irradiance over pi that relief hides from a unit normal: HiddenLight::from_normal of src/light/hidden_sky.rs.
 fn hidden_from(normal: vec3<f32>, stand: StandLight) -> vec3<f32> {
     let along = dot(normal, stand.hidden_direction);
-    let length = length(stand.hidden_direction);
-    let lobe = 1.0 + 2.0 * along + 0.625 * length * (3.0 * along * along - length * length);
+    let concentration = length(stand.hidden_direction);
+    let lobe = 1.0 + 2.0 * along + 0.625 * concentration * (3.0 * along * along - concentration * concentration);
     return stand.hidden * max(lobe, 0.0);
 }
 

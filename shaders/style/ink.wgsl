@@ -3,7 +3,7 @@
 #import canopy::frame::{light, relative_position}
 #import canopy::style::{style, full_screen, FullScreen, airiness}
 #import canopy::style_edges::contour
-#import canopy::style_noise::{anchored_noise, noise_place}
+#import canopy::style_noise::{anchored_noise, noise_place, SKY_RADIUS}
 #import canopy::style_strokes::stroke_ink
 
 @group(1) @binding(1) var depths: texture_depth_2d;
@@ -68,7 +68,7 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let strokes = stroke_ink(in.uv, distance, soft.z, 1.0 - soft.x, identities) * f32(!sky);
     return vec4(mix(color, style.ink * 0.4, saturate(max(1.2 * drawn, strokes))), 1.0);
 #else
-    let relative = select(point, normalize(point) * 4000.0, sky);
+    let relative = select(point, normalize(point) * SKY_RADIUS, sky);
     let place = noise_place(page, relative, sky);
     let position = place.position;
     let footprint = place.pixel;

@@ -34,6 +34,9 @@ fn value_noise(p: vec3<f32>, wrap: i32, seed: u32) -> f32 {
     return mix(bottom, top, t.z);
 }
 
+// The sky is a sphere, metres.
+const SKY_RADIUS: f32 = 4000.0;
+
 // Where noise is looked up, and the length there that is a pixel of a picture of 720 lines.
 struct NoisePlace {
     position: vec3<f32>,

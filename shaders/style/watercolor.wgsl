@@ -2,8 +2,7 @@
 #import canopy::constants::PAPER_SIDE
 #import canopy::frame::relative_position
 #import canopy::style::{style, full_screen, FullScreen, airiness}
-#import canopy::style_edges::contour
-#import canopy::style_noise::{anchored_noise, noise_place}
+#import canopy::style_noise::{anchored_noise, noise_place, SKY_RADIUS}
 #import canopy::style_strokes::stroke_ink
 
 struct Layer {
@@ -21,7 +20,7 @@ struct Layer {
 // Light, pigment of the shadow, depth, length of the normal: under the Gaussian, and under a wide one.
 @group(1) @binding(3) var soft_lights: texture_2d<f32>;
 @group(1) @binding(4) var wide_lights: texture_2d<f32>;
-@group(1) @binding(5) var soft_normals: texture_2d<f32>;
+@group(1) @binding(5) var contours: texture_2d<f32>;
 // Intensities of the layers, four a slice.
 @group(1) @binding(6) var shapes: texture_2d_array<f32>;
 // Colours by light; a row a layer, then one each for the shadow and the dabs.
@@ -36,6 +35,8 @@ struct Layer {
 @group(1) @binding(13) var soft_colors: texture_2d<f32>;
 // The same as seen.
 @group(1) @binding(14) var colors: texture_2d<f32>;
+// Noise of three sizes: middle, broad, of clouds.
+@group(1) @binding(15) var noises: texture_2d<f32>;
 
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> FullScreen {
@@ -78,18 +79,22 @@ fn pigment(intensity: f32, layer: Layer, height: f32, flow: f32) -> Pigment {
 
 // Glazing: transmittances multiply.
 fn glaze(under: vec3<f32>, transmittance: vec3<f32>, density: f32, amount: f32) -> vec3<f32> {
+    if amount <= 0.0 {
+        return under;
+    }
     return mix(under, under * pow(max(transmittance, vec3(1e-3)), vec3(density)), saturate(amount));
+}
+
+fn luminance_at(uv: vec2<f32>) -> f32 {
+    return dot(textureSampleLevel(colors, linear_sampler, uv, 0.0).rgb, LUMINANCE);
 }
 
 // Intensities (dark, medium, bright) of a texture whose mean luminance around `uv` is `mean`: its luminance in three steps, as an
 // intensity texture that is made of a plant's colours [Luft 2006, 4.3].
 fn texture_intensities(uv: vec2<f32>, mean: f32) -> vec3<f32> {
     let reach = 0.7 * style.unit / style.size;
-    var luminance = 0.0;
-    for (var i = 0; i < 4; i += 1) {
-        let corner = vec2(f32(i & 1), f32(i >> 1u)) * 2.0 - 1.0;
-        luminance += 0.25 * dot(textureSampleLevel(colors, linear_sampler, uv + corner * reach, 0.0).rgb, LUMINANCE);
-    }
+    let across = vec2(reach.x, -reach.y);
+    let luminance = 0.25 * (luminance_at(uv + reach) + luminance_at(uv - reach) + luminance_at(uv + across) + luminance_at(uv - across));
     let share = luminance / max(mean, 1e-3);
     let dark = 1.0 - smoothstep(0.40, 0.55, share);
     return vec3(dark, (1.0 - smoothstep(0.70, 0.85, share)) * (1.0 - dark), smoothstep(1.25, 1.5, share));
@@ -108,17 +113,16 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let seen = textureLoad(depths, texel, 0);
     let sky = seen <= 0.0;
     let along = relative_position(in.uv, seen);
-    let direction = normalize(along);
-    // The sky is a sphere of 4 km.
-    let relative = select(along, direction * 4000.0, sky);
+    let relative = select(along, normalize(along) * SKY_RADIUS, sky);
     let place = noise_place(page, relative, sky);
     let position = place.position;
     let footprint = place.pixel;
-    let broad = anchored_noise(position, footprint * 70.0, 1u);
-    let middle = anchored_noise(position, footprint * 22.0, 2u);
+    let noise = textureSampleLevel(noises, linear_sampler, in.uv, 0.0);
+    let middle = noise.x;
+    let broad = noise.y;
+    let cloud = noise.z;
     let fine = anchored_noise(position, footprint * 6.0, 3u);
     let finer = anchored_noise(position, footprint * 3.2, 4u);
-    let cloud = anchored_noise(position * vec3(1.0, 1.8, 1.0), footprint * 190.0, 5u);
 
     // The hand: shapes waver.
     let waver = (vec2(middle, broad) * (1.8 + 5.0 * style.wetness) + vec2(fine, finer) * 0.5) * style.unit / style.size;
@@ -132,7 +136,7 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     // Forms stand out against their surroundings: light against its wide mean, and a rim where something nearer ends in front of
     // something farther [Luft, Colditz, Deussen 2006, unsharp masking of the depth].
     let form = saturate((mix(soft.x, wide.x, 0.25) + 0.5 * (soft.x - wide.x) - 0.20) / 0.62);
-    let drawn = contour(soft_normals, soft_lights, linear_sampler, uv, style.line_width);
+    let drawn = textureSampleLevel(contours, linear_sampler, uv, 0.0).x;
     let seen_color = textureSampleLevel(soft_colors, linear_sampler, uv, 0.0);
     let albedo = seen_color.rgb / max(seen_color.a, 1e-3);
     // Textures are painted where a leaf is larger than a dab of the brush.
@@ -150,24 +154,31 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
 
     var color = style.paper * (1.0 + 0.10 * relief);
     var foliage = 0.0;
-    for (var k = 0; k < i32(arrayLength(&layers)); k += 1) {
-        let layer = layers[k];
-        let slice = textureSampleLevel(shapes, linear_sampler, uv, k / 4, 0.0);
-        let intensity = slice[k % 4];
-        let wash = pigment(intensity, layer, height, broad * 0.7 + middle * select(0.4, 0.12, k == 0));
-        // The sky's ramp is over its height, and has no form.
-        let t = select(mix(form, 0.45 + 0.55 * form, layer.foliage) + layer.foliage * (0.14 * tree + 0.08 * middle) + (1.0 - layer.foliage) * (0.22 * broad + 0.12 * middle), soft.x, k == 0);
-        let paint = ramp(k, t);
-        // Each crown is mixed anew, warmer or cooler.
-        let mixed = paint.rgb * (1.0 + layer.foliage * tree * vec3(0.20, 0.04, -0.30) + layer.foliage * broad * vec3(0.06, 0.0, -0.10));
-        let own = min(hue * dot(mixed, LUMINANCE), vec3(1.0));
-        let pigmented = mix(mixed, own, style.scene * layer.foliage);
-        let transmittance = mix(saturate(pigmented), style.distance, 0.9 * air * f32(k > 0));
-        let rim = style.edges * min(0.5 * near_rim + 0.2 * behind + 1.2 * drawn, 1.3) * (1.0 - 0.6 * air) * layer.edge;
-        let clear = select(0.0, smoothstep(0.0, 0.55, 0.8 * cloud + 0.35 * broad), k == 0);
-        let thickness = (1.0 - 0.4 * air) * (1.0 + layer.foliage * 0.35 * tree) * (1.0 - 0.5 * kept * layer.foliage) * (1.0 - 0.8 * clear);
-        color = glaze(color, transmittance, (wash.density + rim) * thickness, wash.coverage * paint.a);
-        foliage += layer.foliage * wash.coverage;
+    let count = i32(arrayLength(&layers));
+    for (var first = 0; first < count; first += 4) {
+        let slice = textureSampleLevel(shapes, linear_sampler, uv, first / 4, 0.0);
+        for (var channel = 0; channel < min(count - first, 4); channel += 1) {
+            let k = first + channel;
+            let layer = layers[k];
+            let wash = pigment(slice[channel], layer, height, broad * 0.7 + middle * select(0.4, 0.12, k == 0));
+            // Most layers are elsewhere.
+            if wash.coverage > 0.0 {
+                // The sky's ramp is over its height, and has no form.
+                let unevenness = layer.foliage * (0.14 * tree + 0.08 * middle) + (1.0 - layer.foliage) * (0.22 * broad + 0.12 * middle);
+                let t = select(mix(form, 0.45 + 0.55 * form, layer.foliage) + unevenness, soft.x, k == 0);
+                let paint = ramp(k, t);
+                // Each crown is mixed anew, warmer or cooler.
+                let mixed = paint.rgb * (1.0 + layer.foliage * tree * vec3(0.20, 0.04, -0.30) + layer.foliage * broad * vec3(0.06, 0.0, -0.10));
+                let own = min(hue * dot(mixed, LUMINANCE), vec3(1.0));
+                let pigmented = mix(mixed, own, style.scene * layer.foliage);
+                let transmittance = mix(saturate(pigmented), style.distance, 0.9 * air * f32(k > 0));
+                let rim = style.edges * min(0.5 * near_rim + 0.2 * behind + 1.2 * drawn, 1.3) * (1.0 - 0.6 * air) * layer.edge;
+                let clear = select(0.0, smoothstep(0.0, 0.55, 0.8 * cloud + 0.35 * broad), k == 0);
+                let thickness = (1.0 - 0.4 * air) * (1.0 + layer.foliage * 0.35 * tree) * (1.0 - 0.5 * kept * layer.foliage) * (1.0 - 0.8 * clear);
+                color = glaze(color, transmittance, (wash.density + rim) * thickness, wash.coverage * paint.a);
+                foliage += layer.foliage * wash.coverage;
+            }
+        }
     }
     foliage = saturate(foliage);
 
@@ -202,7 +213,7 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
 
     // The pencil drawing, which the paper's hills take.
     let tremble = vec2(broad, middle) * 1.6 * style.unit / style.size;
-    let sketched = contour(soft_normals, soft_lights, linear_sampler, in.uv + tremble, style.line_width);
+    let sketched = textureSampleLevel(contours, linear_sampler, in.uv + tremble, 0.0).x;
     let grain = smoothstep(0.25, 0.55, height + 0.16 * finer);
     let pencil = 1.6 * sketched * grain * style.sketch * (0.9 + 0.5 * broad) * (1.0 - 0.7 * air);
     let stroke_uv = in.uv + 0.3 * vec2(middle, fine) * style.unit / style.size;

@@ -91,6 +91,8 @@ shader_files! {
     StyleIllumination = "style/illumination.wgsl",
     StyleBlur = "style/blur.wgsl",
     StyleParticles = "style/particles.wgsl",
+    StyleContours = "style/contours.wgsl",
+    StyleNoises = "style/noises.wgsl",
     StyleWatercolor = "style/watercolor.wgsl",
     StyleInk = "style/ink.wgsl",
 }

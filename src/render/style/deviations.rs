@@ -44,6 +44,20 @@ pub fn divisor(deviation: f32) -> u32 {
     }
 }
 
+/// Pixels of a picture of 720 lines that the least cell of the broad noises has: half of 22 (`shaders/style/noises.wgsl`).
+const NOISE_CELL: f32 = 11.0;
+/// Texels of a map of noise that a cell needs, so that what lies between texels is found by a bilinear lookup.
+const TEXELS_PER_CELL: f32 = 5.0;
+
+/// How many pixels along a side become one texel of the map of noise in a picture of `lines` lines.
+pub fn noise_divisor(lines: u32) -> u32 {
+    match NOISE_CELL * lines as f32 / 720.0 / TEXELS_PER_CELL {
+        texels if texels >= 4.0 => 4,
+        texels if texels >= 2.0 => 2,
+        _ => 1,
+    }
+}
+
 /// How far apart the points are at which a Gaussian is taken: a texel, or more where their number does not reach to three standard
 /// deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,6 +113,7 @@ mod tests {
 
     #[test]
     fn maps_are_coarser_only_where_the_gaussian_hides_it() {
+        assert_eq!([1, 360, 720, 1080, 4096].map(noise_divisor), [1, 1, 2, 2, 4]);
         assert_eq!([0.0, 1.9, 2.0, 3.9, 4.0, 100.0, f32::NAN].map(divisor), [1, 1, 2, 2, 4, 4, 1]);
     }
 }

@@ -50,6 +50,29 @@ pub fn illumination_layout() -> BindGroupLayoutDescriptor {
     )
 }
 
+/// Group 1 of the contours: the style, light, normals.
+pub fn contours_layout() -> BindGroupLayoutDescriptor {
+    let map = || texture_2d(TextureSampleType::Float { filterable: true });
+    BindGroupLayoutDescriptor::new(
+        "canopy_style_contours",
+        &BindGroupLayoutEntries::sequential(
+            ShaderStages::FRAGMENT,
+            (uniform_buffer_sized(false, STYLE_SIZE), map(), map(), sampler(SamplerBindingType::Filtering)),
+        ),
+    )
+}
+
+/// Group 1 of the noise: the style, depth.
+pub fn noises_layout() -> BindGroupLayoutDescriptor {
+    BindGroupLayoutDescriptor::new(
+        "canopy_style_noises",
+        &BindGroupLayoutEntries::sequential(
+            ShaderStages::FRAGMENT,
+            (uniform_buffer_sized(false, STYLE_SIZE), texture_2d(TextureSampleType::Depth)),
+        ),
+    )
+}
+
 /// Group 0: the job; identifiers, or a map and its sampler.
 pub fn blur_layout(identities: bool) -> BindGroupLayoutDescriptor {
     let job = uniform_buffer_sized(true, BLUR_SIZE);
@@ -100,6 +123,7 @@ pub fn picture_layout(picture: Picture) -> BindGroupLayoutDescriptor {
                 storage_buffer_read_only_sized(false, None),
                 filtering(),
                 filtering(),
+                map(),
                 map(),
                 map(),
                 map(),

@@ -16,6 +16,7 @@
 //! in it either.
 
 mod blur;
+mod contours;
 mod deviations;
 mod full_screen;
 mod illumination;
@@ -66,6 +67,7 @@ impl Plugin for StylePassPlugin {
                         blur::maps_pass,
                         particles::particles_pass,
                         blur::shapes_pass,
+                        contours::contours_pass,
                     )
                         .chain()
                         .in_set(CanopyPasses::Style),

@@ -50,7 +50,7 @@ pub fn picture_pass(
                 &maps.identities,
                 &maps.soft_lights,
                 &maps.wide_lights,
-                &maps.soft_normals,
+                &maps.contours,
                 &maps.shapes,
                 &of.ramps,
                 &of.paper,
@@ -60,6 +60,7 @@ pub fn picture_pass(
                 &maps.soft_dabs,
                 &maps.soft_colors,
                 &maps.colors,
+                &maps.noises,
             )),
         ),
         Picture::Lines | Picture::Toon => device.create_bind_group(

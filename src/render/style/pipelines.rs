@@ -19,8 +19,10 @@ use bevy::{
 
 use super::{
     full_screen::full_screen,
-    layouts::{Picture, blur_layout, illumination_layout, particles_layout, picture_layout},
-    targets::{COLOR_FORMAT, IDENTITY_FORMAT, MAP_FORMAT, SHAPE_FORMAT, has_particles},
+    layouts::{
+        Picture, blur_layout, contours_layout, illumination_layout, noises_layout, particles_layout, picture_layout,
+    },
+    targets::{COLOR_FORMAT, CONTOUR_FORMAT, IDENTITY_FORMAT, MAP_FORMAT, SHAPE_FORMAT, has_particles},
 };
 use crate::{
     lod::Representation,
@@ -56,6 +58,7 @@ pub struct StylePipelines {
     illumination: Option<CachedRenderPipelineId>,
     blurs: Option<[CachedRenderPipelineId; 3]>,
     particles: Option<CachedRenderPipelineId>,
+    contours_and_noises: Option<[CachedRenderPipelineId; 2]>,
     pictures: HashMap<(Picture, TextureFormat), CachedRenderPipelineId>,
     /// Whether the leaves' own normals are wanted.
     own_normals: bool,
@@ -70,6 +73,7 @@ impl FromWorld for StylePipelines {
             illumination: None,
             blurs: None,
             particles: None,
+            contours_and_noises: None,
             pictures: HashMap::default(),
             own_normals: false,
         }
@@ -100,6 +104,11 @@ impl StylePipelines {
     /// That of the particles.
     pub fn particles(&self) -> Option<CachedRenderPipelineId> {
         self.particles
+    }
+
+    /// Those of the contours and of the noise, which washes need.
+    pub fn contours_and_noises(&self) -> Option<[CachedRenderPipelineId; 2]> {
+        self.contours_and_noises
     }
 
     /// That of the picture.
@@ -156,6 +165,18 @@ impl StylePipelines {
         if has_particles(&drawn.style) {
             let shader = shaders.get(ShaderFile::StyleParticles);
             self.particles.get_or_insert_with(|| cache.queue_render_pipeline(particles(shader)));
+        }
+        if picture == Picture::Watercolour {
+            self.contours_and_noises.get_or_insert_with(|| {
+                [
+                    ("canopy_style_contours", ShaderFile::StyleContours, contours_layout(), CONTOUR_FORMAT),
+                    ("canopy_style_noises", ShaderFile::StyleNoises, noises_layout(), MAP_FORMAT),
+                ]
+                .map(|(label, file, own, format)| {
+                    let layout = vec![frame_layout(), own];
+                    cache.queue_render_pipeline(full_screen(label, shaders.get(file), Vec::new(), layout, format))
+                })
+            });
         }
         self.pictures.entry((picture, format)).or_insert_with(|| {
             let (file, defs): (_, Vec<ShaderDefVal>) = match picture {

@@ -34,6 +34,9 @@ pub const COLOR_FORMAT: TextureFormat = TextureFormat::Rgba8UnormSrgb;
 /// Format of four layers' intensities.
 pub const SHAPE_FORMAT: TextureFormat = TextureFormat::Rgba8Unorm;
 
+/// Format of contours.
+pub const CONTOUR_FORMAT: TextureFormat = TextureFormat::R8Unorm;
+
 /// What the maps depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MapKey {
@@ -47,6 +50,8 @@ pub struct MapKey {
     pub wide_divisor: u32,
     /// The same in that of the colours.
     pub color_divisor: u32,
+    /// The same in the map of noise.
+    pub noise_divisor: u32,
 }
 
 impl MapKey {
@@ -80,6 +85,10 @@ pub struct StyleMaps {
     pub soft_normals: TextureView,
     /// Albedo under a Gaussian, with the share of surfaces as its alpha.
     pub soft_colors: TextureView,
+    /// Contours of normals and depth.
+    pub contours: TextureView,
+    /// Broad noises.
+    pub noises: TextureView,
     /// What is blurred along one axis.
     pub half_blurred: TextureView,
     /// The same of the light around.
@@ -141,6 +150,7 @@ pub fn prepare_targets(
         dabs: has_particles(&drawn.style),
         wide_divisor: divisor(deviations.wide),
         color_divisor: divisor(deviations.lights),
+        noise_divisor: deviations::noise_divisor(picture.1),
     };
     match &mut targets.0 {
         Some(maps) if maps.key == key => maps.picture = picture,
@@ -164,7 +174,7 @@ impl StyleMaps {
         };
         let view = |texture: Texture| texture.create_view(&TextureViewDescriptor::default());
         let map = |label| view(texture(label, MAP_FORMAT, 1, key.size));
-        // Only layers are painted with the light around and with soft colours.
+        // Only layers are painted with the light around, soft colours and noise.
         let coarse = |label, divisor| {
             view(texture(label, MAP_FORMAT, 1, if key.layers > 0 { key.coarse(divisor) } else { (1, 1) }))
         };
@@ -193,6 +203,8 @@ impl StyleMaps {
             wide_lights: coarse("canopy_style_wide_lights", key.wide_divisor),
             soft_normals: map("canopy_style_soft_normals"),
             soft_colors: coarse("canopy_style_soft_colors", key.color_divisor),
+            contours: view(texture("canopy_style_contours", CONTOUR_FORMAT, 1, shape_size)),
+            noises: coarse("canopy_style_noises", key.noise_divisor),
             half_blurred: map("canopy_style_half_blurred"),
             half_wide: coarse("canopy_style_half_wide", key.wide_divisor),
             half_colors: coarse("canopy_style_half_colors", key.color_divisor),

@@ -24,13 +24,18 @@
 //! Limits: the layer has no single trees. A tree that is taller than its neighbours, or that stands at the edge, gets
 //! the mean light. Leaves have the mean colour of the stand.
 
+mod layer;
+mod streams;
+
 use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use super::own_crown::{Entry, OwnCrown};
-use super::state::LightState;
-use crate::math::luminance;
+use self::{
+    layer::{Layer, OwnSky, rings},
+    streams::{Streams, Sun},
+};
+use super::{own_crown::OwnCrown, state::LightState};
 
 /// Number of covers in the table, evenly from 0 to 1.
 pub const COVERS: usize = 16;
@@ -42,16 +47,6 @@ pub const DEPTHS: usize = 16;
 const MOST_FILL: f32 = 0.92;
 /// Albedo of the ground under trees: litter and moss, as `shaders/terrain/terrain.wgsl` draws them.
 const FLOOR: Vec3 = Vec3::new(0.062, 0.058, 0.026);
-/// The smallest share of light between crowns.
-const LEAST_SHARE: f32 = 1e-4;
-/// Layers of the two streams, and number of sweeps through them. Few are enough: leaves scatter less than half of the
-/// light.
-const LAYERS: usize = 48;
-const SWEEPS: usize = 12;
-/// Rings of the upper hemisphere, of equal solid angle, and directions in each ring.
-const RINGS: usize = 32;
-const AZIMUTHS: usize = 32;
-
 /// What crowns that shade each other leave of the light of a level layer: with it a forest that is drawn as a surface is as bright
 /// as the trees that end there (`canopy compare` of the demo with `surface_size` 6 and 0).
 const CROWN_SHADE: f32 = 0.42;
@@ -140,9 +135,6 @@ pub struct StandLight {
     shares: Vec<f32>,
 }
 
-/// Sine of a ring's elevation, and its mean radiance.
-type Ring = (f32, Vec3);
-
 impl StandLight {
     /// Computes the table for a light and the stand's trees, with some 250,000 exponentials. Finite and never negative
     /// for any light.
@@ -150,7 +142,6 @@ impl StandLight {
         let open = albedo(light);
         let rings = rings(light);
         let sun = Sun { sine: light.key_direction.y, illuminance: light.key_illuminance };
-        let hidden_sun = Sun { illuminance: Vec3::ZERO, ..sun };
         let own = (0..DEPTHS).map(|row| OwnSky::new(&trees.own_crown(), row as f32 / (DEPTHS - 1) as f32));
         let own: Vec<OwnSky> = own.collect();
         let mut samples = vec![StandSample::default(); COVERS * (DEPTHS + 1)];
@@ -160,12 +151,11 @@ impl StandLight {
             let layer = Layer::new(cover, trees);
             let ground = open.lerp(FLOOR, cover);
             let streams = Streams::new(&layer, &rings, &sun, trees, ground);
-            let shaded = Streams::new(&layer, &rings, &hidden_sun, trees, ground);
             for row in 0..=DEPTHS {
                 let depth = (row as f32 / (DEPTHS - 1) as f32).min(1.0);
                 let within = (depth / layer.length).min(1.0);
                 let (downwelling, upwelling) = streams.at(within);
-                let (shaded_downwelling, shaded_upwelling) = shaded.at(within);
+                let (shaded_downwelling, shaded_upwelling) = streams.shaded_at(within);
                 let (sky_transmittance, trunk_sky_transmittance, sun_transmittance) = match own.get(row) {
                     Some(own) => (
                         own.of_leaves(&layer, &rings),
@@ -187,7 +177,7 @@ impl StandLight {
                     shaded_upwelling,
                 };
                 if row < DEPTHS {
-                    shares[row * COVERS + column] = streams.share_ln((depth / layer.length).min(1.0));
+                    shares[row * COVERS + column] = streams.share_ln(within);
                 }
             }
         }
@@ -251,193 +241,6 @@ fn albedo(light: &LightState) -> Vec3 {
     let lit = light.sky_illuminance + light.key_illuminance * light.key_direction.y.max(0.0);
     let albedo = |c: usize| if lit[c] > 0.0 { (PI * light.ground_radiance[c] / lit[c]).clamp(0.0, 1.0) } else { 0.0 };
     Vec3::from([0, 1, 2].map(albedo))
-}
-
-fn rings(light: &LightState) -> Vec<Ring> {
-    let ring = |index: usize| {
-        let sine = ring_sine(index);
-        let cosine = (1.0 - sine * sine).sqrt();
-        let sum: Vec3 = (0..AZIMUTHS)
-            .map(|azimuth| {
-                let (z, x) = (2.0 * PI * (azimuth as f32 + 0.5) / AZIMUTHS as f32).sin_cos();
-                light.sky_view.sample(Vec3::new(cosine * x, sine, cosine * z))
-            })
-            .sum();
-        (sine, sum / AZIMUTHS as f32)
-    };
-    (0..RINGS).map(ring).collect()
-}
-
-fn ring_sine(ring: usize) -> f32 {
-    (ring as f32 + 0.5) / RINGS as f32
-}
-
-/// Ratio of two sums over the sky; 1 where the sky is black.
-fn ratio(part: Vec3, whole: Vec3) -> Vec3 {
-    Vec3::from([0, 1, 2].map(|c| if whole[c] > 0.0 { (part[c] / whole[c]).clamp(0.0, 1.0) } else { 1.0 }))
-}
-
-/// Crowns of one cover.
-struct Layer {
-    /// Optical depth of all of it, seen straight up.
-    tau: f32,
-    /// Area of a crown's side over that of its top.
-    side: f32,
-    /// Radius of the own crown over the tree's height.
-    own: f32,
-    /// Length of crowns over the tree's height.
-    length: f32,
-}
-
-impl Layer {
-    fn new(cover: f32, trees: &StandTrees) -> Self {
-        let (width, length, fill) = trees.crown();
-        Self { tau: -(1.0 - fill * cover).ln(), side: 4.0 / (PI * width), own: 0.5 * width, length }
-    }
-
-    /// Fraction of light from an elevation of this sine that arrives at `depth`.
-    fn transmittance(&self, depth: f32, sine: f32) -> f32 {
-        let sine = sine.clamp(0.02, 1.0);
-        let cotangent = (1.0 - sine * sine).sqrt() / sine;
-        (-self.tau * (1.0 / self.length + self.side * cotangent) * depth.min(self.length)).exp()
-    }
-
-    /// The same without the tree's own crown.
-    fn neighbour_transmittance(&self, depth: f32, sine: f32) -> f32 {
-        let sine = sine.clamp(0.02, 1.0);
-        let tangent = sine / (1.0 - sine * sine).max(1e-6).sqrt();
-        self.transmittance((depth - self.own * tangent).max(0.0), sine)
-    }
-
-    /// The neighbours' transmittance for the sky's radiance that passes the own crown by these entries.
-    fn sky_transmittance_through<'a>(&self, sky: impl Iterator<Item = (&'a Ring, &'a [Entry])>) -> Vec3 {
-        let (mut part, mut whole) = (Vec3::ZERO, Vec3::ZERO);
-        for ((sine, radiance), entries) in sky {
-            for entry in entries {
-                let seen = *radiance * entry.transmittance;
-                whole += seen;
-                part += seen * self.transmittance(entry.depth, *sine);
-            }
-        }
-        ratio(part, whole)
-    }
-
-    /// Fraction of the sky's irradiance on level ground that the crowns let through.
-    fn sky_flux_transmittance(&self, rings: &[Ring]) -> Vec3 {
-        let part = rings.iter().map(|(sine, radiance)| *radiance * *sine * self.transmittance(1.0, *sine)).sum();
-        ratio(part, rings.iter().map(|(sine, radiance)| *radiance * *sine).sum())
-    }
-
-    /// Transmittance for diffuse light of a layer of the thickness `depth` within the crowns: from the mean of the
-    /// cosine-weighted optical depths.
-    fn diffuse_transmittance(&self, depth: f32) -> f32 {
-        (-self.tau * (1.0 / self.length + 0.5 * PI * self.side) * depth).exp()
-    }
-}
-
-/// What the own crown leaves of the sky at a depth, ring by ring.
-struct OwnSky {
-    leaves: Vec<Vec<Entry>>,
-    trunk: Vec<Entry>,
-}
-
-impl OwnSky {
-    fn new(crown: &OwnCrown, depth: f32) -> Self {
-        let tangent = |ring: usize| {
-            let sine = ring_sine(ring);
-            sine / (1.0 - sine * sine).max(1e-6).sqrt()
-        };
-        Self {
-            leaves: (0..RINGS).map(|ring| crown.entries_of_leaves(depth, tangent(ring)).collect()).collect(),
-            trunk: (0..RINGS).map(|ring| crown.entry_of_trunk(depth, tangent(ring))).collect(),
-        }
-    }
-
-    fn of_leaves(&self, layer: &Layer, rings: &[Ring]) -> Vec3 {
-        layer.sky_transmittance_through(rings.iter().zip(self.leaves.iter().map(Vec::as_slice)))
-    }
-
-    fn of_trunk(&self, layer: &Layer, rings: &[Ring]) -> Vec3 {
-        layer.sky_transmittance_through(rings.iter().zip(self.trunk.iter().map(std::slice::from_ref)))
-    }
-}
-
-struct Sun {
-    sine: f32,
-    illuminance: Vec3,
-}
-
-/// Scattered light of the two-stream equations.
-struct Streams {
-    /// Downwelling and upwelling radiance at each boundary between layers.
-    bounds: Vec<(Vec3, Vec3)>,
-    /// Mean logarithm of the luminance of the irradiance on level surfaces at each of them, scattered light included: some
-    /// are in the sun, the others in the shade.
-    level_ln: Vec<f32>,
-}
-
-impl Streams {
-    fn new(layer: &Layer, rings: &[Ring], sun: &Sun, trees: &StandTrees, ground_albedo: Vec3) -> Self {
-        let scattered = trees.reflectance + trees.transmittance;
-        // Isotropic leaves scatter half of the light backwards, plus a sixth of the difference between reflected and
-        // transmitted light [Sellers 1985, eq. 3].
-        let back = 0.5 * scattered + (trees.reflectance - trees.transmittance) / 6.0;
-        let onward = scattered - back;
-        // Irradiance on a level surface at a depth, of light that has met no leaf.
-        let first = |depth: f32| -> Vec3 {
-            let solid_angle = 2.0 * PI / RINGS as f32;
-            let of_sun = sun.illuminance * (sun.sine.max(0.0) * layer.transmittance(depth, sun.sine));
-            let of_sky =
-                |(sine, radiance): &Ring| *radiance * (*sine * layer.transmittance(depth, *sine) * solid_angle);
-            of_sun + rings.iter().map(of_sky).sum::<Vec3>()
-        };
-        let firsts: Vec<Vec3> = (0..=LAYERS).map(|bound| first(layer.length * bound as f32 / LAYERS as f32)).collect();
-        // The part that each layer intercepts.
-        let taken: Vec<Vec3> = firsts.windows(2).map(|bounds| bounds[0] - bounds[1]).collect();
-        let floor = firsts[LAYERS];
-        let transmittance = layer.diffuse_transmittance(layer.length / LAYERS as f32);
-        let (mut down, mut up) = (vec![Vec3::ZERO; LAYERS + 1], vec![Vec3::ZERO; LAYERS + 1]);
-        for _ in 0..SWEEPS {
-            for layer in 0..LAYERS {
-                let met = (1.0 - transmittance) * (down[layer] * onward + up[layer + 1] * back);
-                down[layer + 1] = down[layer] * transmittance + met + taken[layer] * onward;
-            }
-            up[LAYERS] = ground_albedo * (floor + down[LAYERS]);
-            for layer in (0..LAYERS).rev() {
-                let met = (1.0 - transmittance) * (up[layer + 1] * onward + down[layer] * back);
-                up[layer] = up[layer + 1] * transmittance + met + taken[layer] * back;
-            }
-        }
-        let finite =
-            |flux: Vec3| Vec3::from((flux / PI).to_array().map(|v| if v.is_finite() { v.max(0.0) } else { 0.0 }));
-        let sunlight = sun.illuminance * sun.sine.max(0.0);
-        let level_ln = (0..=LAYERS)
-            .map(|bound| {
-                let lit = layer.transmittance(layer.length * bound as f32 / LAYERS as f32, sun.sine);
-                let shade = firsts[bound] - sunlight * lit + down[bound];
-                lit * luminance(shade + sunlight).ln() + (1.0 - lit) * luminance(shade).ln()
-            })
-            .collect();
-        Self { bounds: down.into_iter().zip(up).map(|(down, up)| (finite(down), finite(up))).collect(), level_ln }
-    }
-
-    /// Mean logarithm of the irradiance of level surfaces at a fraction of the crowns' length, 0..=1, less that above the
-    /// crowns; at least that of [`LEAST_SHARE`], and 0 where there is no light at all.
-    fn share_ln(&self, depth: f32) -> f32 {
-        let (bound, t) = position(depth, LAYERS + 1);
-        let here = self.level_ln[bound] + (self.level_ln[bound + 1] - self.level_ln[bound]) * t;
-        let share = here - self.level_ln[0];
-        if share.is_nan() { 0.0 } else { share.clamp(LEAST_SHARE.ln(), 0.0) }
-    }
-
-    /// Downwelling and upwelling radiance at a fraction of the crowns' length, 0..=1.
-    fn at(&self, depth: f32) -> (Vec3, Vec3) {
-        let position = depth * LAYERS as f32;
-        let bound = (position as usize).min(LAYERS - 1);
-        let (a, b) = (self.bounds[bound], self.bounds[bound + 1]);
-        let t = position - bound as f32;
-        (a.0.lerp(b.0, t), a.1.lerp(b.1, t))
-    }
 }
 
 #[cfg(test)]
