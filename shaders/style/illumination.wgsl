@@ -66,7 +66,7 @@ fn depths_around(index: i32, center: vec2<f32>, step: f32, depth: f32, allowance
 // Metres above the ground below which a position takes the shadow of what is near as sharp as it is.
 const CONTACT_HEIGHT: f32 = 0.5;
 // Softnesses between ground and caster from which on the shadow is as soft as it may be.
-const CONTACT_REACH: f32 = 8.0;
+const CONTACT_REACH: f32 = 24.0;
 
 // Light by the blurred depth test [Luft 2006, eq. 5]: the map's depths under a Gaussian, then the smooth step over the band of
 // +-`style.shadow_softness` metres. On the ground the Gaussian and the band narrow towards the foot of what casts, as a penumbra does [Fernando 2005]:

@@ -1,13 +1,14 @@
 //! What a user chooses: the style of the picture and its values.
 
 use bevy::reflect::{Reflect, std_traits::ReflectDefault};
-use serde::Deserialize;
+use ron::{extensions::Extensions, ser::PrettyConfig};
+use serde::{Deserialize, Serialize};
 
 use super::{palette::BUILT_IN, paper::Paper};
 use crate::math::Range;
 
 /// The style in which a scene is drawn. In a scene file, `style: Watercolour(palette: "sepia")`.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Reflect)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, Reflect)]
 #[reflect(Default)]
 pub enum Style {
     /// As a camera sees it.
@@ -23,7 +24,7 @@ pub enum Style {
 }
 
 /// Values of a watercolour. Lengths in pixels are those of a picture of 720 lines, and grow with others.
-#[derive(Clone, Debug, PartialEq, Deserialize, Reflect)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, Reflect)]
 #[reflect(Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct Watercolour {
@@ -97,7 +98,7 @@ impl Default for Watercolour {
 }
 
 /// To what noise and the trembling of lines are fixed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Reflect)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Serialize, Reflect)]
 pub enum NoiseAnchor {
     /// To the scene, with the same size on paper at every distance [Bénard 2009]: nothing swims when the camera moves.
     #[default]
@@ -109,7 +110,7 @@ pub enum NoiseAnchor {
 }
 
 /// Which normals contours are found in [Luft 2007, fig. 7].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Reflect)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Serialize, Reflect)]
 pub enum LineNormals {
     /// Those of the leaves: clutter, for comparison (fig. 7 a).
     Own,
@@ -121,7 +122,7 @@ pub enum LineNormals {
 }
 
 /// Values of a line drawing.
-#[derive(Clone, Debug, PartialEq, Deserialize, Reflect)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, Reflect)]
 #[reflect(Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct Lines {
@@ -167,7 +168,7 @@ impl Default for Lines {
 }
 
 /// Values of toon shading.
-#[derive(Clone, Debug, PartialEq, Deserialize, Reflect)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, Reflect)]
 #[reflect(Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct Toon {
@@ -192,6 +193,13 @@ impl Default for Toon {
 }
 
 impl Style {
+    /// The style with all of its values as a scene file has it: `Watercolour(palette: "sepia", …)`, a value a line.
+    pub fn to_ron(&self) -> String {
+        let options = ron::Options::default().with_default_extension(Extensions::UNWRAP_VARIANT_NEWTYPES);
+        let pretty = PrettyConfig::new().new_line("\n");
+        options.to_string_pretty(self, pretty).unwrap_or_else(|_| "Photograph".to_owned())
+    }
+
     /// Names on the command line, and the styles with their default values.
     pub const NAMES: [&str; 4] = ["photograph", "watercolour", "lines", "toon"];
 
@@ -306,6 +314,8 @@ mod tests {
             assert!(style.paper().is_none_or(|paper| Paper::named(paper).is_some()));
             assert!(BUILT_IN.iter().any(|(known, _)| *known == style.palette()));
             assert_eq!(style.is_drawn(), name != "photograph");
+            let options = ron::Options::default().with_default_extension(Extensions::UNWRAP_VARIANT_NEWTYPES);
+            assert_eq!(options.from_str::<Style>(&style.to_ron()).as_ref(), Ok(&style), "{}", style.to_ron());
         }
         assert_eq!(Style::named("watercolor"), Style::named("watercolour"));
         assert_eq!(Style::named("oil"), None);

@@ -20,7 +20,7 @@ use super::{session::Session, settings::SettingsPanel};
 use crate::{
     app::{error::AppError, notes::notes, rendered_image::RenderedImage},
     components::DrawnSun,
-    render::components::ViewOptions,
+    render::components::{CanopyStyle, ViewOptions},
 };
 
 /// Captures this frame if the session asks for it.
@@ -28,7 +28,7 @@ pub fn save_image(
     mut commands: Commands,
     session: Res<Session>,
     panel: Res<SettingsPanel>,
-    view: Single<&ViewOptions>,
+    view: Single<(&ViewOptions, &CanopyStyle)>,
     drawn: Option<Res<DrawnSun>>,
 ) {
     if !session.capturing {
@@ -36,9 +36,14 @@ pub fn save_image(
     }
     // The light may lag behind the clock.
     let instant = drawn.map_or_else(|| session.clock.now().to_utc(), |sun| sun.0.instant);
+    let (view, style) = view.into_inner();
     let mut notes = notes(&session.stage, &session.view(), instant);
     if view.tint_levels {
         notes.push(("View", "trees tinted by level of detail".to_owned()));
+    }
+    if *style != session.stage.style {
+        notes.retain(|(name, _)| *name != "Style");
+        notes.push(("Style", format!("{:?}", style.style)));
     }
     notes.extend(panel.notes().map(|light| ("Light", light)));
     let save = move |captured: On<ScreenshotCaptured>, mut session: ResMut<Session>| {

@@ -112,7 +112,9 @@ pub fn handle_keys(
             match panel.handle(input) {
                 Some(text) => print(&text, session),
                 None if input == PanelInput::Write => {
-                    session.show_message("only the lighting of a species is written into scene files".to_owned());
+                    session.show_message(
+                        "only the lighting of a species and the style are written into scene files".to_owned(),
+                    );
                 }
                 None => {}
             }

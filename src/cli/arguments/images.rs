@@ -81,7 +81,7 @@ Keys of the settings, which the mouse changes too:
   Backspace     reset it to the scene's own
   Delete        make it automatic
   Tab           next section; with Shift the previous one
-  Enter         print the lighting for the scene file in the terminal
+  Enter         print the lighting or the style for the scene file in the terminal
 
 Examples:
   canopy fly

@@ -245,7 +245,10 @@ fn albedo(light: &LightState) -> Vec3 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{
+        layer::{RINGS, Ring},
+        *,
+    };
     use crate::light::{Atmosphere, AtmosphereParams, LightSettings, SunPosition};
 
     fn light(elevation: f64) -> LightState {
@@ -380,7 +383,9 @@ mod tests {
         assert!((kept / first(0.0) - 1.0).abs() < 0.01, "{}", kept / first(0.0));
         // Black leaves over white ground send nothing back that they would have to scatter.
         let dark = Streams::new(&layer, &rings, &sun, &StandTrees::BLACK, Vec3::ZERO);
-        assert!(dark.bounds.iter().all(|(down, up)| *down == Vec3::ZERO && *up == Vec3::ZERO));
+        for depth in [0.0, 0.3, 1.0] {
+            assert_eq!((dark.at(depth), dark.shaded_at(depth)), ((Vec3::ZERO, Vec3::ZERO), (Vec3::ZERO, Vec3::ZERO)));
+        }
     }
 
     #[test]

@@ -26,7 +26,7 @@ const KEYS: [(&str, &str); 6] = [
     ("Backspace", "reset it to the scene's own"),
     ("Delete", "make it automatic"),
     ("Tab", "next section"),
-    ("Enter", "print the lighting for the scene file, in the terminal"),
+    ("Enter", "print the lighting or the style for the scene file, in the terminal"),
 ];
 
 /// Draws the panel.

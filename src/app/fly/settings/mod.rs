@@ -28,7 +28,7 @@ use super::controls::PanelInput;
 use crate::{
     assets::Stage,
     components::Sun,
-    render::components::{CanopyCamera, Forest},
+    render::components::{CanopyCamera, CanopyStyle, Forest},
 };
 use fields::{Edit, Edited, Field};
 use species::SpeciesLight;
@@ -51,6 +51,8 @@ pub struct SettingsPanel {
     line: usize,
     species: Vec<SpeciesLight>,
     components: Vec<ComponentSection>,
+    /// The selected section for the scene file, if it is the style.
+    style: Option<String>,
     /// The fields of the selected section in the last frame.
     fields: Vec<Field>,
     /// Edits of them that were not carried out yet.
@@ -77,6 +79,7 @@ impl SettingsPanel {
             line: 0,
             species: SpeciesLight::of_stage(stage),
             components: Vec::new(),
+            style: None,
             fields: Vec::new(),
             edits: Vec::new(),
         }
@@ -93,7 +96,9 @@ impl SettingsPanel {
                 self.turn(forward);
                 return None;
             }
-            PanelInput::Write => return Some(self.species.get(self.section)?.snippet()),
+            PanelInput::Write => {
+                return self.species.get(self.section).map(SpeciesLight::snippet).or_else(|| self.style.clone());
+            }
             PanelInput::Value { up, fine } => Edit::Step { up, fine },
             PanelInput::Automatic => Edit::Automatic,
             PanelInput::Reset => Edit::Reset,
@@ -161,6 +166,7 @@ impl SettingsPanel {
     /// Carries out the edits of the selected section, and lists its fields.
     fn refresh(&mut self, world: &mut World, registry: &TypeRegistry, now: Instant) {
         let edits = std::mem::take(&mut self.edits);
+        self.style = None;
         if let Some(light) = self.species.get_mut(self.section) {
             light.request_values();
             let (fields, changed) = carry_out(&mut light.edited(registry), &edits);
@@ -169,6 +175,7 @@ impl SettingsPanel {
                 light.apply(now);
             }
         } else if let Some(section) = self.component() {
+            let mut written = None;
             let component = registry.get_type_data::<ReflectComponent>(section.type_id);
             let entity = world.get_entity_mut(section.entity).ok();
             let value =
@@ -185,8 +192,12 @@ impl SettingsPanel {
                     left: &mut section.left,
                     registry,
                 };
-                carry_out(&mut edited, &edits).0
+                let fields = carry_out(&mut edited, &edits).0;
+                let style = value.as_any().downcast_ref::<CanopyStyle>();
+                written = style.map(|style| format!("style: {},\n", style.style.to_ron()));
+                fields
             });
+            self.style = written;
         } else {
             self.fields.clear();
         }
@@ -248,6 +259,7 @@ mod tests {
         progress::Silent,
         render::components::{SunShadowSettings, ViewOptions},
         scene::{Lighting, Scene},
+        style::{Style, Watercolour},
     };
 
     type Outcome = Result<(), Box<dyn std::error::Error>>;
@@ -277,7 +289,7 @@ mod tests {
             registry.write().register_derived_types();
             world.insert_resource(registry);
             world.insert_resource(SettingsPanel { open: true, ..SettingsPanel::new(&stage) });
-            world.spawn(CanopyCamera);
+            world.spawn((CanopyCamera, stage.style.clone()));
             world.spawn((Sun::default(), stage.shadow()));
             world.spawn(stage.ground());
             if let Some(forest) = stage.forest() {
@@ -376,6 +388,24 @@ mod tests {
         let pasted = Scene::parse(&SCENE.replace("lighting: Local", &written), "pasted.ron".as_ref())?;
         let text = pasted.species[0].lighting.as_ref().map(Lighting::to_ron);
         assert_eq!(text, flight.panel().species[0].changed());
+        Ok(())
+    }
+
+    #[test]
+    fn a_style_that_was_turned_goes_into_a_scene_file() -> Outcome {
+        let style = Style::Watercolour(Watercolour { palette: "sepia".to_owned(), ..Watercolour::default() });
+        let mut flight = Flight::new(&Scene { trees: crate::scene::Trees::None, style, ..Scene::default() })?;
+        let section = flight.panel().components.iter().position(|section| section.name == "CanopyStyle");
+        flight.panel().section = section.ok_or("no section")?;
+        update(&mut flight.world);
+        flight.select("wetness");
+        flight.up();
+        let mut styles = flight.world.query::<&CanopyStyle>();
+        let turned = styles.single(&flight.world)?.style.clone();
+        assert_ne!(turned, flight.stage.style.style);
+        let written = flight.press(PanelInput::Write).ok_or("nothing written")?;
+        let scene = Scene::parse(&format!("(terrain: Flat(size: 200), {written} trees: None)"), "pasted.ron".as_ref())?;
+        assert_eq!(scene.style, turned);
         Ok(())
     }
 
