@@ -398,6 +398,7 @@ fn gpu_structs_are_what_the_shaders_think() {
             scene,
             noise_anchor,
             textures,
+            softness,
         }
     );
     twin!(layouts, "Layer", LayerUniform { threshold, softness, edge, foliage });

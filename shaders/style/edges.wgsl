@@ -11,7 +11,8 @@ const CROWN_STEP: f32 = 0.4;
 // How strongly the maps change around `uv` within `reach` texels, 0..1: `normals` (scaled by the ambient visibility, which
 // suppresses what is inside a crown) and `light`, whose third channel is the depth.
 fn contour(normals: texture_2d<f32>, lights: texture_2d<f32>, linear_sampler: sampler, uv: vec2<f32>, reach: f32) -> f32 {
-    let span = max(reach, 0.0022 * style.map_size.y);
+    // As wide as the Gaussian: over less, what it has smoothed hardly differs, and lines would break up.
+    let span = max(max(reach, style.softness), 0.3);
     let dx = vec2(span, 0.0) / style.map_size;
     let dy = vec2(0.0, span) / style.map_size;
     let n0 = direction(textureSampleLevel(normals, linear_sampler, uv - dx, 0.0).xyz);

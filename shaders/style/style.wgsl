@@ -38,6 +38,8 @@ struct Style {
     noise_anchor: u32,
     // How much of the textures of near plants is painted.
     textures: f32,
+    // Deviation of the Gaussian of light and depth, pixels of the maps.
+    softness: f32,
 }
 
 @group(1) @binding(0) var<uniform> style: Style;

@@ -79,9 +79,6 @@ fn pigment(intensity: f32, layer: Layer, height: f32, flow: f32) -> Pigment {
 
 // Glazing: transmittances multiply.
 fn glaze(under: vec3<f32>, transmittance: vec3<f32>, density: f32, amount: f32) -> vec3<f32> {
-    if amount <= 0.0 {
-        return under;
-    }
     return mix(under, under * pow(max(transmittance, vec3(1e-3)), vec3(density)), saturate(amount));
 }
 

@@ -138,7 +138,8 @@ pub struct Lines {
     /// How small a discontinuity is drawn, 0 to 4. Default 1.
     #[reflect(@Range::steps(0.0..=4.0, 0.1, 0.02), @"How small a discontinuity is drawn.")]
     pub detail: f32,
-    /// Standard deviation in pixels of a picture of 720 lines of the Gaussian that simplifies shapes, 0 to 20. Default 1.6.
+    /// Standard deviation in pixels of a picture of 720 lines of the Gaussian that simplifies shapes, 0 to 20. Default 2. More gives
+    /// fewer and broader lines.
     #[reflect(@Range::steps(0.0..=20.0, 0.5, 0.1).unit("px"), @"How far shapes are simplified.")]
     pub simplification: f32,
     /// Which normals are used. Default `Scaled`.
@@ -159,7 +160,7 @@ impl Default for Lines {
             paper: Paper::HotPressed.name().to_owned(),
             width: 1.2,
             detail: 1.0,
-            simplification: 1.6,
+            simplification: 2.0,
             normals: LineNormals::default(),
             noise: NoiseAnchor::default(),
             hatching: 0.5,

@@ -28,7 +28,7 @@ impl Deviations {
                 let s = l.simplification;
                 Self { shapes: 0.0, lights: s, wide: 0.0, normals: s, dabs: 0.0 }
             }
-            Style::Toon(_) => Self { shapes: 0.0, lights: 1.6, wide: 0.0, normals: 1.2, dabs: 0.0 },
+            Style::Toon(_) => Self { shapes: 0.0, lights: 2.0, wide: 0.0, normals: 1.4, dabs: 0.0 },
             Style::Photograph => Self { shapes: 0.0, lights: 0.0, wide: 0.0, normals: 0.0, dabs: 0.0 },
         }
     }

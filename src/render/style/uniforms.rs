@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
+use super::deviations::Deviations;
 use crate::{
     render::{components::DrawnStyle, view::PreparedView},
     style::{LineNormals, NoiseAnchor, Style, Watercolour, anchor::anchor},
@@ -64,8 +65,10 @@ pub struct StyleUniform {
     pub noise_anchor: u32,
     /// As [`Watercolour::textures`].
     pub textures: f32,
+    /// Deviation of the Gaussian of light and depth, pixels of the maps.
+    pub softness: f32,
     /// WGSL rounds the size up to 16 bytes.
-    pub padding: [u32; 2],
+    pub padding: u32,
 }
 
 /// `Layer` of `shaders/style/watercolor.wgsl`.
@@ -141,6 +144,7 @@ impl StyleUniform {
             size: float(size),
             map_size: float(map_size),
             tones: 3.0,
+            softness: Deviations::of(&drawn.style).lights * map_unit,
             ..Self::default()
         };
         if let Some(palette) = drawn.palette() {
