@@ -72,9 +72,13 @@ fn trees() -> Vec<(String, Plant)> {
 
 /// A tree that is grown by rule.
 fn grown(triangles: usize, conifer: bool) -> (String, Plant) {
+    let plant = stem(triangles, conifer, 1);
+    (plant.name.clone(), plant)
+}
+
+fn stem(triangles: usize, conifer: bool, seed: u64) -> Plant {
     let species = if conifer { GrowParameters::conifer() } else { GrowParameters::broadleaf() };
-    let plant = grow(&species, 1, triangles).expect("a shipped species grows");
-    (species.name.clone(), plant)
+    grow(&species, seed, triangles).expect("a shipped species grows")
 }
 
 fn triangles(plant: &Plant) -> usize {

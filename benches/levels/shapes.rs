@@ -6,12 +6,12 @@ use std::time::Instant;
 use canopy::bake::levels::cloud::{Cloud, CloudSettings, Clustering, bake_cloud};
 use canopy::bake::lighting::BakedLighting;
 use canopy::math::quadrature::SphereQuadrature;
-use canopy::plant::Plant;
+use canopy::plant::{Plant, grow::TRIANGLES};
 use canopy::trace::{PlantTracer, Ray};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{grown, trees, triangles};
+use super::{grown, stem, trees, triangles};
 
 /// Pixels along a side of the images.
 const SIDE: usize = 96;
@@ -65,7 +65,7 @@ pub fn reductions() {
         ("4.22", 407_240, 120, false),
         ("4.23", 166_603, 388, true),
     ] {
-        let (name, plant) = grown(full, conifer);
+        let (name, plant) = coppice(full, conifer);
         // Two triangles a plane, and one of wood for each plane.
         let settings = CloudSettings { planes: reduced / 3, ..CloudSettings::default() };
         let started = Instant::now();
@@ -81,6 +81,16 @@ pub fn reductions() {
             cloud.deviation / plant.height(),
         );
     }
+}
+
+/// A plant of `triangles` in as few stems as grow so many.
+fn coppice(triangles: usize, conifer: bool) -> (String, Plant) {
+    let stems = triangles.div_ceil(*TRIANGLES.end());
+    let (name, mut plant) = grown(triangles / stems, conifer);
+    for seed in 2..=stems as u64 {
+        plant.parts.extend(stem(triangles / stems, conifer, seed).parts);
+    }
+    (if stems > 1 { format!("{name} of {stems} stems") } else { name }, plant)
 }
 
 /// Texels per metre of the first plane.

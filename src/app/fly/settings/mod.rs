@@ -404,7 +404,10 @@ mod tests {
         let turned = styles.single(&flight.world)?.style.clone();
         assert_ne!(turned, flight.stage.style.style);
         let written = flight.press(PanelInput::Write).ok_or("nothing written")?;
-        let scene = Scene::parse(&format!("(terrain: Flat(size: 200), {written} trees: None)"), "pasted.ron".as_ref())?;
+        let scene = Scene::parse(
+            &format!("(terrain: Flat(size: 200), {written} trees: None, place: (latitude: 47.5, longitude: 9.2))"),
+            "pasted.ron".as_ref(),
+        )?;
         assert_eq!(scene.style, turned);
         Ok(())
     }
