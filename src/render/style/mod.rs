@@ -1,9 +1,9 @@
 //! The styles: watercolour [Luft 2006], lines and toon shading [Luft 2007, section 4], instead of the photographic picture.
 //!
 //! ```text
-//! surfaces ───> illumination ──> blur ────────> particles ──> blur ──────> picture, after Bevy's tone mapping
-//! depth, layer, lighting map,    light, depth,  three         dabs, layers
-//! normal × k_a, soft shadow      normals        intensities   of the ID
+//! surfaces ───> illumination ──> blur ────────> particles ──> blur ──────> contours ──> picture, after
+//! depth, layer, lighting map,    light, depth,  three         dabs, layers and noise,   Bevy's tone
+//! normal × k_a, soft shadow      normals        intensities   of the ID    for washes   mapping
 //! albedo                                        of near trees image
 //! ```
 //!
