@@ -14,7 +14,7 @@ use super::errors::{SUNS, sun};
 use super::trees;
 
 /// Upright planes; the first is the default.
-const UPRIGHTS: [u32; 6] = [2, 1, 3, 4, 6, 8];
+const UPRIGHTS: [u32; 6] = [4, 1, 2, 3, 6, 8];
 /// Directions to the camera, evenly over a quarter of a turn.
 const TURNS: u32 = 8;
 /// Largest size of a cross in pixels.
