@@ -132,7 +132,7 @@ pub struct Lines {
     /// Name of a paper. Default `"hot-pressed"`.
     #[reflect(ignore, clone)]
     pub paper: String,
-    /// Width of a line in pixels of a picture of 720 lines, 0.25 to 10. Default 1.2.
+    /// Width of a line in pixels of a picture of 720 lines, 0.25 to 10; lines are at least as wide as `simplification`. Default 1.2.
     #[reflect(@Range::steps(0.25..=10.0, 0.25, 0.05).unit("px"), @"Width of lines.")]
     pub width: f32,
     /// How small a discontinuity is drawn, 0 to 4. Default 1.
@@ -176,7 +176,7 @@ pub struct Toon {
     /// Tones of each colour, 2 to 8. Default 3.
     #[reflect(@Range::steps(2..=8, 1.0, 1.0), @"Tones of each colour.")]
     pub tones: u32,
-    /// Width of the contours in pixels of a picture of 720 lines, 0 to 10; 0: none. Default 1.2.
+    /// Width of the contours in pixels of a picture of 720 lines, 0 to 10; 0: none, else at least 2. Default 1.2.
     #[reflect(@Range::steps(0.0..=10.0, 0.25, 0.05).unit("px"), @"Width of contours; 0: none.")]
     pub width: f32,
     /// How small a discontinuity has a contour, 0 to 4. Default 0.8.
