@@ -20,6 +20,8 @@ struct Frame {
     forest_surface: vec4<f32>,
     // Albedo of crowns that are seen together.
     crown_albedo: vec3<f32>,
+    // For each of the first layers of foliage of the styles, the fraction of the forest's leaves in it and in those before it, 0..1.
+    crown_layers: vec4<f32>,
 }
 
 // The current light, premultiplied by the exposure.

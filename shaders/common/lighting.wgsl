@@ -181,7 +181,8 @@ fn shade_leaves(surface: Surface, lit: f32, visibility: f32, sky: vec3<f32>) -> 
     // The leaves' own shade, for the gloss: what they show over what they would show without it.
     let sides = key_cosines(surface);
     let through = dot(surface.transmission, LUMINANCE);
-    let own = saturate(lit * (1.0 + through) / max(sides.x + through * sides.y, 0.05));
+    let reflected = dot(share, LUMINANCE);
+    let own = saturate(lit * (reflected + through) / max(reflected * sides.x + through * sides.y, 0.05));
     let diffuse = surface.albedo * (share + surface.transmission) * lit;
     return full * visibility * (diffuse + gloss * own) + surface.albedo * sky;
 }

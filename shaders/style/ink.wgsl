@@ -1,9 +1,9 @@
 // Lines, and toon shading with contours [Luft 2007, section 4; Decaudin 1996].
 #import canopy::constants::PAPER_SIDE
-#import canopy::frame::{light, relative_position}
+#import canopy::frame::light
 #import canopy::style::{style, full_screen, FullScreen, airiness}
 #import canopy::style_edges::contour
-#import canopy::style_noise::{anchored_noise, noise_place, SKY_RADIUS}
+#import canopy::style_noise::{anchored_noise, noise_place}
 #import canopy::style_strokes::stroke_ink
 
 @group(1) @binding(1) var depths: texture_depth_2d;
@@ -51,9 +51,9 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let page = in.uv * style.size / style.unit;
     let height = textureSampleLevel(papers, paper_sampler, page / PAPER_SIDE, 0.0).x;
     let texel = vec2<i32>(clamp(in.uv * style.map_size, vec2(0.0), style.map_size - 1.0));
-    let seen = textureLoad(depths, texel, 0);
-    let sky = seen <= 0.0;
-    let point = relative_position(in.uv, seen);
+    let depth = textureLoad(depths, texel, 0);
+    let sky = depth <= 0.0;
+    let place = noise_place(in.uv, depth);
 #ifdef TOON
     // The maps are twice as fine as the picture: the mean of four.
     let first = vec2<i32>(floor(in.uv * style.map_size - 0.5));
@@ -63,17 +63,12 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
         color += 0.25 * toned(clamp(first + vec2(i & 1, i >> 1u), vec2(0), last));
     }
     let drawn = contour(soft_normals, soft_lights, linear_sampler, in.uv, style.line_width) * f32(style.line_width > 0.0);
-    let distance = length(point);
     let soft = textureSampleLevel(soft_lights, linear_sampler, in.uv, 0.0);
-    let strokes = stroke_ink(in.uv, distance, soft.z, 1.0 - soft.x, identities) * f32(!sky);
+    let strokes = stroke_ink(in.uv, place.distance, soft.z, 1.0 - soft.x, identities) * f32(!sky);
     return vec4(mix(color, style.ink * 0.4, saturate(max(1.2 * drawn, strokes))), 1.0);
 #else
-    let relative = select(point, normalize(point) * SKY_RADIUS, sky);
-    let place = noise_place(page, relative, sky);
-    let position = place.position;
-    let footprint = place.pixel;
-    let middle = anchored_noise(position, footprint * 26.0, 2u);
-    let fine = anchored_noise(position, footprint * 5.0, 3u);
+    let middle = anchored_noise(place.position, place.pixel * 26.0, 2u);
+    let fine = anchored_noise(place.position, place.pixel * 5.0, 3u);
     // A pen in a hand.
     let tremble = vec2(middle, fine) * vec2(0.8, 0.6) * style.unit / style.size;
     let soft = textureSampleLevel(soft_lights, linear_sampler, in.uv + tremble, 0.0);
@@ -88,7 +83,7 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let hatched = style.hatching * 0.7 * max(first * smoothstep(0.22, 0.40, dark), second * smoothstep(0.5, 0.65, dark));
     let pressure = 0.85 + 0.25 * middle;
     let grain = smoothstep(0.1, 0.5, height + 0.35);
-    let strokes = stroke_ink(in.uv + 0.3 * tremble, length(point), soft.z, dark, identities) * f32(!sky);
+    let strokes = stroke_ink(in.uv + 0.3 * tremble, place.distance, soft.z, dark, identities) * f32(!sky);
     let ink = saturate(max(max(drawn * 1.25, hatched), 1.1 * strokes) * pressure * grain * (1.0 - 0.6 * air));
     return vec4(mix(style.paper * (1.0 + 0.12 * (height - 0.5)), style.ink * 0.7, ink), 1.0);
 #endif

@@ -3,7 +3,7 @@
 #define_import_path canopy::style_noise
 
 #import canopy::constants::NOISE_SPAN
-#import canopy::frame::frame
+#import canopy::frame::{frame, relative_position}
 #import canopy::hash::mix32
 #import canopy::style::style
 
@@ -37,25 +37,35 @@ fn value_noise(p: vec3<f32>, wrap: i32, seed: u32) -> f32 {
 // The sky is a sphere, metres.
 const SKY_RADIUS: f32 = 4000.0;
 
-// Where noise is looked up, and the length there that is a pixel of a picture of 720 lines.
+// Where noise is looked up for a pixel.
 struct NoisePlace {
     position: vec3<f32>,
+    // The length there that is a pixel of a picture of 720 lines.
     pixel: f32,
+    // Metres from the camera to what is seen.
+    distance: f32,
 }
 
 // Metres a pixel of noise that has one size in metres: that of a tree some 20 m away.
 const SOLID_PIXEL: f32 = 0.03;
 
-// The place of noise for `page` (pixels of a picture of 720 lines), where what lies `relative` metres from the camera is seen. The sky
-// turns with the view and does not move with the camera.
-fn noise_place(page: vec2<f32>, relative: vec3<f32>, sky: bool) -> NoisePlace {
+// The place of noise for a pixel in which `depth` is seen; that of the sky is 0. The sky turns with the view and does not move with the
+// camera.
+fn noise_place(uv: vec2<f32>, depth: f32) -> NoisePlace {
+    // In pixels of a picture of 720 lines.
+    let page = uv * style.size / style.unit;
+    let sky = depth <= 0.0;
+    let along = relative_position(uv, depth);
+    let relative = select(along, normalize(along) * SKY_RADIUS, sky);
     let on_page = style.noise_anchor == 1u;
     let solid = style.noise_anchor == 2u;
     let position = relative + select(style.anchor, vec3(0.0), sky);
-    let footprint = length(relative) / frame.focal_length_pixels * style.unit;
+    let distance = length(relative);
+    let footprint = distance / frame.focal_length_pixels * style.unit;
     return NoisePlace(
         select(position, vec3(page, 0.0), on_page),
         select(select(footprint, SOLID_PIXEL, solid), 1.0, on_page),
+        distance,
     );
 }
 

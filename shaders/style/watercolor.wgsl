@@ -1,8 +1,7 @@
 // Watercolour: layers of pigment on paper [Luft 2006]. The equations of a layer are those of src/style/wash.rs.
 #import canopy::constants::PAPER_SIDE
-#import canopy::frame::relative_position
 #import canopy::style::{style, full_screen, FullScreen, airiness}
-#import canopy::style_noise::{anchored_noise, noise_place, SKY_RADIUS}
+#import canopy::style_noise::{anchored_noise, noise_place}
 #import canopy::style_strokes::stroke_ink
 
 struct Layer {
@@ -107,19 +106,15 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
 
     // Noise that moves with what is painted.
     let texel = vec2<i32>(clamp(in.uv * style.map_size, vec2(0.0), style.map_size - 1.0));
-    let seen = textureLoad(depths, texel, 0);
-    let sky = seen <= 0.0;
-    let along = relative_position(in.uv, seen);
-    let relative = select(along, normalize(along) * SKY_RADIUS, sky);
-    let place = noise_place(page, relative, sky);
-    let position = place.position;
-    let footprint = place.pixel;
+    let depth = textureLoad(depths, texel, 0);
+    let sky = depth <= 0.0;
+    let place = noise_place(in.uv, depth);
     let noise = textureSampleLevel(noises, linear_sampler, in.uv, 0.0);
     let middle = noise.x;
     let broad = noise.y;
     let cloud = noise.z;
-    let fine = anchored_noise(position, footprint * 6.0, 3u);
-    let finer = anchored_noise(position, footprint * 3.2, 4u);
+    let fine = anchored_noise(place.position, place.pixel * 6.0, 3u);
+    let finer = anchored_noise(place.position, place.pixel * 3.2, 4u);
 
     // The hand: shapes waver.
     let waver = (vec2(middle, broad) * (1.8 + 5.0 * style.wetness) + vec2(fine, finer) * 0.5) * style.unit / style.size;
@@ -214,7 +209,7 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let grain = smoothstep(0.25, 0.55, height + 0.16 * finer);
     let pencil = 1.6 * sketched * grain * style.sketch * (0.9 + 0.5 * broad) * (1.0 - 0.7 * air);
     let stroke_uv = in.uv + 0.3 * vec2(middle, fine) * style.unit / style.size;
-    let strokes = stroke_ink(stroke_uv, length(relative), soft.z, max(1.0 - form, soft.y), identities) * f32(!sky);
+    let strokes = stroke_ink(stroke_uv, place.distance, soft.z, max(1.0 - form, soft.y), identities) * f32(!sky);
     let brushed = strokes * mix(0.75, 1.0, grain) * (1.0 - 0.7 * air);
     color = mix(color, style.ink * style.paper, saturate(max(pencil, brushed)) * 0.85);
 

@@ -12,6 +12,7 @@
 #endif
 #ifdef STYLED
 #import canopy::constants::{GROUND_LAYER, FIRST_FOLIAGE_LAYER}
+#import canopy::ground_noise::noise_band
 #import canopy::style_surface::{StyledSurface, styled_surface}
 #endif
 
@@ -265,11 +266,26 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
 }
 
 #ifdef STYLED
-// The surface alone: the styles light it themselves. Forest whose trees are not drawn is of the first layer of foliage.
+// What of a forest's surface makes it look like the trees that end here: mean ambient visibility of what is seen of crowns, and the slope
+// of their relief.
+const CROWN_VISIBILITY: f32 = 0.2;
+const CROWN_SLOPE: f32 = 0.6;
+
+// The surface alone: the styles light it themselves. Forest whose trees are not drawn is of the layers of their foliage.
 @fragment
 fn styled(in: Varying) -> StyledSurface {
     let seen = seen_at(in);
-    let layer = select(GROUND_LAYER, FIRST_FOLIAGE_LAYER, (seen.far > 0.5) & (seen.undrawn > 0.3));
-    return styled_surface(seen.normal, 1.0, 0.0, vec2(layer, 128u), seen.color.albedo);
+    if (seen.far <= 0.5) | (seen.undrawn <= 0.3) {
+        return styled_surface(seen.normal, 1.0, 0.0, vec2(GROUND_LAYER, 128u), seen.color.albedo);
+    }
+    // Octaves of 8 to 32 m. Crowns are upright: they are as wide in the picture at whatever angle the ground is seen.
+    let across = length(in.relative) / frame.focal_length_pixels;
+    let band = noise_band(frame.camera.xz + in.relative.xz, 5, 3, across);
+    let crowns = band.value * inverseSqrt(max(1.0 - band.lost, 1e-2));
+    // Evenly distributed: the logistic function is near the integral of a normal distribution.
+    let even = 1.0 / (1.0 + exp(-1.7 * crowns));
+    let layer = FIRST_FOLIAGE_LAYER + u32(even.y > frame.crown_layers.x) + u32(even.y > frame.crown_layers.y) + u32(even.y > frame.crown_layers.z);
+    let normal = seen.normal + CROWN_SLOPE * vec3(crowns.x, 0.0, crowns.y);
+    return styled_surface(normal, CROWN_VISIBILITY, 0.0, vec2(layer, u32(255.0 * even.x)), seen.color.albedo);
 }
 #endif

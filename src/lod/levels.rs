@@ -97,6 +97,15 @@ impl Levels {
         levels
     }
 
+    /// The same levels in a picture in which as many as `blur` pixels become one: trees give way to the surface of the forest that many
+    /// times sooner, but not before their last level begins. Values below 1, and what is not a number, change nothing.
+    #[must_use]
+    pub fn blurred(mut self, blur: f32) -> Self {
+        self.surface = self.surface.map(|fade| fade.scaled(blur.max(1.0).recip()));
+        self.sanitize();
+        self
+    }
+
     /// The factor on the distances in such a view.
     pub fn view_factor(&self, zoom: f32, focal_pixels: f32) -> f32 {
         if self.by_pixels { focal_pixels / error_curve::nominal_focal_length() } else { zoom }
@@ -285,6 +294,14 @@ mod tests {
             assert_eq!(seen.surface(), seen.fade_out(1));
             assert!(!seen.draws(1, 1.01 * band.end) && seen.draws(1, 0.5 * (band.start + band.end)));
         }
+        // Blurred, it begins sooner, and never farther away.
+        let band = |levels: Levels| levels.surface().expect("a surface").start;
+        let sharp = band(levels.clone());
+        assert!((3.0 * band(levels.clone().blurred(3.0)) / sharp - 1.0).abs() < 1e-5);
+        for nothing in [1.0, 0.2, 0.0, -2.0, f32::NAN] {
+            assert_eq!(band(levels.clone().blurred(nothing)), sharp);
+        }
+        assert_eq!(band(levels.clone().blurred(f32::INFINITY)), 80.0);
         // In a tiny image it begins behind the levels.
         let tiny = levels.in_view(1.0, 1.0);
         assert!(tiny.surface().is_some_and(|band| band.start >= 80.0 && band.end >= band.start));

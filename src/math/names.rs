@@ -1,4 +1,10 @@
-//! Names that people write: their words, and what a misspelt one was meant to be.
+//! Names that people write: which there are, their words, and what a misspelt one was meant to be.
+
+/// The names among which a text is chosen. A field of a setting that can be reflected states them as an attribute,
+/// `#[reflect(@Names(&["rough", "smooth"]))]`, and a panel lists them.
+#[derive(Clone, Copy, Debug, PartialEq, bevy::reflect::Reflect)]
+#[reflect(from_reflect = false)]
+pub struct Names(#[reflect(ignore)] pub &'static [&'static str]);
 
 /// The name of `known` with the least edit distance from `name`, whatever their case; of equally near ones the first.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {

@@ -3,7 +3,13 @@
 use std::sync::Arc;
 
 use bevy::{
-    ecs::{component::Component, query::QueryItem, reflect::ReflectComponent},
+    ecs::{
+        component::Component,
+        query::{Changed, QueryItem},
+        reflect::ReflectComponent,
+        system::Query,
+    },
+    log::warn,
     reflect::{Reflect, std_traits::ReflectDefault},
     render::{extract_component::ExtractComponent, sync_component::SyncComponent},
 };
@@ -22,20 +28,25 @@ use crate::style::{Palette, PaletteError, Paper, Style, palette};
 #[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
 #[reflect(Component, Default)]
 pub struct CanopyStyle {
-    /// The style and its values. Another palette takes effect by [`CanopyStyle::new`] only.
+    /// The style and its values. Another palette is read when its name changes; if it cannot be read, the old one stays and a warning
+    /// says why.
     pub style: Style,
     /// The pigments.
     #[reflect(ignore, clone)]
     palette: Arc<Pigments>,
 }
 
-/// A palette; by default the first one of the program.
+/// A palette and the name by which it was asked for; by default the first one of the program.
 #[derive(Clone, Debug, PartialEq)]
-struct Pigments(Option<Palette>);
+struct Pigments {
+    name: String,
+    palette: Option<Palette>,
+}
 
 impl Default for Pigments {
     fn default() -> Self {
-        Self(Palette::named(palette::BUILT_IN[0].0).ok())
+        let name = palette::NAMES[0];
+        Self { name: name.to_owned(), palette: Palette::named(name).ok() }
     }
 }
 
@@ -45,8 +56,29 @@ impl CanopyStyle {
     /// # Errors
     /// [`PaletteError`].
     pub fn new(style: Style) -> Result<Self, PaletteError> {
-        let palette = Palette::load(style.palette())?;
-        Ok(Self { style, palette: Arc::new(Pigments(Some(palette))) })
+        let name = style.palette().to_owned();
+        let palette = Some(Palette::load(&name)?);
+        Ok(Self { style, palette: Arc::new(Pigments { name, palette }) })
+    }
+}
+
+/// Reads the palettes of styles that name another one than they have.
+pub(super) fn follow_palettes(mut styles: Query<&mut CanopyStyle, Changed<CanopyStyle>>) {
+    for mut style in &mut styles {
+        let name = style.style.palette();
+        if style.palette.name == name {
+            continue;
+        }
+        let palette = match Palette::load(name) {
+            Ok(palette) => Some(palette),
+            Err(error) => {
+                warn!("{error}; the palette `{}` stays", style.palette.name);
+                style.palette.palette.clone()
+            }
+        };
+        // A name that cannot be read is not tried again.
+        let pigments = Pigments { name: name.to_owned(), palette };
+        style.palette = Arc::new(pigments);
     }
 }
 
@@ -61,7 +93,7 @@ pub struct DrawnStyle {
 impl DrawnStyle {
     /// The pigments.
     pub fn palette(&self) -> Option<&Palette> {
-        self.palette.0.as_ref()
+        self.palette.palette.as_ref()
     }
 
     /// The paper: the default one for a name that is none.
@@ -87,5 +119,35 @@ impl ExtractComponent for CanopyStyle {
 
     fn extract_component(item: QueryItem<'_, '_, Self::QueryData>) -> Option<DrawnStyle> {
         item.style.is_drawn().then(|| DrawnStyle { style: item.style.clone(), palette: item.palette.clone() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::ecs::{system::RunSystemOnce, world::World};
+
+    use super::*;
+    use crate::style::Watercolour;
+
+    fn watercolour(palette: &str) -> Style {
+        Style::Watercolour(Watercolour { palette: palette.to_owned(), ..Watercolour::default() })
+    }
+
+    #[test]
+    fn pigments_follow_the_name_of_the_palette() -> Result<(), Box<dyn std::error::Error>> {
+        let mut world = World::new();
+        let camera = world.spawn(CanopyStyle::new(watercolour("natural"))?).id();
+        let mut rename = |name: &str| -> Result<CanopyStyle, Box<dyn std::error::Error>> {
+            world.get_mut::<CanopyStyle>(camera).ok_or("no style")?.style = watercolour(name);
+            world.run_system_once(follow_palettes).map_err(|error| error.to_string())?;
+            Ok(world.get::<CanopyStyle>(camera).ok_or("no style")?.clone())
+        };
+        let sepia = rename("sepia")?;
+        assert_eq!(sepia, CanopyStyle::new(watercolour("sepia"))?);
+        // A name without a palette keeps the pigments.
+        let none = rename("no such palette")?;
+        assert_eq!(none.palette.palette, sepia.palette.palette);
+        assert_eq!(rename("indigo")?, CanopyStyle::new(watercolour("indigo"))?);
+        Ok(())
     }
 }

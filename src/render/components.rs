@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bevy::{
-    app::{App, Plugin},
+    app::{App, Plugin, PostUpdate},
     camera::{Camera3d, Exposure, Hdr, visibility::Visibility},
     core_pipeline::tonemapping::Tonemapping,
     ecs::{
@@ -30,6 +30,7 @@ use crate::{
     terrain::{Drape, Terrain},
 };
 
+use super::camera_style::follow_palettes;
 pub use super::camera_style::{CanopyStyle, DrawnStyle};
 pub use crate::bake::lighting::SunLight;
 
@@ -356,7 +357,8 @@ impl Plugin for ComponentsPlugin {
         .init_resource::<CanopyOrigin>()
         .init_resource::<LightUpdates>()
         .init_resource::<ForestUpdates>()
-        .init_resource::<TreeLists>();
+        .init_resource::<TreeLists>()
+        .add_systems(PostUpdate, follow_palettes);
     }
 }
 

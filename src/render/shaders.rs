@@ -92,7 +92,7 @@ shader_files! {
     StyleBlur = "style/blur.wgsl",
     StyleParticles = "style/particles.wgsl",
     StyleContours = "style/contours.wgsl",
-    StyleNoises = "style/noises.wgsl",
+    StyleNoiseMap = "style/noise_map.wgsl",
     StyleWatercolor = "style/watercolor.wgsl",
     StyleInk = "style/ink.wgsl",
 }

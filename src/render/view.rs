@@ -33,6 +33,7 @@ use super::{
     components::{CameraOpenness, CanopyCamera, DrawnStyle, ViewOptions},
     extract::ExtractedScene,
     sets::CanopyRenderSystems,
+    style::Deviations,
 };
 use crate::{cull::Frustum, lod::level_distance::NOMINAL_FIELD_OF_VIEW};
 
@@ -101,6 +102,9 @@ pub struct PreparedView {
     pub options: ViewOptions,
     /// Whether it is drawn in a style, without the photographic passes.
     pub styled: bool,
+    /// How many pixels the Gaussians of its style make into one, at least 1. Trees give way to the surface of the forest as many times
+    /// sooner.
+    pub blur: f32,
 }
 
 /// The one view that Canopy draws, if there is one.
@@ -133,7 +137,7 @@ fn prepare_view(
             Option<&CameraOpenness>,
             Has<MotionVectorPrepass>,
             Has<DeferredPrepass>,
-            Has<DrawnStyle>,
+            Option<&DrawnStyle>,
         ),
         With<CanopyCamera>,
     >,
@@ -149,7 +153,7 @@ fn prepare_view(
             views.len()
         );
     }
-    let Some((entity, view, camera, msaa, options, openness, motion_vectors, deferred, styled)) =
+    let Some((entity, view, camera, msaa, options, openness, motion_vectors, deferred, style)) =
         views.into_iter().next()
     else {
         return;
@@ -197,6 +201,7 @@ fn prepare_view(
             _ => 1.0,
         },
         options: options.copied().unwrap_or_default(),
-        styled,
+        styled: style.is_some(),
+        blur: style.map_or(1.0, |drawn| Deviations::of(&drawn.style).blur(size.y)),
     });
 }

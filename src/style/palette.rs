@@ -90,13 +90,15 @@ macro_rules! built_in {
         /// Names and texts of the palettes that ship with the program.
         pub const BUILT_IN: [(&str, &str); [$($name),+].len()] =
             [$(($name, include_str!(concat!("../../assets/palettes/", $name, ".ron")))),+];
+        /// Names of the palettes that ship with the program.
+        pub const NAMES: &[&str] = &[$($name),+];
     };
 }
 
 built_in!("natural", "sepia", "cool-to-warm", "autumn", "indigo", "botanical");
 
 fn names() -> String {
-    BUILT_IN.map(|(name, _)| name).join(", ")
+    NAMES.join(", ")
 }
 
 impl Palette {
@@ -114,7 +116,7 @@ impl Palette {
             Some((known, text)) => Self::parse(text, known),
             None => Err(PaletteError::Unknown {
                 name: name.to_owned(),
-                nearest: nearest(name, BUILT_IN.map(|(known, _)| known)).unwrap_or("natural"),
+                nearest: nearest(name, NAMES.iter().copied()).unwrap_or("natural"),
             }),
         }
     }

@@ -24,6 +24,15 @@ impl Paper {
     /// All papers.
     pub const ALL: [Self; 5] = [Self::HotPressed, Self::ColdPressed, Self::Rough, Self::Laid, Self::Canvas];
 
+    /// Their names.
+    pub const NAMES: &[&str] = &[
+        Self::HotPressed.name(),
+        Self::ColdPressed.name(),
+        Self::Rough.name(),
+        Self::Laid.name(),
+        Self::Canvas.name(),
+    ];
+
     /// Name in scene files and on the command line.
     pub const fn name(self) -> &'static str {
         match self {

@@ -4,8 +4,11 @@ use bevy::reflect::{Reflect, std_traits::ReflectDefault};
 use ron::{extensions::Extensions, ser::PrettyConfig};
 use serde::{Deserialize, Serialize};
 
-use super::{palette::BUILT_IN, paper::Paper};
-use crate::math::Range;
+use super::{
+    palette::{BUILT_IN, NAMES},
+    paper::Paper,
+};
+use crate::math::{Range, names::Names};
 
 /// The style in which a scene is drawn. In a scene file, `style: Watercolour(palette: "sepia")`.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, Reflect)]
@@ -29,10 +32,10 @@ pub enum Style {
 #[serde(deny_unknown_fields, default)]
 pub struct Watercolour {
     /// Name of a palette, or the path of a palette's `.ron` file. Default `"natural"`.
-    #[reflect(ignore, clone)]
+    #[reflect(@Names(NAMES), @"The pigments.")]
     pub palette: String,
     /// Name of a paper: `"hot-pressed"`, `"cold-pressed"`, `"rough"`, `"laid"` or `"canvas"`. Default `"cold-pressed"`.
-    #[reflect(ignore, clone)]
+    #[reflect(@Names(Paper::NAMES), @"The paper.")]
     pub paper: String,
     /// Standard deviation in pixels of the Gaussian that simplifies shapes, 0 to 20. Default 2.5.
     #[reflect(@Range::steps(0.0..=20.0, 0.5, 0.1).unit("px"), @"How far shapes are simplified.")]
@@ -127,10 +130,10 @@ pub enum LineNormals {
 #[serde(deny_unknown_fields, default)]
 pub struct Lines {
     /// Name of a palette, or the path of its `.ron` file, of which paper and ink are used. Default `"natural"`.
-    #[reflect(ignore, clone)]
+    #[reflect(@Names(NAMES), @"The pigments.")]
     pub palette: String,
     /// Name of a paper. Default `"hot-pressed"`.
-    #[reflect(ignore, clone)]
+    #[reflect(@Names(Paper::NAMES), @"The paper.")]
     pub paper: String,
     /// Width of a line in pixels of a picture of 720 lines, 0.25 to 10; lines are at least as wide as `simplification`. Default 1.2.
     #[reflect(@Range::steps(0.25..=10.0, 0.25, 0.05).unit("px"), @"Width of lines.")]

@@ -32,7 +32,9 @@ use glam::{DVec3, Vec3};
 
 use super::{components::Ground, extract::ExtractedScene, gpu, view::PreparedFrame};
 use crate::terrain::ground_noise::NOISE_BLOCK;
-use uniforms::{CascadeUniform, CascadeViewUniform, FrameUniform, LightUniform, MAX_CASCADES, ShadowUniform};
+use uniforms::{
+    CascadeUniform, CascadeViewUniform, FOREST_LAYERS, FrameUniform, LightUniform, MAX_CASCADES, ShadowUniform,
+};
 
 /// Mean height of the surface of a closed forest over that of its trees.
 const SURFACE_HEIGHT: f32 = 0.75;
@@ -128,6 +130,8 @@ pub struct SharedPlacement {
     pub mean_cover: f32,
     /// Albedo of crowns that are seen together, as a surface.
     pub crown_albedo: Vec3,
+    /// For each of the first layers of foliage of the styles, the fraction of the forest's leaves in it and in those before it, 0..1.
+    pub crown_layers: [f32; FOREST_LAYERS],
 }
 
 /// Group 0 of this frame and its view; empty while a part of it is missing.
@@ -197,7 +201,7 @@ fn noise_position(value: f64) -> (i32, f32) {
     (block as i64 as i32, (value - block * NOISE_BLOCK) as f32)
 }
 
-/// The values of [`FrameUniform::forest_surface`].
+/// The values of [`FrameUniform::forest_surface`], for pixels as coarse as those of a style.
 fn forest_surface(ground: Option<&Ground>, focal_pixels: f32) -> [f32; 4] {
     match ground.and_then(|ground| ground.forest_surface) {
         Some(surface) => {
@@ -232,9 +236,13 @@ fn prepare_bind_group(
         mean_cover: placement.mean_cover,
         openness: view.openness,
         noise_block: [block_x, block_z],
-        forest_surface: forest_surface(scene.ground.as_ref().map(|(_, ground, _)| ground), view.focal_pixels),
+        forest_surface: forest_surface(
+            scene.ground.as_ref().map(|(_, ground, _)| ground),
+            view.focal_pixels / view.blur,
+        ),
         crown_albedo: placement.crown_albedo.to_array(),
-        end_padding: 0.0,
+        albedo_padding: 0.0,
+        crown_layers: placement.crown_layers,
     };
     let light_uniform = light::light_uniform(&daylight.0, view.exposure);
     let shadow_uniform = ShadowUniform {

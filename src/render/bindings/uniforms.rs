@@ -2,6 +2,9 @@
 
 use bytemuck::{Pod, Zeroable};
 
+/// Layers of foliage that the surface of a forest shows.
+pub const FOREST_LAYERS: usize = 4;
+
 /// Maximum number of cascades of a view.
 pub const MAX_CASCADES: usize = 4;
 
@@ -28,8 +31,10 @@ pub struct FrameUniform {
     pub forest_surface: [f32; 4],
     /// Albedo of crowns that are seen together.
     pub crown_albedo: [f32; 3],
-    /// WGSL rounds the size up to 16 bytes.
-    pub end_padding: f32,
+    /// WGSL begins a vector of four values at 16 bytes.
+    pub albedo_padding: f32,
+    /// For each of the first layers of foliage of the styles, the fraction of the forest's leaves in it and in those before it, 0..1.
+    pub crown_layers: [f32; FOREST_LAYERS],
 }
 
 /// `Light` of `frame.wgsl`, premultiplied by the exposure.

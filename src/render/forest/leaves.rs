@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use crate::{bake::BakedPlant, light::StandTrees, scatter::PackedStand};
+use crate::{bake::BakedPlant, light::StandTrees, render::bindings::uniforms::FOREST_LAYERS, scatter::PackedStand};
 
 /// Sums over leaves, weighted by area.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -15,21 +15,25 @@ pub struct Leaves {
     crown_width: f32,
     crown_length: f32,
     crown_fill: f32,
+    /// Area in each of the first layers of foliage; what belongs to later ones is in the last.
+    layers: [f32; FOREST_LAYERS],
 }
 
 impl Leaves {
-    /// The sums of all trees of a stand of `plants`, by variant.
-    pub fn of(stand: &PackedStand, plants: &[BakedPlant]) -> Self {
+    /// The sums of all trees of a stand of `plants`, by variant; `layers` are the plants' layers of foliage.
+    pub fn of(stand: &PackedStand, plants: &[BakedPlant], layers: &[u8]) -> Self {
         let mut areas = vec![0.0; plants.len()];
         for tree in &stand.trees {
             if let Some(area) = areas.get_mut(usize::from(tree.variant())) {
                 *area += tree.scale().powi(2);
             }
         }
-        let of_plant = |(plant, scaled): (&BakedPlant, f32)| {
+        let of_plant = |(index, (plant, scaled)): (usize, (&BakedPlant, f32))| {
             let colors = plant.plant.leaf_colors();
             let area = colors.area * scaled;
+            let own = layers.get(index).copied().map_or(0, usize::from).min(FOREST_LAYERS - 1);
             Self {
+                layers: std::array::from_fn(|layer| if layer == own { area } else { 0.0 }),
                 area,
                 reflected: colors.reflected * area,
                 transmitted: colors.transmitted * area,
@@ -38,7 +42,7 @@ impl Leaves {
                 crown_fill: crown_fill(plant) * area,
             }
         };
-        plants.iter().zip(areas).map(of_plant).fold(Self::default(), Self::add)
+        plants.iter().zip(areas).enumerate().map(of_plant).fold(Self::default(), Self::add)
     }
 
     /// The sums of two forests.
@@ -50,7 +54,18 @@ impl Leaves {
             crown_width: self.crown_width + other.crown_width,
             crown_length: self.crown_length + other.crown_length,
             crown_fill: self.crown_fill + other.crown_fill,
+            layers: std::array::from_fn(|layer| self.layers[layer] + other.layers[layer]),
         }
+    }
+
+    /// For each of the first layers of foliage, the fraction of the leaves' area in it and in those before it, 0..1. 1 without leaves.
+    pub fn layers_up_to(self) -> [f32; FOREST_LAYERS] {
+        let mut sum = 0.0;
+        self.layers.map(|area| {
+            sum += area;
+            let share = sum / self.area;
+            if share.is_finite() { share.min(1.0) } else { 1.0 }
+        })
     }
 
     /// Means over the area; black without leaves.

@@ -107,6 +107,7 @@ fn upload_stand_light(
     shared.stand_light = table.view().clone();
     let (Some(view), Some(daylight)) = (&frame.view, &scene.daylight) else { return };
     placement.crown_albedo = forests.trees().crown_albedo();
+    placement.crown_layers = forests.leaves().layers_up_to();
     let wanted = StandKey { daylight: daylight.clone(), trees: forests.trees() };
     let key = wanted.clone();
     let compute = move || StandLight::new(&key.daylight.0, &key.trees);

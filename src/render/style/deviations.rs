@@ -1,6 +1,10 @@
 //! How wide the Gaussians of a style are, and how coarse the maps may be into which they blur.
 
+use super::uniforms::LINES;
 use crate::style::Style;
+
+/// The most that [`Deviations::blur`] is.
+const MOST_BLUR: f32 = 64.0;
 
 /// Standard deviations of the Gaussians for one style, pixels of a picture of 720 lines.
 pub struct Deviations {
@@ -32,6 +36,15 @@ impl Deviations {
             Style::Photograph => Self { shapes: 0.0, lights: 0.0, wide: 0.0, normals: 0.0, dabs: 0.0 },
         }
     }
+
+    /// How many pixels of a picture of `lines` lines become one in what is drawn with its Gaussians, at least 1: a Gaussian's width at half
+    /// of its height.
+    pub fn blur(&self, lines: f32) -> f32 {
+        const WIDTH: f32 = 2.355;
+        let pixels = WIDTH * self.shapes.max(self.lights) * lines / LINES;
+        // What is not a number blurs nothing.
+        if pixels > 1.0 { pixels.min(MOST_BLUR) } else { 1.0 }
+    }
 }
 
 /// How many texels of a map along a side become one where it is blurred by a Gaussian of `deviation` texels: what a coarser map lacks
@@ -44,14 +57,14 @@ pub fn divisor(deviation: f32) -> u32 {
     }
 }
 
-/// Pixels of a picture of 720 lines that the least cell of the broad noises has: half of 22 (`shaders/style/noises.wgsl`).
+/// Pixels of a picture of 720 lines that the least cell of the broad noises has: half of 22 (`shaders/style/noise_map.wgsl`).
 const NOISE_CELL: f32 = 11.0;
 /// Texels of a map of noise that a cell needs, so that what lies between texels is found by a bilinear lookup.
 const TEXELS_PER_CELL: f32 = 5.0;
 
 /// How many pixels along a side become one texel of the map of noise in a picture of `lines` lines.
 pub fn noise_divisor(lines: u32) -> u32 {
-    match NOISE_CELL * lines as f32 / 720.0 / TEXELS_PER_CELL {
+    match NOISE_CELL * lines as f32 / LINES / TEXELS_PER_CELL {
         texels if texels >= 4.0 => 4,
         texels if texels >= 2.0 => 2,
         _ => 1,
@@ -109,6 +122,21 @@ mod tests {
             let spacing = Spacing::of(deviation, 8);
             assert!(spacing.texels.is_finite() && (0.0..10.0).contains(&spacing.deviations), "{spacing:?}");
         }
+    }
+
+    #[test]
+    fn a_style_blurs_as_many_pixels_as_its_gaussian_is_wide() {
+        let watercolour = |simplification| {
+            Style::Watercolour(crate::style::Watercolour { simplification, ..crate::style::Watercolour::default() })
+        };
+        let blur = |style: &Style, lines| Deviations::of(style).blur(lines);
+        assert!((blur(&watercolour(2.5), 720.0) - 5.8875).abs() < 1e-4);
+        assert!((blur(&watercolour(2.5), 360.0) - 2.94375).abs() < 1e-4);
+        for nothing in [0.0, -1.0, f32::NAN, 1e-30] {
+            assert_eq!(blur(&watercolour(nothing), 720.0), 1.0);
+        }
+        assert_eq!(blur(&watercolour(1e9), 720.0), MOST_BLUR);
+        assert_eq!(blur(&Style::Photograph, 4096.0), 1.0);
     }
 
     #[test]

@@ -16,7 +16,6 @@
 //! in it either.
 
 mod blur;
-mod contours;
 mod deviations;
 mod full_screen;
 mod illumination;
@@ -28,6 +27,7 @@ mod pipelines;
 mod surfaces;
 mod targets;
 pub mod uniforms;
+mod wash_maps;
 
 use bevy::{
     app::{App, Plugin},
@@ -35,6 +35,8 @@ use bevy::{
     ecs::schedule::IntoScheduleConfigs,
     render::{GpuResourceAppExt, Render, RenderApp},
 };
+
+pub(super) use deviations::Deviations;
 
 use super::sets::{CanopyPasses, CanopyRenderSystems};
 
@@ -67,7 +69,7 @@ impl Plugin for StylePassPlugin {
                         blur::maps_pass,
                         particles::particles_pass,
                         blur::shapes_pass,
-                        contours::contours_pass,
+                        wash_maps::wash_maps_pass,
                     )
                         .chain()
                         .in_set(CanopyPasses::Style),

@@ -170,7 +170,7 @@ impl StylePipelines {
             self.contours_and_noises.get_or_insert_with(|| {
                 [
                     ("canopy_style_contours", ShaderFile::StyleContours, contours_layout(), CONTOUR_FORMAT),
-                    ("canopy_style_noises", ShaderFile::StyleNoises, noises_layout(), MAP_FORMAT),
+                    ("canopy_style_noises", ShaderFile::StyleNoiseMap, noises_layout(), MAP_FORMAT),
                 ]
                 .map(|(label, file, own, format)| {
                     let layout = vec![frame_layout(), own];

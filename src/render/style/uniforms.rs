@@ -130,7 +130,7 @@ pub struct BlurUniform {
 }
 
 /// Lines of the picture for which lengths in pixels are stated.
-const LINES: f32 = 720.0;
+pub(super) const LINES: f32 = 720.0;
 
 impl StyleUniform {
     /// The values of `drawn` in `view`, for a picture and maps of these sizes in pixels.

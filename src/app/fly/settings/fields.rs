@@ -1,7 +1,8 @@
 //! What a user can edit of a reflected value: its fields as a list, and the edits. Pure.
 //!
-//! Numbers, switches, enums and `Option`s of numbers ("automatic") can be edited, in structs and enums of any depth. A
-//! field states its range as a [`Range`] attribute and its tip as a `&'static str` attribute.
+//! Numbers, switches, enums, names among others and `Option`s of numbers ("automatic") can be edited, in structs and enums of any
+//! depth. A field states its range as a [`Range`] attribute, its names as a [`Names`] attribute and its tip as a `&'static str`
+//! attribute.
 
 use std::collections::HashMap;
 
@@ -14,7 +15,7 @@ use bevy::reflect::{
     tuple::DynamicTuple,
 };
 
-use crate::math::Range;
+use crate::math::{Range, names::Names};
 
 /// A field that can be edited.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,7 +55,7 @@ pub enum Content {
     },
     /// On or off.
     Switch(bool),
-    /// One of several variants.
+    /// One of several variants or names.
     Choice {
         /// Index of the current one.
         selected: usize,
@@ -74,7 +75,7 @@ pub enum Edit {
     Automatic,
     /// Switches on or off.
     Switch(bool),
-    /// Chooses a variant. A variant that was chosen before gets its fields back.
+    /// Chooses a variant or a name. A variant that was chosen before gets its fields back.
     Choose(usize),
     /// One step up or down.
     Step {
@@ -132,6 +133,11 @@ impl Edited<'_> {
         };
         let reference = self.reference(&field.path, &edit);
         let Ok(element) = field.path.reflect_element_mut(&mut *self.value) else { return false };
+        if let (Edit::Choose(index), Content::Choice { names, .. }) = (&edit, &field.content)
+            && let (Some(text), Some(name)) = (element.try_downcast_mut::<String>(), names.get(*index))
+        {
+            text.clone_from(name);
+        }
         match edit {
             Edit::Number(value) => set_number(element, Some(value)),
             Edit::Automatic => set_number(element, None),
@@ -248,6 +254,16 @@ impl List<'_> {
         }
         if let Some(on) = value.try_downcast_ref() {
             return self.push(value, at, Content::Switch(*on));
+        }
+        let known_names = at.attributes.and_then(|attributes| attributes.get::<Names>());
+        if let (Some(text), Some(known)) = (value.try_downcast_ref::<String>(), known_names) {
+            let mut names: Vec<String> = known.0.iter().map(|name| (*name).to_owned()).collect();
+            let selected = names.iter().position(|name| name == text.trim()).unwrap_or_else(|| {
+                // Such as the path of a file.
+                names.push(text.clone());
+                names.len() - 1
+            });
+            return self.push(value, at, Content::Choice { selected, names });
         }
         let inner = match value.reflect_ref() {
             ReflectRef::Enum(current) => {
@@ -418,6 +434,12 @@ mod tests {
         seed: (u64, String),
     }
 
+    #[derive(Clone, Debug, PartialEq, Reflect)]
+    struct Page {
+        #[reflect(@Names(&["rough", "smooth", "laid"]), @"Of the page.")]
+        paper: String,
+    }
+
     #[derive(Clone, Debug, Default, PartialEq, Reflect)]
     enum Fill {
         #[default]
@@ -479,6 +501,26 @@ mod tests {
 
     fn labels(expected: &[(usize, &str)]) -> Vec<(usize, String)> {
         expected.iter().map(|(depth, label)| (*depth, (*label).to_owned())).collect()
+    }
+
+    #[test]
+    fn a_text_is_chosen_among_its_names() {
+        let mut subject = Subject::new(Page { paper: "smooth".to_owned() });
+        let field = subject.field("paper").unwrap();
+        let names = ["rough", "smooth", "laid"].map(str::to_owned).to_vec();
+        assert_eq!((field.content, field.tip), (Content::Choice { selected: 1, names }, "Of the page."));
+        let up = Edit::Step { up: true, fine: false };
+        assert!(subject.edit("paper", up.clone()) && subject.value.paper == "laid");
+        assert!(!subject.edit("paper", up), "there is no name behind the last");
+        assert!(subject.edit("paper", Edit::Choose(0)) && subject.value.paper == "rough");
+        assert!(subject.field("paper").unwrap().is_changed);
+        assert!(!subject.edit("paper", Edit::Choose(17)));
+        assert!(subject.edit("paper", Edit::Reset) && subject.value.paper == "smooth");
+        // What is not among them stays until another is chosen.
+        let mut subject = Subject::new(Page { paper: "mine.ron".to_owned() });
+        let Content::Choice { selected, names } = subject.field("paper").unwrap().content else { panic!("no choice") };
+        assert_eq!((selected, names.len(), names[3].as_str()), (3, 4, "mine.ron"));
+        assert!(subject.edit("paper", Edit::Choose(1)) && subject.value.paper == "smooth");
     }
 
     #[test]

@@ -400,9 +400,14 @@ mod tests {
         update(&mut flight.world);
         flight.select("wetness");
         flight.up();
+        flight.select("palette");
+        flight.up();
+        flight.select("paper");
+        flight.up();
         let mut styles = flight.world.query::<&CanopyStyle>();
         let turned = styles.single(&flight.world)?.style.clone();
         assert_ne!(turned, flight.stage.style.style);
+        assert_eq!((turned.palette(), turned.paper()), ("cool-to-warm", Some("rough")));
         let written = flight.press(PanelInput::Write).ok_or("nothing written")?;
         let scene = Scene::parse(
             &format!("(terrain: Flat(size: 200), {written} trees: None, place: (latitude: 47.5, longitude: 9.2))"),

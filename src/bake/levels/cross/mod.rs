@@ -137,7 +137,7 @@ pub struct CrossTextures {
     /// The sun's light, two textures per plane: signed bytes, of which 127 stands for [`SUN_SCALE`], the coefficients of eight
     /// functions of the direction to the sun (the page of `sun.rs`) in the plane's frame, whose third axis is flipped
     /// like the normal's where the plane is seen from behind. The radiance of a texel under the sun is its base colour times
-    /// `1 + transmission`, times illuminance over pi, times their sum.
+    /// what of it is reflected diffusely or comes through, times illuminance over pi, times their sum; and the gloss.
     pub sun: Vec<MipChain>,
     /// Radiance transfer of the sky's light, for plants that are lit by it; empty for others. Signed bytes, of which
     /// 127 stands for [`LIGHT_SCALE`]. RGB: a vector in the plane's frame, whose third component is flipped like the
@@ -369,7 +369,9 @@ struct Seen {
     normal: Vec3,
     /// Linear base colour.
     color: Vec3,
-    /// Luminance of the light that comes through, as a share of what is reflected.
+    /// Luminance of what is reflected diffusely, as a share of the base colour.
+    diffuse: f32,
+    /// Luminance of the light that comes through, as a share of the base colour.
     transmission: f32,
 }
 
@@ -440,9 +442,13 @@ impl Shader<'_> {
         let color = self.raster.surface(hit.part).color(uv);
         // As [Luft 2007, eq. 1] lights leaves, nothing comes through them.
         let opaque = part.kind == PartKind::Wood || self.lighting.ambient_term() == AmbientTerm::Published;
-        let transmission =
-            if opaque { 0.0 } else { luminance(part.material.transmitted(color)) / luminance(color).max(1e-6) };
-        Seen { part: hit.part as usize, corners, weights, from_behind, normal, color, transmission }
+        let through = part.material.transmitted(color);
+        let share = |of_color: Vec3| luminance(of_color) / luminance(color).max(1e-6);
+        let transmission = if opaque { 0.0 } else { share(through) };
+        let matt = part.kind == PartKind::Wood;
+        let diffuse =
+            if matt { 1.0 } else { (1.0 - share(part.material.gloss.specular_albedo(color, through))).clamp(0.0, 1.0) };
+        Seen { part: hit.part as usize, corners, weights, from_behind, normal, color, diffuse, transmission }
     }
 
     /// The sample for the sun's light.
@@ -453,7 +459,8 @@ impl Shader<'_> {
         let light = self.light.and_then(|parts| parts.get(seen.part)).map_or(&[][..], Vec::as_slice);
         let scattered = |corner: usize| light.get(corner).map_or(Vec4::ZERO, |light| light.indirect_sun);
         let indirect = seen.weighted().map(|(corner, weight)| weight * scattered(corner)).sum();
-        sun::Sample { position, normal: seen.normal, transmission: seen.transmission, indirect }
+        let Seen { normal, diffuse, transmission, .. } = seen;
+        sun::Sample { position, normal, diffuse, transmission, indirect }
     }
 
     fn add(&self, hit: &Hit, texel: &mut Texel) {

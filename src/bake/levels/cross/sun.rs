@@ -7,12 +7,14 @@
 //! For a sample of a texel, with `V(w)` the visibility of the direction `w` behind the plant's other leaves:
 //!
 //! ```text
-//!  S(w) = V(w) (max(n.w, 0) + t max(-n.w, 0)) / (1 + t) + pi I(w)      n towards the viewer, t the luminance of the transmission
-//!  radiance under the sun = base colour (1 + t) E / pi S(w)
+//!  S(w) = (V(w) (d max(n.w, 0) + t max(-n.w, 0)) + pi (1 + t) I(w)) / (d + t)
+//!  radiance under the sun = base colour (d + t) E / pi S(w), and the gloss
 //! ```
 //!
-//! `I` is the light that other leaves scatter to the sample, of a plant that is lit by transfer
-//! ([`crate::bake::lighting::transfer::indirect_sun_share`]); its colour is taken to be that of the light itself.
+//! `n` points towards the viewer. `d` and `t` are shares of the base colour (luminance): what is reflected diffusely, the rest of which is the
+//! gloss ([`crate::plant::Gloss`]), and what comes through. `I` is the light that other leaves scatter to the sample, of a plant that is
+//! lit by transfer ([`crate::bake::lighting::transfer::indirect_sun_share`]); as the light of the sky, it is reflected with all of the base
+//! colour. Its colour is taken to be that of the light itself.
 //!
 //! Averaged over leaves, `S` is smooth in `w`, and eight polynomials over the hemisphere hold it ([`basis`]), fitted by least
 //! squares to [`DIRECTIONS`] directions. A sun below the horizon needs none, so half of the sphere is all that is fitted.
@@ -70,7 +72,9 @@ pub(super) struct Sample {
     pub position: Vec3,
     /// Unit length, towards the viewer.
     pub normal: Vec3,
-    /// Luminance of the light that comes through, as a share of what is reflected.
+    /// Luminance of what is reflected diffusely, as a share of the base colour, 0..1.
+    pub diffuse: f32,
+    /// Luminance of the light that comes through, as a share of the base colour.
     pub transmission: f32,
     /// The sun's light that other leaves scatter to it ([`super::light::VertexLight::indirect_sun`]).
     pub indirect: Vec4,
@@ -79,14 +83,20 @@ pub(super) struct Sample {
 impl Sample {
     fn shown(&self, sun: Vec3) -> f32 {
         let cosine = self.normal.dot(sun);
-        let shown = (cosine.max(0.0) + self.transmission * (-cosine).max(0.0)) / (1.0 + self.transmission);
+        let shown = (self.diffuse * cosine.max(0.0) + self.transmission * (-cosine).max(0.0)) / self.both();
         if shown.is_finite() { shown } else { 0.0 }
     }
 
     /// What it shows of the light that other leaves scatter, at most 1.
     fn scattered(&self, sun: Vec3) -> f32 {
         let [x, y, z, w] = self.indirect.to_array();
-        (PI * indirect_sun_share(&[w, -x, y, -z], sun)).min(1.0)
+        let shown = PI * indirect_sun_share(&[w, -x, y, -z], sun) * (1.0 + self.transmission) / self.both();
+        if shown.is_finite() { shown.min(1.0) } else { 0.0 }
+    }
+
+    /// Of the light on both of its sides.
+    fn both(&self) -> f32 {
+        (self.diffuse + self.transmission).max(1e-3)
     }
 }
 
@@ -261,11 +271,30 @@ mod tests {
 
     #[test]
     fn a_lone_leaf_is_lit_from_both_sides() {
-        let leaf = Sample { position: Vec3::ZERO, normal: Vec3::Z, transmission: 0.5, indirect: Vec4::ZERO };
+        let leaf =
+            Sample { position: Vec3::ZERO, normal: Vec3::Z, diffuse: 1.0, transmission: 0.5, indirect: Vec4::ZERO };
         assert!((leaf.shown(Vec3::Z) - 1.0 / 1.5).abs() < 1e-6);
         assert!((leaf.shown(-Vec3::Z) - 0.5 / 1.5).abs() < 1e-6);
         let broken = Sample { transmission: f32::INFINITY, ..leaf };
         assert_eq!(broken.shown(Vec3::Z), 0.0);
+        let black = Sample { diffuse: 0.0, transmission: 0.0, ..leaf };
+        assert_eq!((black.shown(Vec3::Z), black.scattered(Vec3::Z)), (0.0, 0.0));
+    }
+
+    /// Of a glossy leaf, the lobe has a part of the direct light, and nothing of what other leaves scatter.
+    #[test]
+    fn gloss_takes_nothing_of_scattered_light() {
+        let indirect = Vec4::new(0.0, 0.0, 0.0, 0.2);
+        let matt = Sample { position: Vec3::ZERO, normal: Vec3::Z, diffuse: 1.0, transmission: 0.4, indirect };
+        let glossy = Sample { diffuse: 0.5, ..matt };
+        let radiance = |sample: &Sample, shown: f32| (sample.diffuse + sample.transmission) * shown;
+        for sun in [Vec3::Z, -Vec3::Z, Vec3::Y, Vec3::new(0.6, 0.0, 0.8)] {
+            let [all, less] = [&matt, &glossy].map(|sample| radiance(sample, sample.scattered(sun)));
+            assert!((all - less).abs() < 1e-6, "{all} and {less}");
+            let [all, less] = [&matt, &glossy].map(|sample| radiance(sample, sample.shown(sun)));
+            let gloss = 0.5 * sun.z.max(0.0);
+            assert!((all - less - gloss).abs() < 1e-6, "{all} and {less}");
+        }
     }
 
     /// What other leaves scatter is shown in the shade too, and from the side that it comes from.
@@ -273,7 +302,7 @@ mod tests {
     fn scattered_light_is_added() {
         let plant = Arc::new(grow(&GrowParameters::broadleaf(), 1, 5000).unwrap());
         let planes = planes(&plant, 1);
-        let dark = Sample { position: Vec3::Y, normal: Vec3::Z, transmission: 0.0, indirect: Vec4::ZERO };
+        let dark = Sample { position: Vec3::Y, normal: Vec3::Z, diffuse: 1.0, transmission: 0.0, indirect: Vec4::ZERO };
         let lit = Sample { indirect: Vec4::new(0.0, 0.05, 0.0, 0.2), ..dark };
         let found = coefficients(&plant, &planes, &[vec![dark, lit], vec![]]);
         for (azimuth, elevation) in [(10.0, 15.0), (200.0, 40.0), (90.0, 85.0)] {

@@ -1,4 +1,5 @@
-//! Contours, and noise that is broad enough for a coarser map: what the washes would otherwise compute at every pixel, contours twice.
+//! Maps that the washes of a watercolour look up instead of computing them at every pixel: contours, which they need twice, and noise that is
+//! broad enough for a coarser map.
 
 use bevy::{
     ecs::{query::With, system::Res},
@@ -24,7 +25,7 @@ use crate::{
 };
 
 /// Draws both maps for a watercolour.
-pub fn contours_pass(
+pub fn wash_maps_pass(
     view: ViewQuery<&DrawnStyle, With<CanopyCamera>>,
     group: Res<FrameBindGroup>,
     targets: Res<StyleTargets>,
