@@ -139,6 +139,10 @@ fn crown_of(tree: Instance) -> Crown {
     return Crown(tree.position + vec3(0.0, size.y, 0.0), 1.0 / max(size, vec2(1e-3)));
 }
 
+// How far towards the end of the ellipsoid light is taken to enter the crown: the ellipsoid reaches to the farthest leaves, and crowns of
+// neighbours reach into it. With all of the way, crowns against a low sun have 1.06 to 1.13 of the traced light nearby.
+const ENTRY: f32 = 0.7;
+
 // Distance from a position to where light from the unit vector `to_light` enters the crown, metres; 0 outside of it.
 fn depth_in_crown(relative: vec3<f32>, crown: Crown, to_light: vec3<f32>) -> f32 {
     let scale = crown.inverse_extents.xyx;
@@ -147,7 +151,7 @@ fn depth_in_crown(relative: vec3<f32>, crown: Crown, to_light: vec3<f32>) -> f32
     let square = dot(along, along);
     let middle = dot(position, along);
     let inside = middle * middle + square * (1.0 - dot(position, position));
-    return max(sqrt(max(inside, 0.0)) - middle, 0.0) / square;
+    return ENTRY * max(sqrt(max(inside, 0.0)) - middle, 0.0) / square;
 }
 
 // The scale of a code, times 256; octaves are interpolated linearly. CPU twin: src/scatter/packed.rs.
