@@ -64,7 +64,8 @@ pub struct Quality {
     /// Wider: softer change, more trees drawn twice. Default 20.
     pub fade_band: f64,
     /// Height in pixels below which trees are no longer drawn one by one: the ground shows them together, as the surface of the
-    /// forest, 0 to 50. Higher: faster in forests of millions, coarser far away. 0: each tree is drawn, however small. Default 2.
+    /// forest, 0 to 50. Higher: faster in forests of millions, coarser far away. 0: each tree is drawn, however small. In a style, pixels
+    /// count that are as coarse as its Gaussian is wide. Default 2.
     pub surface_size: f64,
     /// The levels of detail from near to far, at most 8. Default: empty, which is `"model"` until `near_distance` and
     /// `"cross"` behind it; a list replaces both values.
