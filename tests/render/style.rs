@@ -387,3 +387,48 @@ fn a_crown_surface_has_the_outline_of_its_leaves_and_fewer_lines_inside() {
     assert!(3 * dark(&clear) < 2 * dark(&cluttered), "{} and {} dark values", dark(&cluttered), dark(&clear));
     assert_eq!(gpu.messages(), Vec::<String>::new());
 }
+
+/// Where a style draws trees together, its picture has the tones of the trees: their light and their variety. Bare ground is the control.
+#[test]
+fn the_surface_of_a_forest_is_painted_as_the_trees_that_end_there() {
+    let gpu = gpu();
+    let wood = |stems: u32, size: f64| {
+        let plants = "individuals: 1, triangles: 5000, seed: 1";
+        build(
+            &format!(
+                "(seed: 7, terrain: Flat(size: 2400), species: [(name: \"broadleaf\", plant: Grown(form: Broadleaf, {plants}), \
+                 height: (14, 20)), (name: \"conifer\", plant: Grown(form: Conifer, {plants}), height: (16, 24))], trees: \
+                 Scattered(stems_per_hectare: {stems}, min_distance: 2, surroundings: 0), {PLACE}, quality: (shadow_map_size: 512, \
+                 cascades: 2, shadow_distance: 300, near_distance: 30, msaa: 1, cross_resolution: 64, surface_size: {size}))"
+            ),
+            &[],
+        )
+        .stage
+    };
+    let painted = |stems: u32, size: f64| {
+        let stage = wood(stems, size);
+        let mut renderer = showing(&stage);
+        renderer.set_style(watercolour(|_| ()));
+        let picture = draw(&mut renderer, &stage, &view(&stage, (0.0, 90.0, 1100.0), 0.0, -8.0), NOON);
+        keep(&picture, &format!("forest-{stems}-{size}"));
+        picture
+    };
+    // What lies 350 to 1,200 m away.
+    let (columns, rows) = (8..184, 46..66);
+    let deviation = |picture: &RenderedImage| {
+        let mean = brightness(picture, columns.clone(), rows.clone());
+        let all = rows.clone().flat_map(|row| columns.clone().map(move |column| (row, column)));
+        let squares: Vec<f64> =
+            all.map(|(row, column)| (brightness(picture, column..column + 1, row..row + 1) - mean).powi(2)).collect();
+        (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+    };
+    let (trees, surface, ground) = (painted(400, 0.0), painted(400, 10.0), painted(1, 10.0));
+    let [trees_light, light, bare] = [&trees, &surface, &ground].map(|p| brightness(p, columns.clone(), rows.clone()));
+    let [trees_variety, variety, even] = [&trees, &surface, &ground].map(&deviation);
+    println!("light {trees_light:.1} {light:.1} {bare:.1}, variety {trees_variety:.1} {variety:.1} {even:.1}");
+    assert!(difference(&trees, &surface) > 0.0, "the surface is not drawn");
+    assert!((light - trees_light).abs() < 10.0, "{light} for {trees_light}");
+    assert!((0.6..1.4).contains(&(variety / trees_variety)), "{variety} for {trees_variety}");
+    assert!((bare - trees_light).abs() > 20.0, "the control, bare ground, has {bare} too");
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
