@@ -262,7 +262,8 @@ fn gpu_structs_are_what_the_shaders_think() {
             openness,
             noise_block,
             forest_surface,
-            crown_albedo
+            crown_albedo,
+            crown_layers
         }
     );
     twin!(

@@ -33,9 +33,8 @@ use super::{
     components::{CameraOpenness, CanopyCamera, DrawnStyle, ViewOptions},
     extract::ExtractedScene,
     sets::CanopyRenderSystems,
-    style::Deviations,
 };
-use crate::{cull::Frustum, lod::level_distance::NOMINAL_FIELD_OF_VIEW};
+use crate::{cull::Frustum, lod::level_distance::NOMINAL_FIELD_OF_VIEW, style::Deviations};
 
 /// The camera's colour attachment, on which the pipelines of all passes depend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

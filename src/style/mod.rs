@@ -11,10 +11,12 @@
 //! | [`wash`] | one layer of watercolour: shape, edge, pigment, glazing |
 //! | [`particles`] | the particles of a crown: how many, where, how large, in which intensity map [Luft 2006, 4.2] |
 //! | [`anchor`](mod@anchor) | where noise is fixed to the scene |
+//! | [`deviations`] | how wide the Gaussians of a style are, and how coarse the maps may be into which they blur |
 //! | [`layers`] | which plants share a layer |
 
 pub mod anchor;
 pub mod depth;
+pub mod deviations;
 pub mod layers;
 pub mod palette;
 pub mod paper;
@@ -23,6 +25,7 @@ pub mod ramp;
 pub mod settings;
 pub mod wash;
 
+pub use deviations::Deviations;
 pub use palette::{Palette, PaletteError};
 pub use paper::Paper;
 pub use ramp::Ramp;

@@ -1,7 +1,7 @@
 //! Gaussians of the maps, along one axis after the other. Those of the layers abstract their shapes: what is smaller than the
 //! Gaussian falls below the threshold of its wash and vanishes, with the distance too [Luft 2006, fig. 11].
 //!
-//! What is blurred much, and drawn without sharp edges (the light around, the colours), is blurred into coarser maps ([`divisor`](super::deviations::divisor)).
+//! What is blurred much, and drawn without sharp edges (the light around, the colours), is blurred into coarser maps ([`divisor`](crate::style::deviations::divisor)).
 
 use bevy::{
     ecs::{query::With, system::Res},

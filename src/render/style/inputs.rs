@@ -18,7 +18,6 @@ use glam::Vec4;
 use half::f16;
 
 use super::{
-    deviations::{Deviations, IDENTITY_POINTS, MAP_POINTS, Spacing},
     targets::{MapKey, StyleTargets},
     uniforms::{BlurUniform, LayerUniform, StyleUniform},
 };
@@ -30,7 +29,11 @@ use crate::{
         report::FrameReport,
         view::PreparedFrame,
     },
-    style::{Palette, Paper, Ramp, Style, layers},
+    style::{
+        Deviations, Palette, Paper, Ramp, Style,
+        deviations::{IDENTITY_POINTS, MAP_POINTS, Spacing},
+        layers,
+    },
 };
 
 /// Colours of a ramp on the device.

@@ -16,7 +16,6 @@
 //! in it either.
 
 mod blur;
-mod deviations;
 mod full_screen;
 mod illumination;
 mod inputs;
@@ -35,8 +34,6 @@ use bevy::{
     ecs::schedule::IntoScheduleConfigs,
     render::{GpuResourceAppExt, Render, RenderApp},
 };
-
-pub(super) use deviations::Deviations;
 
 use super::sets::{CanopyPasses, CanopyRenderSystems};
 

@@ -17,13 +17,16 @@ use bevy::{
     },
 };
 
-use super::deviations::{self, Deviations};
 use crate::render::{
     components::{CanopyCamera, DrawnStyle},
     forest::GpuForests,
     view::PreparedFrame,
 };
-use crate::style::{Style, Watercolour, layers};
+use crate::style::{
+    Deviations, Style, Watercolour,
+    deviations::{self, LINES},
+    layers,
+};
 
 /// Format of normals, of light and of what is blurred of both.
 pub const MAP_FORMAT: TextureFormat = TextureFormat::Rgba16Float;
@@ -143,7 +146,7 @@ pub fn prepare_targets(
     let picture = (view.viewport.z.max(1), view.viewport.w.max(1));
     let size = (texels(picture.0), texels(picture.1));
     let deviations = Deviations::of(&drawn.style);
-    let divisor = |deviation: f32| deviations::divisor(deviation * size.1 as f32 / 720.0);
+    let divisor = |deviation: f32| deviations::divisor(deviation * size.1 as f32 / LINES);
     let key = MapKey {
         size,
         layers: layer_count(&drawn.style, &forests),

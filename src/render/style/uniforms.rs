@@ -3,10 +3,9 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use super::deviations::Deviations;
 use crate::{
     render::{components::DrawnStyle, view::PreparedView},
-    style::{LineNormals, NoiseAnchor, Style, Watercolour, anchor::anchor},
+    style::{Deviations, LineNormals, NoiseAnchor, Style, Watercolour, anchor::anchor, deviations::LINES},
 };
 
 /// `Style` of `shaders/style/style.wgsl`.
@@ -128,9 +127,6 @@ pub struct BlurUniform {
     /// First of the four layers, for identifiers.
     pub first_layer: u32,
 }
-
-/// Lines of the picture for which lengths in pixels are stated.
-pub(super) const LINES: f32 = 720.0;
 
 impl StyleUniform {
     /// The values of `drawn` in `view`, for a picture and maps of these sizes in pixels.

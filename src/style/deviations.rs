@@ -1,8 +1,9 @@
 //! How wide the Gaussians of a style are, and how coarse the maps may be into which they blur.
 
-use super::uniforms::LINES;
-use crate::style::Style;
+use super::Style;
 
+/// Lines of the picture for which lengths in pixels are stated.
+pub const LINES: f32 = 720.0;
 /// The most that [`Deviations::blur`] is.
 const MOST_BLUR: f32 = 64.0;
 
@@ -81,9 +82,9 @@ pub struct Spacing {
     pub deviations: f32,
 }
 
-/// Points on either side of a Gaussian's middle: of maps, which are looked up between two points, and of identifiers, which are looked up at
-/// each. `POINTS` of `shaders/style/blur.wgsl`.
+/// Points on either side of a Gaussian's middle, of maps, which are looked up between two points. `POINTS` of `shaders/style/blur.wgsl`.
 pub const MAP_POINTS: u32 = 10;
+/// The same of identifiers, which are looked up at each point.
 pub const IDENTITY_POINTS: u32 = 8;
 
 impl Spacing {
@@ -109,6 +110,7 @@ const GREATEST: f32 = 1e6;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::style::Watercolour;
 
     #[test]
     fn points_of_a_gaussian_are_texels_until_they_do_not_reach_far_enough() {
@@ -126,9 +128,7 @@ mod tests {
 
     #[test]
     fn a_style_blurs_as_many_pixels_as_its_gaussian_is_wide() {
-        let watercolour = |simplification| {
-            Style::Watercolour(crate::style::Watercolour { simplification, ..crate::style::Watercolour::default() })
-        };
+        let watercolour = |simplification| Style::Watercolour(Watercolour { simplification, ..Watercolour::default() });
         let blur = |style: &Style, lines| Deviations::of(style).blur(lines);
         assert!((blur(&watercolour(2.5), 720.0) - 5.8875).abs() < 1e-4);
         assert!((blur(&watercolour(2.5), 360.0) - 2.94375).abs() < 1e-4);
