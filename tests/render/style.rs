@@ -394,10 +394,12 @@ fn the_surface_of_a_forest_is_painted_as_the_trees_that_end_there() {
     let gpu = gpu();
     let wood = |stems: u32, size: f64| {
         let plants = "individuals: 1, triangles: 5000, seed: 1";
+        // As the program lights plants for a style.
+        let realigned = "lighting: Expressive()";
         build(
             &format!(
                 "(seed: 7, terrain: Flat(size: 2400), species: [(name: \"broadleaf\", plant: Grown(form: Broadleaf, {plants}), \
-                 height: (14, 20)), (name: \"conifer\", plant: Grown(form: Conifer, {plants}), height: (16, 24))], trees: \
+                 height: (14, 20), {realigned}), (name: \"conifer\", plant: Grown(form: Conifer, {plants}), height: (16, 24), {realigned})], trees: \
                  Scattered(stems_per_hectare: {stems}, min_distance: 2, surroundings: 0), {PLACE}, quality: (shadow_map_size: 512, \
                  cascades: 2, shadow_distance: 300, near_distance: 30, msaa: 1, cross_resolution: 64, surface_size: {size}))"
             ),
