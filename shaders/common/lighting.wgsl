@@ -160,8 +160,8 @@ fn transferred_key_light(
     let full = light.key_illuminance * INVERSE_PI;
     let own = saturate(dot(near + far, LUMINANCE) / max(dot(full, LUMINANCE) * (cosines.x + cosines.y), 1e-6));
     let both = own * visibility;
-    // The harmonics are never dark; behind so much that the map's mean is, their light ends there, too. The factor: a map hides too much
-    // rather than too little behind the leaves of a texel.
+    // A few bands of harmonics leave light in deep shade; the map's mean is its upper limit. A map hides too much rather than too little
+    // behind the leaves of a texel, hence the factor (docs/decisions/0027-leaves-combine-transfer-and-shadow-map.md).
     let limit = clamp(1.2 * leaves.mean / max(both, 1e-3), 0.15, 1.0);
     let mean = visibility * mix(1.0, limit, leaves.weight);
     let detail = leaves.detail * leaves.weight;

@@ -139,8 +139,8 @@ fn crown_of(tree: Instance) -> Crown {
     return Crown(tree.position + vec3(0.0, size.y, 0.0), 1.0 / max(size, vec2(1e-3)));
 }
 
-// How far towards the end of the ellipsoid light is taken to enter the crown: the ellipsoid reaches to the farthest leaves, and crowns of
-// neighbours reach into it. With all of the way, crowns against a low sun have 1.06 to 1.13 of the traced light nearby.
+// Light enters a crown after this fraction of the way out of its ellipsoid, which reaches to the farthest leaves: neighbouring crowns reach
+// into it, and their shade would be missed (docs/decisions/0025-crosses-have-sun-textures.md).
 const ENTRY: f32 = 0.7;
 
 // Distance from a position to where light from the unit vector `to_light` enters the crown, metres; 0 outside of it.

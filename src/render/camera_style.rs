@@ -77,8 +77,7 @@ pub(super) fn follow_palettes(mut styles: Query<&mut CanopyStyle, Changed<Canopy
             }
         };
         // A name that cannot be read is not tried again.
-        let pigments = Pigments { name: name.to_owned(), palette };
-        style.palette = Arc::new(pigments);
+        style.palette = Arc::new(Pigments { name: name.to_owned(), palette });
     }
 }
 

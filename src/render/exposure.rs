@@ -45,7 +45,7 @@ impl StandTotals {
         let heights: Vec<f32> = plants.iter().map(|plant| plant.size().height).collect();
         let height = |variant: u16, scale: f32| heights.get(usize::from(variant)).map_or(0.0, |height| height * scale);
         Self {
-            leaves: Leaves::of(stand, plants, &[]),
+            leaves: Leaves::of(stand, plants),
             trees: stand.trees.len() as f64,
             heights: stand.trees.iter().map(|tree| f64::from(height(tree.variant(), tree.scale()))).sum(),
         }

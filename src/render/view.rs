@@ -34,7 +34,11 @@ use super::{
     extract::ExtractedScene,
     sets::CanopyRenderSystems,
 };
-use crate::{cull::Frustum, lod::level_distance::NOMINAL_FIELD_OF_VIEW, style::Deviations};
+use crate::{
+    cull::Frustum,
+    lod::{Levels, level_distance::NOMINAL_FIELD_OF_VIEW},
+    style::Deviations,
+};
 
 /// The camera's colour attachment, on which the pipelines of all passes depend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -104,6 +108,13 @@ pub struct PreparedView {
     /// How many pixels the Gaussians of its style make into one, at least 1. Trees give way to the surface of the forest as many times
     /// sooner.
     pub blur: f32,
+}
+
+impl PreparedView {
+    /// `levels` at the distances that they have in this view.
+    pub fn levels(&self, levels: &Levels) -> Levels {
+        levels.in_view(self.zoom, self.focal_pixels).blurred(self.blur)
+    }
 }
 
 /// The one view that Canopy draws, if there is one.

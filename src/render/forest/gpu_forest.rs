@@ -178,7 +178,7 @@ impl GpuForest {
     /// A tree casts in the first level whose range contains it. That is the level in which the view draws it, except
     /// for levels that are too fine for the map: the farthest level casts instead of them.
     pub fn casting_distances(&self, near: Range<f64>, texel: f64, view: &PreparedView) -> Vec<Range<f64>> {
-        let levels = &self.forest.levels.in_view(view.zoom, view.focal_pixels).blurred(view.blur);
+        let levels = view.levels(&self.forest.levels);
         let near = near.start..near.end * f64::from(self.forest.levels.view_factor(view.zoom, view.focal_pixels));
         let mut casting = vec![0.0..0.0; levels.len()];
         let mut ends = near.end;
@@ -233,7 +233,6 @@ impl GpuForest {
         let levels: Vec<_> = forest.levels.representations().iter().copied().map(level).collect();
         let grouping =
             |level: &Option<ForestLevel>| level.as_ref().map_or(Grouping::Together, |level| level.renderer.grouping());
-        let groups = foliage_groups(&forest.plants);
         Self {
             stand: component.stand.clone(),
             plants: forest.plants.clone(),
@@ -242,9 +241,9 @@ impl GpuForest {
             sizes_buffer: OnceLock::new(),
             tables: Default::default(),
             variants,
-            leaves: Leaves::of(&forest.stand, &forest.plants, &groups),
+            leaves: Leaves::of(&forest.stand, &forest.plants),
             tree_sizes: sizes.iter().map(TreeSize::from).collect(),
-            groups,
+            groups: foliage_groups(&forest.plants),
             sizes,
             max_scale: forest.stand.cells.iter().map(|cell| cell.max_scale).fold(0.0, f32::max),
             groupings: levels.iter().map(grouping).collect(),

@@ -4,7 +4,11 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use crate::{bake::BakedPlant, light::StandTrees, render::bindings::uniforms::FOREST_LAYERS, scatter::PackedStand};
+use super::uniforms::layers_of;
+use crate::{
+    bake::BakedPlant, light::StandTrees, plant::LeafColors, render::bindings::uniforms::FOREST_LAYERS,
+    scatter::PackedStand,
+};
 
 /// Sums over leaves, weighted by area.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -20,18 +24,19 @@ pub struct Leaves {
 }
 
 impl Leaves {
-    /// The sums of all trees of a stand of `plants`, by variant; `layers` are the plants' layers of foliage.
-    pub fn of(stand: &PackedStand, plants: &[BakedPlant], layers: &[u8]) -> Self {
+    /// The sums of all trees of a stand of `plants`, by variant.
+    pub fn of(stand: &PackedStand, plants: &[BakedPlant]) -> Self {
         let mut areas = vec![0.0; plants.len()];
         for tree in &stand.trees {
             if let Some(area) = areas.get_mut(usize::from(tree.variant())) {
                 *area += tree.scale().powi(2);
             }
         }
-        let of_plant = |(index, (plant, scaled)): (usize, (&BakedPlant, f32))| {
-            let colors = plant.plant.leaf_colors();
+        let colors: Vec<LeafColors> = plants.iter().map(|plant| plant.plant.leaf_colors()).collect();
+        let layers = layers_of(colors.iter().map(|colors| colors.reflected));
+        let of_plant = |(((plant, colors), layer), scaled): (((&BakedPlant, &LeafColors), u8), f32)| {
             let area = colors.area * scaled;
-            let own = layers.get(index).copied().map_or(0, usize::from).min(FOREST_LAYERS - 1);
+            let own = usize::from(layer).min(FOREST_LAYERS - 1);
             Self {
                 layers: std::array::from_fn(|layer| if layer == own { area } else { 0.0 }),
                 area,
@@ -42,7 +47,7 @@ impl Leaves {
                 crown_fill: crown_fill(plant) * area,
             }
         };
-        plants.iter().zip(areas).enumerate().map(of_plant).fold(Self::default(), Self::add)
+        plants.iter().zip(&colors).zip(layers).zip(areas).map(of_plant).fold(Self::default(), Self::add)
     }
 
     /// The sums of two forests.

@@ -169,7 +169,7 @@ pub fn prepare_view_lists(
     for (entity, forest) in forests.iter() {
         let settings = &forest.forest;
         let camera = view.camera - settings.origin;
-        let levels = settings.levels.in_view(view.zoom, view.focal_pixels).blurred(view.blur);
+        let levels = view.levels(&settings.levels);
         // A forest that was replaced on the same entity has other buffers, so group 1 is created again each frame.
         let (mut slots, uniform) = match prepared.0.remove(&entity) {
             Some(old) => (old.slots, old.uniform),

@@ -222,8 +222,12 @@ pub fn variants(plants: &[BakedPlant], sizes: &[PlantSize]) -> Vec<VariantUnifor
 
 /// The layer of foliage (0, 1, ...) of each plant: those with leaves of one colour share it.
 pub fn foliage_groups(plants: &[BakedPlant]) -> Vec<u8> {
-    let colors: Vec<Vec3> = plants.iter().map(|plant| plant.plant.leaf_colors().reflected).collect();
-    layers::foliage_groups(&colors, layers::MOST_FOLIAGE)
+    layers_of(plants.iter().map(|plant| plant.plant.leaf_colors().reflected))
+}
+
+/// The same for the colours of the plants' leaves.
+pub fn layers_of(colors: impl Iterator<Item = Vec3>) -> Vec<u8> {
+    layers::foliage_groups(&colors.collect::<Vec<_>>(), layers::MOST_FOLIAGE)
 }
 
 fn variant(plant: &BakedPlant, size: &PlantSize) -> VariantUniform {

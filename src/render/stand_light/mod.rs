@@ -106,9 +106,11 @@ fn upload_stand_light(
     let StandTexture { table, light } = &mut *stand;
     shared.stand_light = table.view().clone();
     let (Some(view), Some(daylight)) = (&frame.view, &scene.daylight) else { return };
-    placement.crown_albedo = forests.trees().crown_albedo();
-    placement.crown_layers = forests.leaves().layers_up_to();
-    let wanted = StandKey { daylight: daylight.clone(), trees: forests.trees() };
+    let leaves = forests.leaves();
+    let trees = leaves.trees();
+    placement.crown_albedo = trees.crown_albedo();
+    placement.crown_layers = leaves.layers_up_to();
+    let wanted = StandKey { daylight: daylight.clone(), trees };
     let key = wanted.clone();
     let compute = move || StandLight::new(&key.daylight.0, &key.trees);
     let followed = light.follow(&wanted, scene.light_updates, |old| wanted.is_near(old), compute);

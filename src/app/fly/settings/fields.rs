@@ -131,13 +131,8 @@ impl Edited<'_> {
             }
             _ => edit.clone(),
         };
-        let reference = self.reference(&field.path, &edit);
+        let reference = self.reference(field, &edit);
         let Ok(element) = field.path.reflect_element_mut(&mut *self.value) else { return false };
-        if let (Edit::Choose(index), Content::Choice { names, .. }) = (&edit, &field.content)
-            && let (Some(text), Some(name)) = (element.try_downcast_mut::<String>(), names.get(*index))
-        {
-            text.clone_from(name);
-        }
         match edit {
             Edit::Number(value) => set_number(element, Some(value)),
             Edit::Automatic => set_number(element, None),
@@ -155,11 +150,15 @@ impl Edited<'_> {
         self.value.reflect_partial_eq(&*before) != Some(true)
     }
 
-    /// What a choice or a reset of the element at `path` gives it.
-    fn reference(&mut self, path: &ParsedPath, edit: &Edit) -> Option<Box<dyn PartialReflect>> {
+    /// What a choice or a reset of a field gives it.
+    fn reference(&mut self, Field { path, content, .. }: &Field, edit: &Edit) -> Option<Box<dyn PartialReflect>> {
         match edit {
             Edit::Choose(index) => {
                 let element = path.reflect_element(&*self.value).ok()?;
+                if element.try_downcast_ref::<String>().is_some() {
+                    let Content::Choice { names, .. } = content else { return None };
+                    return Some(Box::new(names.get(*index)?.clone()));
+                }
                 let ReflectRef::Enum(current) = element.reflect_ref() else { return None };
                 let variant = current.get_represented_enum_info()?.variant_at(*index)?;
                 let initial = path.reflect_element(self.initial).ok();
