@@ -12,7 +12,7 @@ use canopy::scene::{
     Anchor, GltfPlants, Ground, GroundFile, GrownForm, GrownPlants, InventoryTrees, Lighting, Overrides, Path,
     PlantSource, Position, ScatteredTrees, Scene, SceneError, Species, Transfer, Trees,
 };
-use canopy::style::{Style, Toon};
+use canopy::style::{Lines, Style, Toon};
 use canopy::terrain::CoordinateSystem;
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
@@ -226,6 +226,17 @@ fn a_request_restyles_a_scene_and_gives_its_foliage_a_surface() -> Outcome {
     assert_eq!(toon.style, Style::Toon(Toon::default()));
     let realigned = |scene: &Scene| scene.species.iter().all(|s| matches!(s.lighting, Some(Lighting::Expressive(_))));
     assert!(realigned(&toon));
+    // A palette or a paper that the style does not have is not dropped in silence.
+    let given = |style| Overrides {
+        style: Some(style),
+        palette: Some("sepia".to_owned()),
+        paper: Some("laid".to_owned()),
+        ..Overrides::default()
+    };
+    let warnings = |style: Style| given(style.clone()).warnings(&given(style).applied(full.clone()));
+    assert_eq!(warnings(Style::Lines(Lines::default())), Vec::<String>::new());
+    assert!(matches!(&warnings(Style::Toon(Toon::default()))[..], [paper] if paper.contains("paper")));
+    assert_eq!(warnings(Style::Photograph).len(), 2);
     let photograph = Overrides { style: Some(Style::Photograph), ..Overrides::default() }.applied(full.clone());
     assert!(!photograph.style.is_drawn() && photograph.species == full.species && !realigned(&full));
     Ok(())

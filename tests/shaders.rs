@@ -403,7 +403,7 @@ fn gpu_structs_are_what_the_shaders_think() {
         }
     );
     twin!(layouts, "Layer", LayerUniform { threshold, softness, edge, foliage });
-    twin!(layouts, "BlurJob", BlurUniform { step, scale, spacing, first_layer });
+    twin!(layouts, "BlurJob", BlurUniform { step, scale, spacing, first_layer, splits_depth });
     twin!(layouts, "Particle", GpuParticle { position, normal });
     twin!(
         layouts,

@@ -1,6 +1,8 @@
 // One direction of a Gaussian. Of identifiers it first makes four layers, one a channel [Luft 2006, 3.1]: 1 where a pixel is of the
 // layer, else 0.
 
+#import canopy::style::split_depth
+
 struct BlurJob {
     // From one point of the Gaussian to the next, in texels of the source.
     step: vec2<f32>,
@@ -9,6 +11,8 @@ struct BlurJob {
     // From one point to the next, in standard deviations.
     spacing: f32,
     first_layer: u32,
+    // 1: the third and fourth channel are a depth in two values.
+    splits_depth: u32,
 }
 
 @group(0) @binding(0) var<uniform> job: BlurJob;
@@ -74,5 +78,6 @@ fn fragment(in: Corner) -> @location(0) vec4<f32> {
         weights += 2.0 * both;
     }
 #endif
-    return sum / weights;
+    let mean = sum / weights;
+    return select(mean, vec4(mean.xy, split_depth(mean.z + mean.w)), job.splits_depth > 0u);
 }

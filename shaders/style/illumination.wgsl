@@ -1,6 +1,6 @@
 // The light on the surfaces that are seen [Luft 2006, 3.2 and 3.3]: the lighting map, and the shadow by the blurred depth test.
 #import canopy::frame::{frame, light, shadow, shadow_map, relative_position}
-#import canopy::style::{style, full_screen, FullScreen, landscape_depth}
+#import canopy::style::{style, full_screen, FullScreen, landscape_depth, split_depth}
 #import canopy::sun_visibility::{sample_ground, terrain_visibility, map_position, cascade_weight}
 #import canopy::constants::MAX_CASCADES
 
@@ -97,7 +97,7 @@ fn soft_light(relative: vec3<f32>, normal: vec3<f32>, height: f32) -> f32 {
     return mix(1.0, lit, cascade_weight(length(relative)));
 }
 
-// Light (0..1), pigment of the shadow (0..1), depth (0..1), and the length of the normal.
+// Light (0..1), pigment of the shadow (0..1), and depth (0..1) in two values.
 @fragment
 fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let texel = vec2<i32>(in.clip.xy);
@@ -107,7 +107,7 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let direction = normalize(relative);
     // The sky is painted from the horizon to the zenith.
     if sky {
-        return vec4(saturate(1.25 * direction.y), 0.0, 1.0, 1.0);
+        return vec4(saturate(1.25 * direction.y), 0.0, 1.0, 0.0);
     }
     let stored = textureLoad(surfaces, texel, 0);
     let ambient = max(length(stored.xyz), 1e-4);
@@ -118,5 +118,5 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let shade = 1.0 - soft_light(relative, normal, stored.w) * open;
     let diffuse = 0.5 + 0.5 * facing;
     let lit = diffuse * mix(0.6, 1.0, ambient);
-    return vec4(lit, shade * direct_share(), landscape_depth(length(relative)), ambient);
+    return vec4(lit, shade * direct_share(), split_depth(landscape_depth(length(relative))));
 }

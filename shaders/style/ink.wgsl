@@ -2,16 +2,16 @@
 #import canopy::constants::PAPER_SIDE
 #import canopy::frame::light
 #import canopy::style::{style, full_screen, FullScreen, airiness}
-#import canopy::style_edges::contour
 #import canopy::style_noise::{anchored_noise, noise_place}
 #import canopy::style_strokes::stroke_ink
 
 @group(1) @binding(1) var depths: texture_depth_2d;
 @group(1) @binding(2) var colors: texture_2d<f32>;
-// Light, pigment of the shadow, depth, length of the normal: as seen, and under the Gaussian.
+// Light, pigment of the shadow, depth in two values: as seen, and under the Gaussian.
 @group(1) @binding(3) var lights: texture_2d<f32>;
 @group(1) @binding(4) var soft_lights: texture_2d<f32>;
-@group(1) @binding(5) var soft_normals: texture_2d<f32>;
+// Lines, rims, depth of what is in front.
+@group(1) @binding(5) var lines: texture_2d<f32>;
 @group(1) @binding(6) var papers: texture_2d<f32>;
 @group(1) @binding(7) var ramps: texture_2d<f32>;
 @group(1) @binding(8) var linear_sampler: sampler;
@@ -62,17 +62,18 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     for (var i = 0; i < 4; i += 1) {
         color += 0.25 * toned(clamp(first + vec2(i & 1, i >> 1u), vec2(0), last));
     }
-    let drawn = contour(soft_normals, soft_lights, linear_sampler, in.uv, style.line_width) * f32(style.line_width > 0.0);
+    // Without a width the map is of an earlier frame.
+    let drawn = textureSampleLevel(lines, linear_sampler, in.uv, 0.0).x * f32(style.line_width > 0.0);
     let soft = textureSampleLevel(soft_lights, linear_sampler, in.uv, 0.0);
     let strokes = stroke_ink(in.uv, place.distance, soft.z, 1.0 - soft.x, identities) * f32(!sky);
-    return vec4(mix(color, style.ink * 0.4, saturate(max(1.2 * drawn, strokes))), 1.0);
+    return vec4(mix(color, style.ink * 0.4 * style.night, saturate(max(1.2 * drawn, strokes))), 1.0);
 #else
     let middle = anchored_noise(place.position, place.pixel * 26.0, 2u);
     let fine = anchored_noise(place.position, place.pixel * 5.0, 3u);
     // A pen in a hand.
     let tremble = vec2(middle, fine) * vec2(0.8, 0.6) * style.unit / style.size;
     let soft = textureSampleLevel(soft_lights, linear_sampler, in.uv + tremble, 0.0);
-    let drawn = contour(soft_normals, soft_lights, linear_sampler, in.uv + tremble, style.line_width);
+    let line = textureSampleLevel(lines, linear_sampler, in.uv + tremble, 0.0);
     let air = airiness(soft.z);
     // Hatching: strokes across the page where it is dark, a second direction where it is darkest.
     let dark = saturate(1.0 - 1.35 * soft.x + 0.45 * soft.y) * f32(!sky) * (1.0 - air);
@@ -84,7 +85,8 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let pressure = 0.85 + 0.25 * middle;
     let grain = smoothstep(0.1, 0.5, height + 0.35);
     let strokes = stroke_ink(in.uv + 0.3 * tremble, place.distance, soft.z, dark, identities) * f32(!sky);
-    let ink = saturate(max(max(drawn * 1.25, hatched), 1.1 * strokes) * pressure * grain * (1.0 - 0.6 * air));
+    let drawn = 1.25 * line.x * (1.0 - 0.6 * airiness(line.z));
+    let ink = saturate(max(drawn, max(hatched, 1.1 * strokes) * (1.0 - 0.6 * air)) * pressure * grain);
     return vec4(mix(style.paper * (1.0 + 0.12 * (height - 0.5)), style.ink * 0.7, ink), 1.0);
 #endif
 }

@@ -64,6 +64,13 @@ fn landscape_depth(distance: f32) -> f32 {
     return saturate(log(max(distance, NEAREST) / NEAREST) / log(FARTHEST / NEAREST));
 }
 
+// A depth in two values of 16 bits, whose sum it is: the second is what the first has rounded off. Differences of depths far away need
+// both.
+fn split_depth(depth: f32) -> vec2<f32> {
+    let rounded = unpack2x16float(pack2x16float(vec2(depth, 0.0))).x;
+    return vec2(rounded, depth - rounded);
+}
+
 // Where a distance begins to fade, and where it has faded.
 fn airiness(depth: f32) -> f32 {
     return smoothstep(0.42, 0.78, depth);

@@ -16,10 +16,11 @@ struct Layer {
 
 @group(1) @binding(1) var depths: texture_depth_2d;
 @group(1) @binding(2) var identities: texture_2d<u32>;
-// Light, pigment of the shadow, depth, length of the normal: under the Gaussian, and under a wide one.
+// Light, pigment of the shadow, depth in two values: under the Gaussian, and under a wide one.
 @group(1) @binding(3) var soft_lights: texture_2d<f32>;
 @group(1) @binding(4) var wide_lights: texture_2d<f32>;
-@group(1) @binding(5) var contours: texture_2d<f32>;
+// Lines, rims, depth of what is in front.
+@group(1) @binding(5) var lines: texture_2d<f32>;
 // Intensities of the layers, four a slice.
 @group(1) @binding(6) var shapes: texture_2d_array<f32>;
 // Colours by light; a row a layer, then one each for the shadow and the dabs.
@@ -128,7 +129,7 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     // Forms stand out against their surroundings: light against its wide mean, and a rim where something nearer ends in front of
     // something farther [Luft, Colditz, Deussen 2006, unsharp masking of the depth].
     let form = saturate((mix(soft.x, wide.x, 0.25) + 0.5 * (soft.x - wide.x) - 0.20) / 0.62);
-    let drawn = textureSampleLevel(contours, linear_sampler, uv, 0.0).x;
+    let drawn = textureSampleLevel(lines, linear_sampler, uv, 0.0).y;
     let seen_color = textureSampleLevel(soft_colors, linear_sampler, uv, 0.0);
     let albedo = seen_color.rgb / max(seen_color.a, 1e-3);
     // Textures are painted where a leaf is larger than a dab of the brush.
@@ -146,6 +147,7 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
 
     var color = style.paper * (1.0 + 0.10 * relief);
     var foliage = 0.0;
+    var painted = 0.0;
     let count = i32(arrayLength(&layers));
     for (var first = 0; first < count; first += 4) {
         let slice = textureSampleLevel(shapes, linear_sampler, uv, first / 4, 0.0);
@@ -169,6 +171,7 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
                 let thickness = (1.0 - 0.4 * air) * (1.0 + layer.foliage * 0.35 * tree) * (1.0 - 0.5 * kept * layer.foliage) * (1.0 - 0.8 * clear);
                 color = glaze(color, transmittance, (wash.density + rim) * thickness, wash.coverage * paint.a);
                 foliage += layer.foliage * wash.coverage;
+                painted = max(painted, wash.coverage * paint.a);
             }
         }
     }
@@ -200,18 +203,19 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let shadow_density = 0.85 + 0.35 * style.edges * shadow_rim + style.granulation * (0.5 - height) + 0.3 * style.flow * broad;
     color = glaze(color, shadow_paint.rgb, max(shadow_density, 0.0), shadow * style.shadow * shadow_paint.a * mix(1.0, 0.45, foliage));
 
-    // The night is one glaze over all.
-    color *= style.night;
-
-    // The pencil drawing, which the paper's hills take.
+    // The pencil drawing, which the paper's hills take, of what is painted: not the horizon behind a plant on white paper.
     let tremble = vec2(broad, middle) * 1.6 * style.unit / style.size;
-    let sketched = textureSampleLevel(contours, linear_sampler, in.uv + tremble, 0.0).x;
+    let sketched = textureSampleLevel(lines, linear_sampler, in.uv + tremble, 0.0);
     let grain = smoothstep(0.25, 0.55, height + 0.16 * finer);
-    let pencil = 1.6 * sketched * grain * style.sketch * (0.9 + 0.5 * broad) * (1.0 - 0.7 * air);
+    let faded = 1.0 - 0.7 * style.air * airiness(sketched.z);
+    let pencil = 1.6 * sketched.x * grain * style.sketch * (0.9 + 0.5 * broad) * faded * smoothstep(0.0, 0.15, painted);
     let stroke_uv = in.uv + 0.3 * vec2(middle, fine) * style.unit / style.size;
     let strokes = stroke_ink(stroke_uv, place.distance, soft.z, max(1.0 - form, soft.y), identities) * f32(!sky);
     let brushed = strokes * mix(0.75, 1.0, grain) * (1.0 - 0.7 * air);
     color = mix(color, style.ink * style.paper, saturate(max(pencil, brushed)) * 0.85);
+
+    // The night is one glaze over all.
+    color *= style.night;
 
     // The margin: the brush does not end in a straight line.
     let from_edge = min(min(page.x, page.y), min(style.size.x / style.unit - page.x, style.size.y / style.unit - page.y));

@@ -22,6 +22,7 @@ pub fn render(options: &RenderOptions, progress: &mut dyn Progress) -> Result<Re
     // The scene's own errors come first, then the request's, then the device's: all are found before the long work, and
     // before anything is left behind.
     let scene = options.overrides.applied(options.scene.read()?);
+    options.overrides.warnings(&scene).iter().for_each(|warning| progress.warn(warning));
     RenderPlan::check(options, &scene)?;
     let choice = Choice::new(&options.beside, &scene)?;
     check_writable(options)?;

@@ -56,7 +56,7 @@ impl CanopyStyle {
     /// # Errors
     /// [`PaletteError`].
     pub fn new(style: Style) -> Result<Self, PaletteError> {
-        let name = style.palette().to_owned();
+        let name = style.palette().unwrap_or(palette::NAMES[0]).to_owned();
         let palette = Some(Palette::load(&name)?);
         Ok(Self { style, palette: Arc::new(Pigments { name, palette }) })
     }
@@ -65,10 +65,7 @@ impl CanopyStyle {
 /// Reads the palettes of styles that name another one than they have.
 pub(super) fn follow_palettes(mut styles: Query<&mut CanopyStyle, Changed<CanopyStyle>>) {
     for mut style in &mut styles {
-        let name = style.style.palette();
-        if style.palette.name == name {
-            continue;
-        }
+        let Some(name) = style.style.palette().filter(|name| *name != style.palette.name) else { continue };
         let palette = match Palette::load(name) {
             Ok(palette) => Some(palette),
             Err(error) => {

@@ -69,6 +69,19 @@ impl Overrides {
         }
     }
 
+    /// What a user should know of the values that change nothing in `scene`, to which they were applied.
+    pub fn warnings(&self, scene: &Scene) -> Vec<String> {
+        let style = &scene.style;
+        let unused = |given: &Option<String>, has: bool, what: &str, styles: &str| {
+            let name = style.name();
+            let text = || format!("the {what} has no effect: `{name}` has none; choose the style {styles}");
+            (given.is_some() && !has).then(text)
+        };
+        let palette = unused(&self.palette, style.palette().is_some(), "palette", "watercolour, lines or toon");
+        let paper = unused(&self.paper, style.paper().is_some(), "paper", "watercolour or lines");
+        palette.into_iter().chain(paper).collect()
+    }
+
     /// Replaces the style.
     fn restyle(&self, scene: &mut Scene) {
         let kind = |style: &Style| std::mem::discriminant(style);

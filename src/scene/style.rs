@@ -19,8 +19,8 @@ pub(super) fn check(style: &Style, check: &mut Check) {
         let remedy = format!("did you mean \"{nearest}\"? (known: {})", known.join(", "));
         check.problem("style.paper", format!("is \"{paper}\", which is no paper"), remedy);
     }
-    if !Palette::is_file(style.palette())
-        && let Err(PaletteError::Unknown { name, nearest }) = Palette::named(style.palette())
+    if let Some(palette) = style.palette().filter(|palette| !Palette::is_file(palette))
+        && let Err(PaletteError::Unknown { name, nearest }) = Palette::named(palette)
     {
         let remedy = format!("did you mean \"{nearest}\"? (or name a .ron file)");
         check.problem("style.palette", format!("is \"{name}\", which is no palette"), remedy);

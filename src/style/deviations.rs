@@ -101,6 +101,33 @@ impl Spacing {
     }
 }
 
+/// The deviations of Gaussians that, one after the other, make one of `deviation` texels. Each has so many points on either side, the first
+/// `first_points`, and is as wide as those may be that reach far: over what is unblurred a texel apart, over what is blurred already
+/// ([`SMOOTH_SPACING`]) farther. Between points that are too far apart grain would be left.
+///
+/// `blurred` is the deviation of what the first one blurs. At least one deviation; at most [`MOST_STAGES`], of which the last takes what
+/// is left.
+pub fn stages(deviation: f32, blurred: f32, first_points: u32) -> Vec<f32> {
+    // Not what is not a number either.
+    let wanted = if deviation > 0.0 { deviation.min(GREATEST) } else { 0.0 };
+    let (mut stages, mut reached) = (Vec::new(), 0.0_f32);
+    loop {
+        let points = if stages.is_empty() { first_points } else { MAP_POINTS };
+        let widest = (SMOOTH_SPACING * reached.hypot(blurred)).max(1.0) * points as f32 / REACH;
+        let left = (wanted * wanted - reached * reached).max(0.0).sqrt();
+        if left <= widest || stages.len() + 1 == MOST_STAGES {
+            stages.push(left);
+            return stages;
+        }
+        stages.push(widest);
+        reached = reached.hypot(widest);
+    }
+}
+
+/// Most Gaussians that [`stages`] gives.
+pub const MOST_STAGES: usize = 4;
+/// Deviations of what is blurred between the points at which it is looked up: exp(-2 π² / 1.5²), below a thousandth, is left of its grain.
+const SMOOTH_SPACING: f32 = 1.5;
 /// Standard deviations from the middle of a Gaussian to its last point.
 const REACH: f32 = 3.0;
 /// Deviations in texels: of less, the next texel has no weight; more than any map has.
@@ -124,6 +151,27 @@ mod tests {
             let spacing = Spacing::of(deviation, 8);
             assert!(spacing.texels.is_finite() && (0.0..10.0).contains(&spacing.deviations), "{spacing:?}");
         }
+    }
+
+    #[test]
+    fn wide_gaussians_are_made_of_several_without_gaps_between_their_points() {
+        assert_eq!(stages(2.5, 0.0, IDENTITY_POINTS), [2.5]);
+        for nothing in [0.0, -1.0, f32::NAN] {
+            assert_eq!(stages(nothing, 0.0, MAP_POINTS), [0.0]);
+        }
+        for (deviation, blurred, first_points) in
+            [(3.4, 0.0, 10), (20.0, 0.0, 8), (30.0, 6.0, 10), (114.0, 0.0, 8), (130.0, 0.0, 10)]
+        {
+            let (mut total, mut points) = (0.0_f32, first_points);
+            let stages = stages(deviation, blurred, first_points);
+            for stage in &stages {
+                let spacing = Spacing::of(*stage, points).texels;
+                assert!(spacing <= 1.001_f32.max(1.501 * total.hypot(blurred)), "{deviation}: {stages:?}");
+                (total, points) = (total.hypot(*stage), MAP_POINTS);
+            }
+            assert!((total - deviation).abs() < 1e-3 * deviation, "{deviation}: {stages:?}");
+        }
+        assert_eq!(stages(f32::INFINITY, 0.0, 10).len(), MOST_STAGES);
     }
 
     #[test]

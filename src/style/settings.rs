@@ -135,14 +135,14 @@ pub struct Lines {
     /// Name of a paper. Default `"hot-pressed"`.
     #[reflect(@Names(Paper::NAMES), @"The paper.")]
     pub paper: String,
-    /// Width of a line in pixels of a picture of 720 lines, 0.25 to 10; lines are at least as wide as `simplification`. Default 1.2.
+    /// Width of a line in pixels of a picture of 720 lines, 0.25 to 10. Default 2.
     #[reflect(@Range::steps(0.25..=10.0, 0.25, 0.05).unit("px"), @"Width of lines.")]
     pub width: f32,
     /// How small a discontinuity is drawn, 0 to 4. Default 1.
     #[reflect(@Range::steps(0.0..=4.0, 0.1, 0.02), @"How small a discontinuity is drawn.")]
     pub detail: f32,
     /// Standard deviation in pixels of a picture of 720 lines of the Gaussian that simplifies shapes, 0 to 20. Default 2. More gives
-    /// fewer and broader lines.
+    /// fewer and smoother lines.
     #[reflect(@Range::steps(0.0..=20.0, 0.5, 0.1).unit("px"), @"How far shapes are simplified.")]
     pub simplification: f32,
     /// Which normals are used. Default `Scaled`.
@@ -161,7 +161,7 @@ impl Default for Lines {
         Self {
             palette: BUILT_IN[0].0.to_owned(),
             paper: Paper::HotPressed.name().to_owned(),
-            width: 1.2,
+            width: 2.0,
             detail: 1.0,
             simplification: 2.0,
             normals: LineNormals::default(),
@@ -176,10 +176,13 @@ impl Default for Lines {
 #[reflect(Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct Toon {
+    /// Name of a palette, or the path of its `.ron` file, of which sky, distance and ink are used. Default `"natural"`.
+    #[reflect(@Names(NAMES), @"The pigments.")]
+    pub palette: String,
     /// Tones of each colour, 2 to 8. Default 3.
     #[reflect(@Range::steps(2..=8, 1.0, 1.0), @"Tones of each colour.")]
     pub tones: u32,
-    /// Width of the contours in pixels of a picture of 720 lines, 0 to 10; 0: none, else at least 2. Default 1.2.
+    /// Width of the contours in pixels of a picture of 720 lines, 0 to 10; 0: none. Default 1.6.
     #[reflect(@Range::steps(0.0..=10.0, 0.25, 0.05).unit("px"), @"Width of contours; 0: none.")]
     pub width: f32,
     /// How small a discontinuity has a contour, 0 to 4. Default 0.8.
@@ -192,7 +195,7 @@ pub struct Toon {
 
 impl Default for Toon {
     fn default() -> Self {
-        Self { tones: 3, width: 1.2, detail: 0.8, normals: LineNormals::default() }
+        Self { palette: BUILT_IN[0].0.to_owned(), tones: 3, width: 1.6, detail: 0.8, normals: LineNormals::default() }
     }
 }
 
@@ -233,12 +236,13 @@ impl Style {
         *self != Self::Photograph
     }
 
-    /// The palette that it names.
-    pub fn palette(&self) -> &str {
+    /// The palette that it names, if it has one.
+    pub fn palette(&self) -> Option<&str> {
         match self {
-            Self::Watercolour(watercolour) => &watercolour.palette,
-            Self::Lines(lines) => &lines.palette,
-            Self::Photograph | Self::Toon(_) => BUILT_IN[0].0,
+            Self::Watercolour(watercolour) => Some(&watercolour.palette),
+            Self::Lines(lines) => Some(&lines.palette),
+            Self::Toon(toon) => Some(&toon.palette),
+            Self::Photograph => None,
         }
     }
 
@@ -247,7 +251,8 @@ impl Style {
         match self {
             Self::Watercolour(watercolour) => Some(&mut watercolour.palette),
             Self::Lines(lines) => Some(&mut lines.palette),
-            Self::Photograph | Self::Toon(_) => None,
+            Self::Toon(toon) => Some(&mut toon.palette),
+            Self::Photograph => None,
         }
     }
 
@@ -266,6 +271,16 @@ impl Style {
             Self::Watercolour(watercolour) => Some(&watercolour.paper),
             Self::Lines(lines) => Some(&lines.paper),
             Self::Photograph | Self::Toon(_) => None,
+        }
+    }
+
+    /// Whether contours are looked for.
+    pub fn has_contours(&self) -> bool {
+        match self {
+            Self::Photograph => false,
+            Self::Watercolour(watercolour) => watercolour.edges > 0.0 || watercolour.sketch > 0.0,
+            Self::Lines(_) => true,
+            Self::Toon(toon) => toon.width > 0.0,
         }
     }
 
@@ -316,7 +331,7 @@ mod tests {
             let style = Style::named(name).expect("a style");
             assert!(style.numbers().into_iter().all(|(_, value, range)| range.contains(&value)), "{name}");
             assert!(style.paper().is_none_or(|paper| Paper::named(paper).is_some()));
-            assert!(BUILT_IN.iter().any(|(known, _)| *known == style.palette()));
+            assert!(style.palette().is_none_or(|palette| BUILT_IN.iter().any(|(known, _)| *known == palette)));
             assert_eq!(style.is_drawn(), name != "photograph");
             let options = ron::Options::default().with_default_extension(Extensions::UNWRAP_VARIANT_NEWTYPES);
             assert_eq!(options.from_str::<Style>(&style.to_ron()).as_ref(), Ok(&style), "{}", style.to_ron());

@@ -157,6 +157,96 @@ fn realigned_and_scaled_normals_have_fewer_lines_inside_a_crown() {
     assert_eq!(gpu.messages(), Vec::<String>::new());
 }
 
+/// A renderer of 640 by 480 pixels that shows `stage`.
+fn larger(stage: &Stage) -> Renderer {
+    let mut renderer = match Renderer::new((640, 480), None, 1) {
+        Ok(renderer) => renderer,
+        Err(error) => panic!("{error}"),
+    };
+    renderer.show(stage);
+    renderer
+}
+
+/// Lines were as broad as the Gaussian that simplifies shapes: the horizon was a bar.
+#[test]
+fn a_line_is_as_wide_as_it_should_be_at_any_simplification() {
+    let gpu = gpu();
+    let stage = trees_at(&[DVec2::new(0.0, 90.0)], 1).stage;
+    let mut renderer = larger(&stage);
+    // Pixels of the horizon's line: its ink in all rows over that in the darkest.
+    let mut thickness = |simplification: f32, width: f32| {
+        let lines = Lines { width, simplification, hatching: 0.0, ..Lines::default() };
+        renderer.set_style(styled(Style::Lines(lines)));
+        let picture = draw(&mut renderer, &stage, &view(&stage, (0.0, 2.0, 0.0), 0.0, 0.0), NOON);
+        keep(&picture, &format!("horizon-{simplification}-{width}"));
+        let ink = |row: u32| (250.0 - brightness(&picture, 200..440, row..row + 1)).max(0.0);
+        let rows = || (160..320).map(ink);
+        let darkest = rows().fold(0.0, f64::max);
+        assert!(darkest > 20.0, "no horizon at simplification {simplification}");
+        rows().sum::<f64>() / darkest
+    };
+    for simplification in [0.0, 2.0, 6.0, 20.0] {
+        // 4.5 and 15 of 720 lines are 3 and 10 pixels here.
+        let (narrow, wide) = (thickness(simplification, 4.5), thickness(simplification, 10.0));
+        println!("simplification {simplification}: {narrow:.1} and {wide:.1} pixels");
+        assert!((1.0..6.0).contains(&narrow), "{narrow} pixels at simplification {simplification}");
+        assert!(wide > 1.3 * narrow, "{wide} pixels are not wider than {narrow} at simplification {simplification}");
+    }
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+/// Without a Gaussian, depths of 16 bits had steps on flat ground.
+#[test]
+fn flat_ground_has_no_contours() {
+    let gpu = gpu();
+    let stage = trees_at(&[DVec2::new(0.0, 90.0)], 1).stage;
+    let mut renderer = larger(&stage);
+    for (simplification, height) in [(0.0, 2.0), (0.0, 40.0), (2.0, 2.0), (20.0, 2.0)] {
+        let lines = Lines { simplification, detail: 4.0, hatching: 0.0, ..Lines::default() };
+        renderer.set_style(styled(Style::Lines(lines)));
+        let picture = draw(&mut renderer, &stage, &view(&stage, (0.0, height, 0.0), 0.0, -20.0), NOON);
+        keep(&picture, &format!("flat-{simplification}-{height}"));
+        // Below the horizon; the control is the horizon itself.
+        let darkest = |rows: std::ops::Range<u32>| {
+            rows.flat_map(|row| (0..640).map(move |column| (column, row)))
+                .map(|(column, row)| pixel(&picture, column, row)[1])
+                .min()
+                .unwrap()
+        };
+        let (ground, horizon) = (darkest(220..480), darkest(0..160));
+        println!("simplification {simplification} from {height} m: {ground} on the ground, {horizon} at the horizon");
+        assert!(ground > 225 && horizon < 200, "{ground} on the ground, {horizon} at the horizon");
+    }
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
+/// Ink had its colour of the day, and shone at night.
+#[test]
+fn contours_at_night_are_darker_than_what_they_outline() {
+    let gpu = gpu();
+    let stage = lone_tree("Expressive()");
+    let mut renderer = larger(&stage);
+    let mut at_night = |style: CanopyStyle, name: &str| {
+        renderer.set_style(style);
+        let picture = draw(&mut renderer, &stage, &view(&stage, (0.0, 6.0, 15.0), 0.0, 4.0), NIGHT);
+        keep(&picture, name);
+        picture
+    };
+    let toon = |width: f32| styled(Style::Toon(Toon { width, ..Toon::default() }));
+    let sketched = |sketch: f32| watercolour(|w| w.sketch = sketch);
+    let pairs = [
+        (at_night(toon(0.0), "night-toon-without"), at_night(toon(3.0), "night-toon-with")),
+        (at_night(sketched(0.0), "night-watercolour-without"), at_night(sketched(2.0), "night-watercolour-with")),
+    ];
+    for (without, with) in pairs {
+        let changes = || without.pixels.iter().zip(&with.pixels).map(|(a, b)| i16::from(*b) - i16::from(*a));
+        let (darker, lighter) = (changes().filter(|c| *c < -4).count(), changes().filter(|c| *c > 4).count());
+        println!("{darker} values are darker, {lighter} lighter");
+        assert!(darker > 1000 && 50 * lighter < darker, "{darker} values are darker, {lighter} lighter");
+    }
+    assert_eq!(gpu.messages(), Vec::<String>::new());
+}
+
 #[test]
 fn a_toon_has_few_tones() {
     let gpu = gpu();

@@ -55,11 +55,12 @@ use tour::Tour;
 /// [`AppError`] if the scene cannot be used, if there is no display or no graphics adapter, or if the device fails
 /// during the flight; [`AppError::Interrupted`] after an interrupt, if the program listens to them
 /// ([`listen_to_interrupts`](super::listen_to_interrupts)). What can be known of it is checked before the window opens.
-pub fn fly(options: &FlyOptions, progress: impl Progress + 'static) -> Result<(), AppError> {
+pub fn fly(options: &FlyOptions, mut progress: impl Progress + 'static) -> Result<(), AppError> {
     display::check()?;
     let settings = adapter::settings(options.adapter.as_deref())?;
     adapter::check_size(&settings, options.size)?;
     let scene = Request::read(options)?;
+    options.overrides.warnings(&scene).iter().for_each(|warning| progress.warn(warning));
     Tour::new(&scene, options.view)?;
     let ending = Ending::default();
     let request = Request { options: options.clone(), scene: Arc::new(scene), ending: ending.clone() };

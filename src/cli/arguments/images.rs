@@ -32,7 +32,7 @@ pub struct StyleArguments {
     /// Draw in a style: photograph, watercolour, lines or toon [default: the scene's].
     #[arg(long, value_name = "STYLE", value_parser = parse_style)]
     pub style: Option<Style>,
-    /// Palette of a watercolour or of lines: natural, sepia, cool-to-warm, autumn, indigo, botanical, or a .ron file [default: the
+    /// Palette of a watercolour, of lines or of toon shading: natural, sepia, cool-to-warm, autumn, indigo, botanical, or a .ron file [default: the
     /// scene's].
     #[arg(long, value_name = "PALETTE", value_parser = parse_palette)]
     pub palette: Option<String>,

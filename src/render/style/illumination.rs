@@ -5,38 +5,28 @@
 //! cascade's map, instead of over whole maps.
 
 use bevy::{
-    ecs::{query::With, system::Res},
+    ecs::query::With,
     render::{
-        render_resource::{BindGroupEntries, PipelineCache},
-        renderer::{RenderContext, RenderDevice, ViewQuery},
+        render_resource::BindGroupEntries,
+        renderer::{RenderContext, ViewQuery},
     },
 };
 
 use super::{
-    full_screen, inputs::StyleInputs, layouts::illumination_layout, pipelines::StylePipelines, targets::StyleTargets,
+    layouts::illumination_layout,
+    pass::{FullScreenPass, StylePass},
 };
-use crate::render::{
-    bindings::FrameBindGroup,
-    components::{CanopyCamera, DrawnStyle},
-};
+use crate::render::components::{CanopyCamera, DrawnStyle};
 
 /// Lights the surfaces.
-pub fn illumination_pass(
-    view: ViewQuery<&DrawnStyle, With<CanopyCamera>>,
-    group: Res<FrameBindGroup>,
-    targets: Res<StyleTargets>,
-    inputs: Res<StyleInputs>,
-    pipelines: Res<StylePipelines>,
-    cache: Res<PipelineCache>,
-    device: Res<RenderDevice>,
-    mut ctx: RenderContext,
-) {
-    let pipeline = pipelines.illumination().and_then(|id| cache.get_render_pipeline(id));
-    let (Some(group), Some(maps), Some(pipeline)) = (group.of(view.entity()), &targets.0, pipeline) else { return };
-    let own = device.create_bind_group(
-        "canopy_style_light",
-        &cache.get_bind_group_layout(&illumination_layout()),
-        &BindGroupEntries::sequential((inputs.uniform.as_entire_binding(), &maps.depth, &maps.surfaces)),
-    );
-    full_screen::draw(&mut ctx, "canopy_style_light", &maps.lights, pipeline, &[(group, &[]), (&own, &[])]);
+pub fn illumination_pass(view: ViewQuery<&DrawnStyle, With<CanopyCamera>>, pass: StylePass, mut ctx: RenderContext) {
+    let Some(maps) = pass.maps() else { return };
+    let light = FullScreenPass {
+        label: "canopy_style_light",
+        pipeline: pass.pipelines.illumination(),
+        layout: illumination_layout(),
+        entries: &BindGroupEntries::sequential((pass.uniform(), &maps.depth, &maps.surfaces)),
+        target: &maps.lights,
+    };
+    pass.draw(&mut ctx, view.entity(), light);
 }

@@ -1,5 +1,7 @@
 //! What the full-screen passes read besides the maps: the style's values, ramps, layers and paper.
 
+use std::ops::Range;
+
 use bevy::{
     ecs::{
         query::With,
@@ -31,23 +33,25 @@ use crate::{
     },
     style::{
         Deviations, Palette, Paper, Ramp, Style,
-        deviations::{IDENTITY_POINTS, MAP_POINTS, Spacing},
+        deviations::{IDENTITY_POINTS, LINES, MAP_POINTS, MOST_STAGES, Spacing, stages},
         layers,
     },
 };
 
 /// Colours of a ramp on the device.
 const RAMP_STEPS: usize = 64;
-/// Passes of the Gaussian: four maps, the dabs, and the slices of the layers, both directions each.
-pub const MOST_BLURS: u64 = 2 * (5 + 64);
+/// Passes of the Gaussians: four maps, the dabs, and the slices of the layers, both directions of each stage.
+pub const MOST_BLURS: u64 = 2 * (5 + 64) * MOST_STAGES as u64;
 
 /// The values of the style that is drawn.
 #[derive(Resource)]
 pub struct StyleInputs {
     /// [`StyleUniform`].
     pub uniform: Buffer,
-    /// [`BlurUniform`]s at [`UNIFORM_STRIDE`].
+    /// [`BlurUniform`]s at [`UNIFORM_STRIDE`], two a stage.
     pub blurs: Buffer,
+    /// The stages of each Gaussian: of four maps, of the dabs, of each slice of the layers.
+    pub blur_stages: Vec<Range<u32>>,
     /// Clamps.
     pub linear: Sampler,
     /// Repeats.
@@ -92,6 +96,7 @@ impl FromWorld for StyleInputs {
         Self {
             uniform: gpu::buffer_with(device, "canopy_style", usage, &[StyleUniform::default()]),
             blurs: gpu::uniform_slots(device, "canopy_style_blurs", MOST_BLURS),
+            blur_stages: Vec::new(),
             linear: sampler(AddressMode::ClampToEdge),
             repeating: sampler(AddressMode::Repeat),
             drawn: None,
@@ -113,17 +118,17 @@ pub fn prepare_inputs(
         inputs.drawn = None;
         return;
     };
-    let uniform = StyleUniform::new(drawn, view, maps.picture, maps.key.size);
+    let uniform = StyleUniform::new(drawn, view, maps.key.picture, maps.key.size);
     gpu.queue.write_buffer(&inputs.uniform, 0, bytemuck::bytes_of(&uniform));
-    write_blurs(&gpu, &inputs.blurs, &Deviations::of(&drawn.style), &maps.key);
+    inputs.blur_stages = write_blurs(&gpu, &inputs.blurs, &Deviations::of(&drawn.style), &maps.key);
 
     let wetness = if let Style::Watercolour(w) = &drawn.style { w.wetness } else { 0.0 };
     let key = InputKey { palette: drawn.palette().cloned(), paper: drawn.paper(), layers: maps.key.layers, wetness };
     if inputs.drawn.as_ref().is_some_and(|known| known.key == key) {
-        report.skipped("palette and paper", "neither has changed");
+        report.skipped("style palette and paper", "neither has changed");
         return;
     }
-    report.ran("palette and paper", format!("{} layers", key.layers));
+    report.ran("style palette and paper", "uploaded");
     let old_paper = inputs.drawn.take().filter(|known| known.key.paper == key.paper).map(|known| known.paper);
     let paper = old_paper.unwrap_or_else(|| upload_paper(&gpu, key.paper));
     let washes = washes(&key);
@@ -131,34 +136,74 @@ pub fn prepare_inputs(
     inputs.drawn = Some(DrawnInputs { ramps: upload_ramps(&gpu, &key), layers, paper, key });
 }
 
-/// Writes the steps of all Gaussians, in the order in which `blur` runs them.
-fn write_blurs(gpu: &Gpu, buffer: &Buffer, deviations: &Deviations, key: &MapKey) {
-    let maps = [
-        (deviations.lights, 1),
-        (deviations.wide, key.wide_divisor),
-        (deviations.normals, 1),
-        (deviations.lights, key.color_divisor),
-        (deviations.dabs, 1),
-    ];
-    let maps = maps.map(|(deviation, divisor)| (deviation, divisor, None));
-    let slices = (0..key.layers.div_ceil(4)).map(|slice| (deviations.shapes, 1, Some(4 * slice)));
-    for (index, (deviation, divisor, first_layer)) in maps.into_iter().chain(slices).enumerate() {
-        let deviation = deviation * key.size.1 as f32 / 720.0;
-        let coarse = key.coarse(divisor);
-        let ratio = [key.size.0 as f32 / coarse.0 as f32, key.size.1 as f32 / coarse.1 as f32];
-        let across = Spacing::of(deviation, if first_layer.is_some() { IDENTITY_POINTS } else { MAP_POINTS });
-        let along = Spacing::of(deviation / ratio[1], MAP_POINTS);
-        // The first axis leads to the size of the target, the second stays at it.
-        let axes = [(across, [across.texels, 0.0], ratio), (along, [0.0, along.texels], [1.0; 2])];
-        for (axis, (spacing, step, scale)) in axes.into_iter().enumerate() {
-            let uniform =
-                BlurUniform { step, scale, spacing: spacing.deviations, first_layer: first_layer.unwrap_or(0) };
-            let slot = (2 * index + axis) as u64;
-            if slot < MOST_BLURS {
-                gpu.queue.write_buffer(buffer, slot * UNIFORM_STRIDE, bytemuck::bytes_of(&uniform));
-            }
-        }
+/// A Gaussian over a map.
+struct Gaussian {
+    /// Pixels of a picture of 720 lines.
+    deviation: f32,
+    /// The same of what it blurs.
+    blurred: f32,
+    /// Texels along a side that become one.
+    divisor: u32,
+    /// Whether two channels are a depth.
+    depth: bool,
+    /// First of four layers, for identifiers.
+    first_layer: Option<u32>,
+}
+
+impl Gaussian {
+    fn of(deviation: f32) -> Self {
+        Self { deviation, blurred: 0.0, divisor: 1, depth: false, first_layer: None }
     }
+
+    /// The passes: two for each stage.
+    fn passes(&self, key: &MapKey) -> Vec<BlurUniform> {
+        let unit = key.size.1 as f32 / LINES;
+        let coarse = key.coarse(self.divisor);
+        let ratio = [key.size.0 as f32 / coarse.0 as f32, key.size.1 as f32 / coarse.1 as f32];
+        let points = if self.first_layer.is_some() { IDENTITY_POINTS } else { MAP_POINTS };
+        let pass = |spacing: Spacing, step, scale| BlurUniform {
+            step,
+            scale,
+            spacing: spacing.deviations,
+            first_layer: self.first_layer.unwrap_or(0),
+            splits_depth: self.depth.into(),
+            padding: 0,
+        };
+        let stages = stages(self.deviation * unit, self.blurred * unit, points);
+        let passes = stages.iter().enumerate().flat_map(|(stage, deviation)| {
+            // The first pass leads to the size of the target, the others stay at it.
+            let (points, scale) = if stage == 0 { (points, ratio) } else { (MAP_POINTS, [1.0; 2]) };
+            let across = Spacing::of(if stage == 0 { *deviation } else { deviation / ratio[0] }, points);
+            let along = Spacing::of(deviation / ratio[1], MAP_POINTS);
+            [pass(across, [across.texels, 0.0], scale), pass(along, [0.0, along.texels], [1.0; 2])]
+        });
+        passes.collect()
+    }
+}
+
+/// Writes the passes of all Gaussians, in the order in which `blur` draws them, and returns the stages of each.
+fn write_blurs(gpu: &Gpu, buffer: &Buffer, deviations: &Deviations, key: &MapKey) -> Vec<Range<u32>> {
+    let Deviations { shapes, lights, wide, normals, dabs } = *deviations;
+    let maps = [
+        Gaussian { depth: true, ..Gaussian::of(lights) },
+        Gaussian { depth: true, blurred: lights, divisor: key.wide_divisor, ..Gaussian::of(wide) },
+        Gaussian::of(normals),
+        Gaussian { divisor: key.color_divisor, ..Gaussian::of(lights) },
+        Gaussian::of(dabs),
+    ];
+    let slices =
+        (0..key.layers.div_ceil(4)).map(|slice| Gaussian { first_layer: Some(4 * slice), ..Gaussian::of(shapes) });
+    let mut passes = Vec::new();
+    let stages = maps.into_iter().chain(slices).map(|gaussian| {
+        let first = passes.len() as u32 / 2;
+        passes.extend(gaussian.passes(key));
+        first..passes.len() as u32 / 2
+    });
+    let stages = stages.collect();
+    for (slot, pass) in (0..MOST_BLURS).zip(&passes) {
+        gpu.queue.write_buffer(buffer, slot * UNIFORM_STRIDE, bytemuck::bytes_of(pass));
+    }
+    stages
 }
 
 /// How each layer is painted: the sky on wet paper, the rest on dry paper as far as the style says.
@@ -228,6 +273,6 @@ mod tests {
             assert_eq!(rows.len(), layers.max(1) as usize + 4);
             assert!(rows.iter().all(|row| row.len() == RAMP_STEPS && row.iter().all(|color| color.is_finite())));
         }
-        const { assert!(MOST_BLURS >= 2 * (5 + 256 / 4)) };
+        const { assert!(MOST_BLURS >= 2 * (5 + 256 / 4) * MOST_STAGES as u64) };
     }
 }

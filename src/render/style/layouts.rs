@@ -62,6 +62,21 @@ pub fn contours_layout() -> BindGroupLayoutDescriptor {
     )
 }
 
+/// Group 1 of the lines: the style, contours.
+pub fn lines_layout() -> BindGroupLayoutDescriptor {
+    BindGroupLayoutDescriptor::new(
+        "canopy_style_lines",
+        &BindGroupLayoutEntries::sequential(
+            ShaderStages::FRAGMENT,
+            (
+                uniform_buffer_sized(false, STYLE_SIZE),
+                texture_2d(TextureSampleType::Float { filterable: true }),
+                sampler(SamplerBindingType::Filtering),
+            ),
+        ),
+    )
+}
+
 /// Group 1 of the noise: the style, depth.
 pub fn noises_layout() -> BindGroupLayoutDescriptor {
     BindGroupLayoutDescriptor::new(

@@ -1,9 +1,9 @@
 //! The styles: watercolour [Luft 2006], lines and toon shading [Luft 2007, section 4], instead of the photographic picture.
 //!
 //! ```text
-//! surfaces ───> illumination ──> blur ────────> particles ──> blur ──────> contours ──> picture, after
-//! depth, layer, lighting map,    light, depth,  three         dabs, layers and noise,   Bevy's tone
-//! normal × k_a, soft shadow      normals        intensities   of the ID    for washes   mapping
+//! surfaces ───> illumination ──> blur ────────> particles ──> blur ──────> contours,    ──> picture, after
+//! depth, layer, lighting map,    light, depth,  three         dabs, layers lines; noise     Bevy's tone
+//! normal × k_a, soft shadow      normals        intensities   of the ID    for washes       mapping
 //! albedo                                        of near trees image
 //! ```
 //!
@@ -16,17 +16,19 @@
 //! in it either.
 
 mod blur;
+mod contours;
 mod full_screen;
 mod illumination;
 mod inputs;
 mod layouts;
+mod noise_map;
 mod particles;
+mod pass;
 mod picture;
 mod pipelines;
 mod surfaces;
 mod targets;
 pub mod uniforms;
-mod wash_maps;
 
 use bevy::{
     app::{App, Plugin},
@@ -66,7 +68,8 @@ impl Plugin for StylePassPlugin {
                         blur::maps_pass,
                         particles::particles_pass,
                         blur::shapes_pass,
-                        wash_maps::wash_maps_pass,
+                        contours::contours_pass,
+                        noise_map::noise_map_pass,
                     )
                         .chain()
                         .in_set(CanopyPasses::Style),

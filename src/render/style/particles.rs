@@ -21,7 +21,7 @@ use bevy::{
     platform::collections::HashMap,
     render::{
         diagnostic::RecordDiagnostics,
-        render_resource::{BindGroup, BindGroupEntries, Buffer, BufferUsages, PipelineCache, RenderPassDescriptor},
+        render_resource::{BindGroup, BindGroupEntries, Buffer, BufferUsages, RenderPassDescriptor},
         renderer::{RenderContext, RenderDevice, ViewQuery},
     },
 };
@@ -30,7 +30,7 @@ use glam::Vec3;
 use super::{
     full_screen::cleared,
     layouts::particles_layout,
-    pipelines::StylePipelines,
+    pass::StylePass,
     targets::{StyleMaps, StyleTargets, has_particles},
     uniforms::{GpuParticle, ParticleViewUniform},
 };
@@ -41,7 +41,6 @@ use crate::{
     math::octahedral::{encode_y, pack_snorm16},
     plant::PartKind,
     render::{
-        bindings::FrameBindGroup,
         components::{CanopyCamera, DrawnStyle},
         forest::{GpuForest, GpuForests, LevelLook, forest_view, instance_bind_group},
         gpu::{self, Gpu, GrowingBuffer},
@@ -161,7 +160,7 @@ pub fn prepare_particles(
     }
     let trees: usize = particles.draws.iter().map(|draw| draw.trees.len()).sum();
     let count: u64 = particles.draws.iter().flat_map(|draw| &draw.trees).map(|tree| u64::from(tree.count)).sum();
-    report.ran("particles", format!("{count} of {trees} trees"));
+    report.ran("style particles", format!("{count} dabs on {trees} trees"));
 }
 
 impl ForestParticles {
@@ -188,7 +187,7 @@ impl ForestParticles {
         settings: &ParticleViewUniform,
         maps: &StyleMaps,
     ) -> Vec<ForestDraw> {
-        let focal = view.focal_pixels * maps.key.size.1 as f32 / maps.picture.1.max(1) as f32;
+        let focal = view.focal_pixels * maps.key.size.1 as f32 / maps.key.picture.1.max(1) as f32;
         let uniform = forest_view(forest, view.camera, Some(LevelLook::default()));
         gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
         self.visible.resize_with(forest.page_count(), || GrowingBuffer::new(&gpu.device, "canopy_particle_trees"));
@@ -272,21 +271,16 @@ fn pack(particle: &Particle) -> GpuParticle {
 /// Draws the particles into their map.
 pub fn particles_pass(
     view: ViewQuery<&DrawnStyle, With<CanopyCamera>>,
-    group: Res<FrameBindGroup>,
-    targets: Res<StyleTargets>,
+    style: StylePass,
     particles: Res<StyleParticles>,
-    pipelines: Res<StylePipelines>,
-    cache: Res<PipelineCache>,
-    device: Res<RenderDevice>,
     mut ctx: RenderContext,
 ) {
-    let group = group.of(view.entity());
-    let pipeline = pipelines.particles().and_then(|id| cache.get_render_pipeline(id));
-    let (Some(group), Some(maps)) = (group, &targets.0) else { return };
+    let (Some(group), Some(maps)) = (style.frame.of(view.entity()), style.maps()) else { return };
+    let pipeline = style.pipeline(style.pipelines.particles());
     let Some(dabs) = maps.dabs.as_ref() else { return };
-    let layout = cache.get_bind_group_layout(&particles_layout());
+    let layout = style.cache.get_bind_group_layout(&particles_layout());
     let group_of = |buffer: &Buffer| {
-        device.create_bind_group(
+        style.device.create_bind_group(
             "canopy_style_particles",
             &layout,
             &BindGroupEntries::sequential((

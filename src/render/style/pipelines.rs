@@ -20,9 +20,10 @@ use bevy::{
 use super::{
     full_screen::full_screen,
     layouts::{
-        Picture, blur_layout, contours_layout, illumination_layout, noises_layout, particles_layout, picture_layout,
+        Picture, blur_layout, contours_layout, illumination_layout, lines_layout, noises_layout, particles_layout,
+        picture_layout,
     },
-    targets::{COLOR_FORMAT, CONTOUR_FORMAT, IDENTITY_FORMAT, MAP_FORMAT, SHAPE_FORMAT, has_particles},
+    targets::{COLOR_FORMAT, IDENTITY_FORMAT, MAP_FORMAT, SHAPE_FORMAT, has_particles},
 };
 use crate::{
     lod::Representation,
@@ -58,7 +59,8 @@ pub struct StylePipelines {
     illumination: Option<CachedRenderPipelineId>,
     blurs: Option<[CachedRenderPipelineId; 3]>,
     particles: Option<CachedRenderPipelineId>,
-    contours_and_noises: Option<[CachedRenderPipelineId; 2]>,
+    contours: Option<[CachedRenderPipelineId; 2]>,
+    noises: Option<CachedRenderPipelineId>,
     pictures: HashMap<(Picture, TextureFormat), CachedRenderPipelineId>,
     /// Whether the leaves' own normals are wanted.
     own_normals: bool,
@@ -73,7 +75,8 @@ impl FromWorld for StylePipelines {
             illumination: None,
             blurs: None,
             particles: None,
-            contours_and_noises: None,
+            contours: None,
+            noises: None,
             pictures: HashMap::default(),
             own_normals: false,
         }
@@ -106,9 +109,14 @@ impl StylePipelines {
         self.particles
     }
 
-    /// Those of the contours and of the noise, which washes need.
-    pub fn contours_and_noises(&self) -> Option<[CachedRenderPipelineId; 2]> {
-        self.contours_and_noises
+    /// Those of the contours' strength and of their lines.
+    pub fn contours(&self) -> Option<[CachedRenderPipelineId; 2]> {
+        self.contours
+    }
+
+    /// That of the noise, which washes need.
+    pub fn noises(&self) -> Option<CachedRenderPipelineId> {
+        self.noises
     }
 
     /// That of the picture.
@@ -149,10 +157,12 @@ impl StylePipelines {
         self.ground
             .entry(ground_features)
             .or_insert_with(|| cache.queue_render_pipeline(ground(shaders.get(ShaderFile::Terrain), ground_features)));
+        let of_maps = |label, file, own, format| {
+            let layout = vec![frame_layout(), own];
+            cache.queue_render_pipeline(full_screen(label, shaders.get(file), Vec::new(), layout, format))
+        };
         self.illumination.get_or_insert_with(|| {
-            let shader = shaders.get(ShaderFile::StyleIllumination);
-            let layout = vec![frame_layout(), illumination_layout()];
-            cache.queue_render_pipeline(full_screen("canopy_style_light", shader, Vec::new(), layout, MAP_FORMAT))
+            of_maps("canopy_style_light", ShaderFile::StyleIllumination, illumination_layout(), MAP_FORMAT)
         });
         self.blurs.get_or_insert_with(|| {
             [(false, MAP_FORMAT), (true, SHAPE_FORMAT), (false, SHAPE_FORMAT)].map(|(identities, format)| {
@@ -166,16 +176,15 @@ impl StylePipelines {
             let shader = shaders.get(ShaderFile::StyleParticles);
             self.particles.get_or_insert_with(|| cache.queue_render_pipeline(particles(shader)));
         }
+        self.contours.get_or_insert_with(|| {
+            [
+                of_maps("canopy_style_contours", ShaderFile::StyleContours, contours_layout(), MAP_FORMAT),
+                of_maps("canopy_style_lines", ShaderFile::StyleLines, lines_layout(), SHAPE_FORMAT),
+            ]
+        });
         if picture == Picture::Watercolour {
-            self.contours_and_noises.get_or_insert_with(|| {
-                [
-                    ("canopy_style_contours", ShaderFile::StyleContours, contours_layout(), CONTOUR_FORMAT),
-                    ("canopy_style_noises", ShaderFile::StyleNoiseMap, noises_layout(), MAP_FORMAT),
-                ]
-                .map(|(label, file, own, format)| {
-                    let layout = vec![frame_layout(), own];
-                    cache.queue_render_pipeline(full_screen(label, shaders.get(file), Vec::new(), layout, format))
-                })
+            self.noises.get_or_insert_with(|| {
+                of_maps("canopy_style_noises", ShaderFile::StyleNoiseMap, noises_layout(), MAP_FORMAT)
             });
         }
         self.pictures.entry((picture, format)).or_insert_with(|| {

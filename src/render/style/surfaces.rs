@@ -6,22 +6,16 @@ use bevy::{
     render::{
         diagnostic::RecordDiagnostics,
         render_resource::{
-            IndexFormat, LoadOp, Operations, PipelineCache, RenderPassDepthStencilAttachment, RenderPassDescriptor,
-            StoreOp,
+            IndexFormat, LoadOp, Operations, RenderPassDepthStencilAttachment, RenderPassDescriptor, StoreOp,
         },
         renderer::{RenderContext, ViewQuery},
     },
 };
 
-use super::{
-    full_screen::cleared,
-    pipelines::{LEVEL_TARGET, StylePipelines},
-    targets::StyleTargets,
-};
+use super::{full_screen::cleared, pass::StylePass, pipelines::LEVEL_TARGET};
 use crate::{
     cull::Share,
     render::{
-        bindings::FrameBindGroup,
         components::{CanopyCamera, DrawnStyle},
         forest::{GpuForests, PreparedForest, PreparedForests},
         frame_work::FrameWork,
@@ -32,15 +26,12 @@ use crate::{
 /// Draws forests and ground into the maps.
 pub fn surfaces_pass(
     view: ViewQuery<&DrawnStyle, With<CanopyCamera>>,
-    group: Res<FrameBindGroup>,
-    targets: Res<StyleTargets>,
+    style: StylePass,
     (forests, prepared, terrain): (Res<GpuForests>, Res<PreparedForests>, Res<GpuTerrain>),
-    pipelines: Res<StylePipelines>,
-    cache: Res<PipelineCache>,
     work: Res<FrameWork>,
     mut ctx: RenderContext,
 ) {
-    let (Some(group), Some(maps)) = (group.of(view.entity()), &targets.0) else { return };
+    let (Some(group), Some(maps)) = (style.frame.of(view.entity()), style.maps()) else { return };
     let diagnostics = ctx.diagnostic_recorder();
     let diagnostics = diagnostics.as_deref();
     let mut pass = ctx.begin_tracked_render_pass(RenderPassDescriptor {
@@ -61,8 +52,7 @@ pub fn surfaces_pass(
         let Some(lists) = prepared.get(entity) else { continue };
         for (index, level) in forest.levels() {
             for features in level.gpu.features(LEVEL_TARGET) {
-                let id = pipelines.level(level, features);
-                let Some(pipeline) = id.and_then(|id| cache.get_render_pipeline(id)) else { continue };
+                let Some(pipeline) = style.pipeline(style.pipelines.level(level, features)) else { continue };
                 pass.set_render_pipeline(pipeline);
                 for page in lists.pages.iter().filter(|page| page.trees.may_have(index)) {
                     pass.set_bind_group(1, &page.bind_group, &[PreparedForest::offset(index)]);
@@ -73,7 +63,7 @@ pub fn surfaces_pass(
             }
         }
     }
-    let ground = pipelines.ground(terrain.features).and_then(|id| cache.get_render_pipeline(id));
+    let ground = style.pipeline(style.pipelines.ground(terrain.features));
     if let (Some(pipeline), Some(tiles)) = (ground, &terrain.bind_group)
         && terrain.count > 0
     {
@@ -83,4 +73,5 @@ pub fn surfaces_pass(
         pass.draw_indexed(0..terrain.index_count, 0, 0..terrain.count);
     }
     span.end(&mut pass);
+    style.ran("canopy_style_surfaces", "trees and ground");
 }

@@ -37,12 +37,11 @@ pub const COLOR_FORMAT: TextureFormat = TextureFormat::Rgba8UnormSrgb;
 /// Format of four layers' intensities.
 pub const SHAPE_FORMAT: TextureFormat = TextureFormat::Rgba8Unorm;
 
-/// Format of contours.
-pub const CONTOUR_FORMAT: TextureFormat = TextureFormat::R8Unorm;
-
 /// What the maps depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MapKey {
+    /// Pixels of the picture.
+    pub picture: (u32, u32),
     /// Texels of the maps.
     pub size: (u32, u32),
     /// Layers of pigment; 0 for a style without.
@@ -68,8 +67,6 @@ impl MapKey {
 pub struct StyleMaps {
     /// What they depend on.
     pub key: MapKey,
-    /// Pixels of the picture.
-    pub picture: (u32, u32),
     /// Reversed depth.
     pub depth: TextureView,
     /// Normal times ambient visibility, height above the ground.
@@ -78,7 +75,7 @@ pub struct StyleMaps {
     pub identities: TextureView,
     /// Albedo.
     pub colors: TextureView,
-    /// Light, pigment of the shadow, depth, length of the normal.
+    /// Light, pigment of the shadow, depth in two values.
     pub lights: TextureView,
     /// The same under a Gaussian.
     pub soft_lights: TextureView,
@@ -88,8 +85,10 @@ pub struct StyleMaps {
     pub soft_normals: TextureView,
     /// Albedo under a Gaussian, with the share of surfaces as its alpha.
     pub soft_colors: TextureView,
-    /// Contours of normals and depth.
+    /// Contours of normals and depth, of the picture's size: logarithm of their strength, ink, depth of what is in front.
     pub contours: TextureView,
+    /// Their lines, their rims, and that depth.
+    pub lines: TextureView,
     /// Broad noises.
     pub noises: TextureView,
     /// What is blurred along one axis.
@@ -148,6 +147,7 @@ pub fn prepare_targets(
     let deviations = Deviations::of(&drawn.style);
     let divisor = |deviation: f32| deviations::divisor(deviation * size.1 as f32 / LINES);
     let key = MapKey {
+        picture,
         size,
         layers: layer_count(&drawn.style, &forests),
         dabs: has_particles(&drawn.style),
@@ -155,14 +155,13 @@ pub fn prepare_targets(
         color_divisor: divisor(deviations.lights),
         noise_divisor: deviations::noise_divisor(picture.1),
     };
-    match &mut targets.0 {
-        Some(maps) if maps.key == key => maps.picture = picture,
-        old => *old = Some(StyleMaps::new(&device, key, picture)),
+    if targets.0.as_ref().is_none_or(|maps| maps.key != key) {
+        targets.0 = Some(StyleMaps::new(&device, key));
     }
 }
 
 impl StyleMaps {
-    fn new(device: &RenderDevice, key: MapKey, picture: (u32, u32)) -> Self {
+    fn new(device: &RenderDevice, key: MapKey) -> Self {
         let texture = |label, format, slices: u32, size: (u32, u32)| {
             device.create_texture(&TextureDescriptor {
                 label: Some(label),
@@ -196,7 +195,6 @@ impl StyleMaps {
         let array = TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..Default::default() };
         Self {
             key,
-            picture,
             depth: view(texture("canopy_style_depth", CORE_3D_DEPTH_FORMAT, 1, key.size)),
             surfaces: map("canopy_style_surfaces"),
             identities: view(texture("canopy_style_identities", IDENTITY_FORMAT, 1, key.size)),
@@ -206,7 +204,8 @@ impl StyleMaps {
             wide_lights: coarse("canopy_style_wide_lights", key.wide_divisor),
             soft_normals: map("canopy_style_soft_normals"),
             soft_colors: coarse("canopy_style_soft_colors", key.color_divisor),
-            contours: view(texture("canopy_style_contours", CONTOUR_FORMAT, 1, shape_size)),
+            contours: view(texture("canopy_style_contours", MAP_FORMAT, 1, key.picture)),
+            lines: view(texture("canopy_style_lines", SHAPE_FORMAT, 1, key.picture)),
             noises: coarse("canopy_style_noises", key.noise_divisor),
             half_blurred: map("canopy_style_half_blurred"),
             half_wide: coarse("canopy_style_half_wide", key.wide_divisor),

@@ -126,7 +126,14 @@ pub struct BlurUniform {
     pub spacing: f32,
     /// First of the four layers, for identifiers.
     pub first_layer: u32,
+    /// 1: the third and fourth channel are a depth in two values.
+    pub splits_depth: u32,
+    /// WGSL rounds the size up to 8 bytes.
+    pub padding: u32,
 }
+
+/// Width of the pencil under a watercolour, pixels of a picture of 720 lines.
+const PENCIL_WIDTH: f32 = 1.6;
 
 impl StyleUniform {
     /// The values of `drawn` in `view`, for a picture and maps of these sizes in pixels.
@@ -158,7 +165,7 @@ impl StyleUniform {
         match &drawn.style {
             Style::Photograph => {}
             Style::Watercolour(w) => {
-                lines(1.4, 1.0, LineNormals::Scaled);
+                lines(PENCIL_WIDTH, 1.0, LineNormals::Scaled);
                 let Watercolour { margin, sketch, air, flow, edges, granulation, wetness, dabs, shadow, .. } = *w;
                 let shadow_softness = w.shadow_softness;
                 uniform = Self {

@@ -407,7 +407,7 @@ mod tests {
         let mut styles = flight.world.query::<&CanopyStyle>();
         let turned = styles.single(&flight.world)?.style.clone();
         assert_ne!(turned, flight.stage.style.style);
-        assert_eq!((turned.palette(), turned.paper()), ("cool-to-warm", Some("rough")));
+        assert_eq!((turned.palette(), turned.paper()), (Some("cool-to-warm"), Some("rough")));
         let written = flight.press(PanelInput::Write).ok_or("nothing written")?;
         let scene = Scene::parse(
             &format!("(terrain: Flat(size: 200), {written} trees: None, place: (latitude: 47.5, longitude: 9.2))"),
