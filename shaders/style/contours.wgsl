@@ -1,14 +1,16 @@
 // Contours: discontinuities of depth and normal [Saito & Takahashi 1990; Luft 2007, section 4]. How strong they are around each pixel;
 // lines.wgsl finds the lines in it.
-#import canopy::style::{style, full_screen, FullScreen, NEAREST, FARTHEST}
+#import canopy::style::{style, full_screen, FullScreen, contour_span, NEAREST, FARTHEST}
 
 @group(1) @binding(1) var soft_lights: texture_2d<f32>;
 @group(1) @binding(2) var soft_normals: texture_2d<f32>;
 @group(1) @binding(3) var linear_sampler: sampler;
 
 // Least steps in depth that are drawn, metres.
-const LEAF_STEP: f32 = 2.0;
-const CROWN_STEP: f32 = 0.4;
+const LEAF_STEP: f32 = 1.0;
+const CROWN_STEP: f32 = 0.2;
+// What 16 bits hold.
+const MOST_STRENGTH: f32 = 6e4;
 
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> FullScreen {
@@ -59,11 +61,10 @@ fn over(strength: f32, first: f32, second: f32) -> f32 {
     return max(strength - first, 0.0) / (second - first);
 }
 
-// The logarithm of the strength, without a limit; the ink, 0..1; the depth of what is in front.
+// The strength; the ink, 0..1; the depth of what is in front.
 @fragment
 fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
-    // As wide as the Gaussian: over less, what it has smoothed hardly differs, and lines would break up.
-    let span = max(style.softness, 0.7);
+    let span = contour_span();
     let dx = vec2(span, 0.0) / style.map_size;
     let dy = vec2(0.0, span) / style.map_size;
     let bend_x = direction(in.uv + dx) - direction(in.uv - dx);
@@ -77,11 +78,11 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let crease = 0.8 * over(style.detail * bend, 0.28, 0.85) * near;
     // Steps from leaf to leaf inside a near crown do not count; of farther crowns, steps from one to the next do.
     let metres = log(FARTHEST / NEAREST) * NEAREST * exp(z * log(FARTHEST / NEAREST));
-    let least = max(0.0005, mix(LEAF_STEP, CROWN_STEP, smoothstep(0.32, 0.46, z)) / metres);
+    let least = max(0.0003, mix(LEAF_STEP, CROWN_STEP, smoothstep(0.32, 0.46, z)) / metres);
     let silhouette = over(step, least, 4.0 * least);
     let strong = over(step, 0.01, 0.03) * (1.0 - near);
     let ink = max(smooth_limit(crease), smooth_limit(silhouette) * mix(0.25, 1.0, near) + smooth_limit(strong));
-    return vec4(log2(1.0 + max(crease, silhouette)), saturate(ink), z, 1.0);
+    return vec4(min(max(crease, silhouette), MOST_STRENGTH), saturate(ink), z, 1.0);
 }
 
 fn smooth_limit(strength: f32) -> f32 {

@@ -1,7 +1,7 @@
 // Lines of a chosen width on the ridges of the contours' strength, which is as broad as the Gaussian that has smoothed light and
 // depth. A ridge is found by the second derivatives at each pixel, to a part of a pixel [Steger 1998, An unbiased detector of curvilinear
 // structures].
-#import canopy::style::{style, full_screen, FullScreen}
+#import canopy::style::{style, full_screen, FullScreen, contour_span}
 
 @group(1) @binding(1) var contours: texture_2d<f32>;
 @group(1) @binding(2) var linear_sampler: sampler;
@@ -20,7 +20,7 @@ fn strength(uv: vec2<f32>) -> f32 {
 fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let scale = style.size.y / style.map_size.y;
     // Pixels between the points at which the strength is looked up.
-    let span = max(0.35 * style.softness * scale, 1.0);
+    let span = max(0.35 * contour_span() * scale, 1.0);
     let dx = vec2(span, 0.0) / style.size;
     let dy = vec2(0.0, span) / style.size;
     let middle = textureSampleLevel(contours, linear_sampler, in.uv, 0.0);
@@ -41,14 +41,15 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let raw = select(vec2(xy, bend - xx), vec2(bend - yy, xy), half_difference < 0.0);
     let across = raw * inverseSqrt(max(dot(raw, raw), 1e-12));
     // Spans to the ridge, by the parabola through the three values across.
-    let to_ridge = dot(gradient, across) / max(-bend, 1e-4);
-    let on_ridge = in.uv + clamp(to_ridge, -1.5, 1.5) * across * span / style.size;
+    let to_ridge = dot(gradient, across) / max(-bend, 1e-6);
+    let on_ridge = in.uv + clamp(to_ridge, -3.0, 3.0) * across * span / style.size;
     let ridge = textureSampleLevel(contours, linear_sampler, on_ridge, 0.0);
     // What hardly stands out is drawn finer.
     let width = style.line_width * scale * mix(0.5, 1.0, ridge.y);
     let outside = abs(to_ridge) * span - 0.5 * width;
     // Neither a plateau nor a peak is a line.
-    let ridged = smoothstep(0.02, 0.08, -bend) * smoothstep(0.2, 0.6, 2.0 * root / max(-bend, 1e-4));
-    let coverage = saturate(0.5 - outside) * min(width, 1.0) * ridged * f32(abs(to_ridge) < 1.5);
+    let sharp = -bend / max(middle.x, 1e-4);
+    let ridged = smoothstep(0.03, 0.10, sharp) * smoothstep(0.2, 0.6, 2.0 * root / max(-bend, 1e-6));
+    let coverage = saturate(0.5 - outside) * min(width, 1.0) * ridged * f32(abs(to_ridge) < 3.0);
     return vec4(coverage * ridge.y, middle.y, mix(middle.z, ridge.z, coverage), 1.0);
 }

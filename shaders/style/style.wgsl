@@ -44,6 +44,12 @@ struct Style {
 
 @group(1) @binding(0) var<uniform> style: Style;
 
+// Texels of the maps over which contours are sought: as wide as the Gaussian, as over less, what it has smoothed hardly differs, and
+// lines would break up.
+fn contour_span() -> f32 {
+    return max(style.softness, 0.7);
+}
+
 struct FullScreen {
     @builtin(position) clip: vec4<f32>,
     @location(0) uv: vec2<f32>,
@@ -64,10 +70,9 @@ fn landscape_depth(distance: f32) -> f32 {
     return saturate(log(max(distance, NEAREST) / NEAREST) / log(FARTHEST / NEAREST));
 }
 
-// A depth in two values of 16 bits, whose sum it is: the second is what the first has rounded off. Differences of depths far away need
-// both.
+// A depth in two values of 16 bits, whose sum it is: a multiple of 1/1024, and what is left. Differences of depths far away need both.
 fn split_depth(depth: f32) -> vec2<f32> {
-    let rounded = unpack2x16float(pack2x16float(vec2(depth, 0.0))).x;
+    let rounded = round(depth * 1024.0) / 1024.0;
     return vec2(rounded, depth - rounded);
 }
 

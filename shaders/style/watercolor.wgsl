@@ -212,7 +212,7 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let stroke_uv = in.uv + 0.3 * vec2(middle, fine) * style.unit / style.size;
     let strokes = stroke_ink(stroke_uv, place.distance, soft.z, max(1.0 - form, soft.y), identities) * f32(!sky);
     let brushed = strokes * mix(0.75, 1.0, grain) * (1.0 - 0.7 * air);
-    color = mix(color, style.ink * style.paper, saturate(max(pencil, brushed)) * 0.85);
+    color *= mix(vec3(1.0), style.ink, saturate(max(pencil, brushed)) * 0.85);
 
     // The night is one glaze over all.
     color *= style.night;

@@ -21,6 +21,9 @@ pub struct Deviations {
     pub dabs: f32,
 }
 
+/// Least deviation of the Gaussian of what has contours, over their width: what is smaller than a line is wide has no room for its outline.
+const LINE_ROOM: f32 = 0.6;
+
 impl Deviations {
     /// Those of `style`.
     pub fn of(style: &Style) -> Self {
@@ -30,10 +33,13 @@ impl Deviations {
                 Self { shapes: s, lights: 0.6 * s, wide: 3.0 * s, normals: 0.6 * s, dabs: 0.3 * s }
             }
             Style::Lines(l) => {
-                let s = l.simplification;
+                let s = l.simplification.max(LINE_ROOM * l.width);
                 Self { shapes: 0.0, lights: s, wide: 0.0, normals: s, dabs: 0.0 }
             }
-            Style::Toon(_) => Self { shapes: 0.0, lights: 2.0, wide: 0.0, normals: 1.4, dabs: 0.0 },
+            Style::Toon(t) => {
+                let s = (LINE_ROOM * t.width).max(2.0);
+                Self { shapes: 0.0, lights: s, wide: 0.0, normals: 0.7 * s, dabs: 0.0 }
+            }
             Style::Photograph => Self { shapes: 0.0, lights: 0.0, wide: 0.0, normals: 0.0, dabs: 0.0 },
         }
     }

@@ -142,7 +142,7 @@ pub struct Lines {
     #[reflect(@Range::steps(0.0..=4.0, 0.1, 0.02), @"How small a discontinuity is drawn.")]
     pub detail: f32,
     /// Standard deviation in pixels of a picture of 720 lines of the Gaussian that simplifies shapes, 0 to 20. Default 2. More gives
-    /// fewer and smoother lines.
+    /// fewer and smoother lines; what is smaller than `width` has none.
     #[reflect(@Range::steps(0.0..=20.0, 0.5, 0.1).unit("px"), @"How far shapes are simplified.")]
     pub simplification: f32,
     /// Which normals are used. Default `Scaled`.

@@ -85,7 +85,7 @@ pub struct StyleMaps {
     pub soft_normals: TextureView,
     /// Albedo under a Gaussian, with the share of surfaces as its alpha.
     pub soft_colors: TextureView,
-    /// Contours of normals and depth, of the picture's size: logarithm of their strength, ink, depth of what is in front.
+    /// Contours of normals and depth, of the picture's size: their strength, ink, depth of what is in front.
     pub contours: TextureView,
     /// Their lines, their rims, and that depth.
     pub lines: TextureView,
