@@ -208,7 +208,7 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let sketched = textureSampleLevel(lines, linear_sampler, in.uv + tremble, 0.0);
     let grain = smoothstep(0.25, 0.55, height + 0.16 * finer);
     let faded = 1.0 - 0.7 * style.air * airiness(sketched.z);
-    let pencil = 1.6 * sketched.x * grain * style.sketch * (0.9 + 0.5 * broad) * faded * smoothstep(0.0, 0.15, painted);
+    let pencil = 1.6 * sketched.x * grain * style.sketch * (0.9 + 0.5 * broad) * faded * smoothstep(0.1, 0.3, painted);
     let stroke_uv = in.uv + 0.3 * vec2(middle, fine) * style.unit / style.size;
     let strokes = stroke_ink(stroke_uv, place.distance, soft.z, max(1.0 - form, soft.y), identities) * f32(!sky);
     let brushed = strokes * mix(0.75, 1.0, grain) * (1.0 - 0.7 * air);
