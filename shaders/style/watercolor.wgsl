@@ -1,5 +1,5 @@
 // Watercolour: layers of pigment on paper [Luft 2006]. The equations of a layer are those of src/style/wash.rs.
-#import canopy::constants::PAPER_SIDE
+#import canopy::constants::{PAPER_SIDE, GROUND_LAYER}
 #import canopy::style::{style, full_screen, FullScreen, airiness}
 #import canopy::style_noise::{anchored_noise, noise_place}
 #import canopy::style_strokes::stroke_ink
@@ -117,8 +117,12 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let fine = anchored_noise(place.position, place.pixel * 6.0, 3u);
     let finer = anchored_noise(place.position, place.pixel * 3.2, 4u);
 
-    // The hand: shapes waver.
-    let waver = (vec2(middle, broad) * (1.8 + 5.0 * style.wetness) + vec2(fine, finer) * 0.5) * style.unit / style.size;
+    // The hand: shapes waver. Not so ground that is seen along itself, where noise that is fixed to it is squeezed from row to row: trunks in front
+    // of it would have combs for outlines.
+    let rise = abs(place.position.y - style.anchor.y) / max(place.distance, 1e-3);
+    let level = (textureLoad(identities, texel, 0).x == GROUND_LAYER) & (style.noise_anchor != 1u);
+    let steady = select(1.0, smoothstep(0.05, 0.5, rise), level);
+    let waver = steady * (vec2(middle, broad) * (1.8 + 5.0 * style.wetness) + vec2(fine, finer) * 0.5) * style.unit / style.size;
     let uv = in.uv + waver;
     let soft = textureSampleLevel(soft_lights, linear_sampler, uv, 0.0);
     let wide = textureSampleLevel(wide_lights, linear_sampler, uv, 0.0);
@@ -204,7 +208,7 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     color = glaze(color, shadow_paint.rgb, max(shadow_density, 0.0), shadow * style.shadow * shadow_paint.a * mix(1.0, 0.45, foliage));
 
     // The pencil drawing, which the paper's hills take, of what is painted: not the horizon behind a plant on white paper.
-    let tremble = vec2(broad, middle) * 1.6 * style.unit / style.size;
+    let tremble = steady * vec2(broad, middle) * 1.6 * style.unit / style.size;
     let sketched = textureSampleLevel(lines, linear_sampler, in.uv + tremble, 0.0);
     let grain = smoothstep(0.25, 0.55, height + 0.16 * finer);
     let faded = 1.0 - 0.7 * style.air * airiness(sketched.z);
