@@ -109,7 +109,7 @@ impl Spacing {
 
 /// The deviations of Gaussians that, one after the other, make one of `deviation` texels. Each has so many points on either side, the first
 /// `first_points`, and is as wide as those may be that reach far: over what is unblurred a texel apart, over what is blurred already
-/// ([`SMOOTH_SPACING`]) farther. Between points that are too far apart grain would be left.
+/// (`SMOOTH_SPACING`) farther. Between points that are too far apart grain would be left.
 ///
 /// `blurred` is the deviation of what the first one blurs. At least one deviation; at most [`MOST_STAGES`], of which the last takes what
 /// is left.
