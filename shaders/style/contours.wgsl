@@ -81,10 +81,7 @@ fn fragment(in: FullScreen) -> @location(0) vec4<f32> {
     let least = max(0.0003, mix(LEAF_STEP, CROWN_STEP, smoothstep(0.32, 0.46, z)) / metres);
     let silhouette = over(step, least, 4.0 * least);
     let strong = over(step, 0.01, 0.03) * (1.0 - near);
-    let ink = max(smooth_limit(crease), smooth_limit(silhouette) * mix(0.25, 1.0, near) + smooth_limit(strong));
+    let limited = smoothstep(vec3(0.0), vec3(1.0), vec3(crease, silhouette, strong));
+    let ink = max(limited.x, limited.y * mix(0.25, 1.0, near) + limited.z);
     return vec4(min(max(crease, silhouette), MOST_STRENGTH), saturate(ink), z, 1.0);
-}
-
-fn smooth_limit(strength: f32) -> f32 {
-    return smoothstep(0.0, 1.0, strength);
 }

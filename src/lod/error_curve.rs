@@ -9,9 +9,9 @@
 //! | size, pixels | crosses | full models | more |
 //! |--:|--:|--:|--:|
 //! | 512 | 0.517 | 0.264 | 0.253 |
-//! | 256 | 0.454 | 0.295 | 0.159 |
-//! | 128 | 0.372 | 0.320 | 0.052 |
-//! | 64 | 0.323 | 0.360 | none |
+//! | 256 | 0.453 | 0.293 | 0.159 |
+//! | 128 | 0.373 | 0.321 | 0.052 |
+//! | 64 | 0.325 | 0.363 | none |
 //!
 //! Below 64 pixels a cross is nearer to the truth than the model. Between the two, simplified models and billboard clouds have
 //! more error than crosses at every size, and cost more: they are not chosen.

@@ -176,7 +176,8 @@ impl Default for Lines {
 #[reflect(Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct Toon {
-    /// Name of a palette, or the path of its `.ron` file, of which sky, distance and ink are used. Default `"natural"`.
+    /// Name of a palette, or the path of its `.ron` file, of which sky, distance, ink and night are used. Default
+    /// `"natural"`.
     #[reflect(@Names(NAMES), @"The pigments.")]
     pub palette: String,
     /// Tones of each colour, 2 to 8. Default 3.
