@@ -54,6 +54,8 @@ const BLOCK: usize = 8;
 struct Case {
     name: &'static str,
     scene: Scene,
+    /// Whether it is drawn with crosses from 5 m on too, and not with the default levels alone.
+    as_crosses: bool,
     at: LocalTime,
     /// Far, middle, near.
     bands: [(f64, f64); 3],
@@ -64,7 +66,7 @@ fn main() -> anyhow::Result<()> {
     let temporary = tempfile::tempdir()?;
     let folder = arguments.out.clone().unwrap_or_else(|| temporary.path().to_owned());
     std::fs::create_dir_all(&folder)?;
-    println!("| view | band | light | contrast | correlation |\n|---|---|--:|--:|--:|");
+    println!("| view | levels | far | middle | near |\n|---|---|---|---|---|");
     for case in cases()? {
         let halves = [arguments.spp / 2, arguments.spp];
         let mut traced = Vec::new();
@@ -76,13 +78,16 @@ fn main() -> anyhow::Result<()> {
             }
             traced.push(read(&kept)?);
         }
-        let drawn = draw(&arguments, &case)?;
-        drawn.save(&folder.join(format!("{}-drawn.png", case.name)), &[])?;
         let [half, whole] = [&traced[0], &traced[1]].map(Luminance::new);
-        let drawn = Luminance::new(&drawn);
-        for (band, (from, to)) in ["far", "middle", "near"].into_iter().zip(case.bands) {
-            let [light, contrast, correlation] = compare(&drawn, &half, &whole, from, to);
-            println!("| {} | {band} | {light:.2} | {contrast:.2} | {correlation:.2} |", case.name);
+        let levels = [("default", None), ("crosses", Some(5.0))];
+        for (levels, near_distance) in levels.into_iter().filter(|(_, near)| near.is_none() || case.as_crosses) {
+            let drawn = draw(&arguments, &case, near_distance)?;
+            drawn.save(&folder.join(format!("{}-{levels}.png", case.name)), &[])?;
+            let drawn = Luminance::new(&drawn);
+            let bands = case.bands.map(|(from, to)| {
+                compare(&drawn, &half, &whole, from, to).map(|value| format!("{value:.2}")).join(" ")
+            });
+            println!("| {} | {levels} | {} |", case.name, bands.join(" | "));
         }
     }
     Ok(())
@@ -98,7 +103,7 @@ fn cases() -> anyhow::Result<Vec<Case>> {
     ];
     let bands = [(0.38, 0.6), (0.6, 0.8), (0.8, 1.0)];
     let mut cases: Vec<Case> =
-        demos.into_iter().map(|(name, at)| Case { name, scene: demo.clone(), at, bands }).collect();
+        demos.into_iter().map(|(name, at)| Case { name, scene: demo.clone(), as_crosses: false, at, bands }).collect();
     let Some(data) = std::env::var_os("CANOPY_DATA").map(PathBuf::from) else {
         eprintln!("note: CANOPY_DATA is not set, so the stands of given trees are left out");
         return Ok(cases);
@@ -111,8 +116,7 @@ fn cases() -> anyhow::Result<Vec<Case>> {
         let text = format!(
             "(terrain: Noise(size: 1600, seed: 3), species: [{}], trees: Scattered(stems_per_hectare: {stems}, min_distance: 3, \
              area: (west: -500, south: -400, east: 500, north: 500)), place: (latitude: 48, longitude: 9, time: \
-             \"2026-06-21T13:00+01:00\"), camera: (start: (position: {position}, yaw: {yaw}, pitch: {pitch})), quality: \
-             (near_distance: 5, shadow_distance: 800))",
+             \"2026-06-21T13:00+01:00\"), camera: (start: (position: {position}, yaw: {yaw}, pitch: {pitch})))",
             species.join(", ")
         );
         Scene::parse(&text, Path::new("stand.ron"))
@@ -121,7 +125,7 @@ fn cases() -> anyhow::Result<Vec<Case>> {
     let (noon, evening, dusk) =
         (hour("2026-06-21T13:00+01:00")?, hour("2026-06-21T19:00+01:00")?, hour("2026-06-21T20:15+01:00")?);
     let mixed = [species("oak", 14, 22), species("aspen", 12, 20), species("pine", 14, 24)];
-    let pines = [species("pine", 12, 22)];
+    let (pines, oaks) = ([species("pine", 12, 22)], [species("oak", 14, 22)]);
     // Along a slope, and towards the evening's sun.
     let (along, against) = (("(0, 30, -300)", 0, -8), ("(300, 30, 0)", 290, -6));
     for (name, species, stems, (position, yaw, pitch), at) in [
@@ -133,14 +137,18 @@ fn cases() -> anyhow::Result<Vec<Case>> {
         ("pines-low-sun", &pines[..], 400, along, evening),
         ("pines-against-the-sun", &pines[..], 400, against, evening),
         ("pines-dusk", &pines[..], 400, along, dusk),
+        ("oaks-noon", &oaks[..], 300, along, noon),
+        ("oaks-low-sun", &oaks[..], 300, along, evening),
     ] {
-        cases.push(Case { name, scene: stand(species, stems, position, yaw, pitch)?, at, bands });
+        cases.push(Case { name, scene: stand(species, stems, position, yaw, pitch)?, as_crosses: true, at, bands });
     }
     Ok(cases)
 }
 
-fn draw(arguments: &Arguments, case: &Case) -> anyhow::Result<RenderedImage> {
-    let stage = Stage::build(&case.scene, &mut Silent)?;
+fn draw(arguments: &Arguments, case: &Case, near_distance: Option<f64>) -> anyhow::Result<RenderedImage> {
+    let mut scene = case.scene.clone();
+    scene.quality.near_distance = near_distance.unwrap_or(scene.quality.near_distance);
+    let stage = Stage::build(&scene, &mut Silent)?;
     let view = stage.scene.camera.start;
     let view = view.viewpoint(stage.terrain.height(view.position.0, view.position.2), stage.scene.camera.field_of_view);
     let mut renderer = Renderer::new(arguments.size, None, stage.scene.quality.msaa)?;

@@ -8,6 +8,7 @@
 //! | `planes` | crosses of one to eight upright planes, from sides between them |
 //! | `cost` | a frame of many trees as each level |
 //! | `pop` | what a frame changes while a tree shrinks by one percent a frame |
+//! | `turn` | what a frame changes while a tree turns |
 //! | `shimmer` | what a frame changes while the demo's camera turns by a tenth of a pixel a frame |
 //!
 //! `cargo bench --bench levels -- errors cost` runs those parts; without arguments all run. `CANOPY_DATA` is the folder
@@ -52,6 +53,9 @@ fn main() {
     }
     if runs("pop") {
         motion::pop();
+    }
+    if runs("turn") {
+        motion::turn();
     }
     if runs("shimmer") {
         motion::shimmer();

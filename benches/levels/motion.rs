@@ -1,4 +1,4 @@
-//! What changes from frame to frame: a tree that comes nearer, and far slopes under a camera that turns slowly.
+//! What changes from frame to frame: a tree that comes nearer, one that turns, and far slopes under a camera that turns slowly.
 
 use std::path::Path;
 
@@ -49,6 +49,33 @@ pub fn pop() {
                 let [cover, light] = [0, 1].map(|which| changes(&within, which));
                 println!("| {name} | {what} | {high} to {low} | {cover} | {light} |");
             }
+        }
+    }
+}
+
+/// Turns from one image to the next: the yaws of a packed tree, over half a turn.
+const YAWS: u32 = 128;
+/// Size of the tree that turns, pixels.
+const TURNED: f64 = 128.0;
+
+/// A tree turns under a fixed sun: cover and luminance that a step of a yaw (1.4°) changes, as crosses and as the full model.
+pub fn turn() {
+    println!();
+    println!("| tree | level | cover, mean change | largest | light, mean change | largest |");
+    println!("|---|---|--:|--:|--:|--:|");
+    for (name, plant) in trees() {
+        let mut studio = Studio::new(baked(plant), IMAGE, None, 4).expect("a renderer");
+        for level in [Representation::CROSS, Representation::MODEL] {
+            let mut look = |yaw: u32| -> Look {
+                studio.turn(yaw as f32 / YAWS as f32 * std::f32::consts::PI);
+                studio.show(Some(level)).expect("a tree");
+                let zoom = f64::from(IMAGE) / TURNED;
+                let image = studio.cutout(Side::South, &sun("2026-06-21T06:45:00Z"), zoom).expect("an image");
+                [image.area(), image.mean_luminance()]
+            };
+            let looks: Vec<Look> = (0..=YAWS).map(&mut look).collect();
+            let [cover, light] = [0, 1].map(|which| changes(&looks, which));
+            println!("| {name} | {} | {cover} | {light} |", level.name());
         }
     }
 }

@@ -180,6 +180,21 @@ fn sees(bounds: Bounds) -> bool {
     return true;
 }
 
+// Whether a plane may cut a box.
+fn cuts(bounds: Bounds) -> bool {
+    let inside = clamped(bounds);
+    let size = max(abs(inside.low), abs(inside.high));
+    let slack = ((size.x + size.y + size.z) >> 1u) + PLANE_SLACK;
+    for (var i = 0u; i < volume.plane_count; i++) {
+        let plane = volume.planes[i];
+        let product = -farthest(-vec3(plane.normal[0], plane.normal[1], plane.normal[2]), inside);
+        if product + plane.offset - slack < 0 {
+            return true;
+        }
+    }
+    return false;
+}
+
 // A difference of heights in steps, if heights count.
 fn height_steps(units: u32) -> u32 {
     let coarse = (min(units, u32(COORDINATE_LIMIT)) * volume.height_factor) >> 10u;
@@ -208,7 +223,7 @@ fn levels_of_tree(tree: Tree, size: TreeSize) -> u32 {
     return levels_at(vec3(at.x, y, at.y), distance_factor(tree, size.inverse_height));
 }
 
-// A cluster's key: less is drawn earlier.
+// A cluster's key: less is drawn earlier. In views, those that no plane cuts come first.
 fn cluster_key(bounds: Bounds, near: vec2<u32>) -> u32 {
     if volume.along_light == 1u {
         let reach = farthest(vec3(volume.key_normal[0], volume.key_normal[1], volume.key_normal[2]), clamped(bounds));
@@ -216,9 +231,9 @@ fn cluster_key(bounds: Bounds, near: vec2<u32>) -> u32 {
     }
     let shifted = min(near >> vec2(volume.shift + 3u), vec2(SQUARE_LIMIT));
     let square = (shifted.x * shifted.x + shifted.y * shifted.y) | 1u;
-    // A floating-point number of 7 bits.
+    // A floating-point number with 6 bits of a fraction.
     let exponent = firstLeadingBit(square);
-    return (exponent << 7u) | (((square << (31u - exponent)) >> 24u) & 0x7fu);
+    return (select(0u, 1u, cuts(bounds)) << 11u) | (exponent << 6u) | (((square << (31u - exponent)) >> 25u) & 0x3fu);
 }
 
 fn look_at(cluster: Cluster) -> ClusterLook {

@@ -1,5 +1,5 @@
-// Crossed billboards [Franzke 2005, 4.3]: of the upright planes those two that face the viewer best, and the level one; eighteen
-// pulled vertices a tree.
+// Crossed billboards [Franzke 2005, 4.3]: an upright quad that faces the viewer, with the texture of the upright plane along whose normal the
+// tree is seen, or the textures of two; and the level plane. Twelve pulled vertices a tree.
 #import canopy::octahedral::decode_octahedral
 #import canopy::constants::{CROSS_VERTICES, ISOTROPIC_LEVELS, LIGHT_SCALE, SUN_SCALE, WHOLE, FADE_SPAN, GONE}
 #import canopy::cross_variant::cross_variants
@@ -35,154 +35,223 @@ struct Varying {
     @builtin(position) clip: vec4<f32>,
 #endif
     @location(0) relative: vec3<f32>,
-    @location(1) uv: vec2<f32>,
-    // Layer of the textures, and the variant.
-    @location(2) @interpolate(flat) layer: vec2<u32>,
-    // The texture's right, up and front in world axes, the front towards the viewer.
-    @location(3) @interpolate(flat) right: vec3<f32>,
-    @location(4) @interpolate(flat) up: vec3<f32>,
-    @location(7) @interpolate(flat) front: vec3<f32>,
-    // A packed `Look`.
-    @location(5) look: vec4<f32>,
+    // u in the textures of the first and of the second plane, and v.
+    @location(1) uv: vec3<f32>,
+    // Layers of the two planes, the variant, and bits of `LEVEL`, `FIRST_BEHIND` and `SECOND_BEHIND`.
+    @location(2) @interpolate(flat) layers: vec4<u32>,
+    // Of upright planes, their normals on the ground; of the level plane, its right.
+    @location(3) @interpolate(flat) axes: vec4<f32>,
+    // Metres above the foot; then in heights of the tree, above the foot and to the right of the trunk.
+    @location(4) place: vec3<f32>,
     // A `Crown`.
-    @location(6) @interpolate(flat) crown_center: vec3<f32>,
-    @location(8) @interpolate(flat) crown_inverse_extents: vec2<f32>,
-    // The functions of the sun textures at the key light's direction, times their scale.
-    @location(9) @interpolate(flat) sun_basis: vec4<f32>,
-    @location(10) @interpolate(flat) more_sun_basis: vec4<f32>,
+    @location(5) @interpolate(flat) crown_center: vec3<f32>,
+    @location(6) @interpolate(flat) crown_inverse_extents: vec2<f32>,
+    // Threshold of the alpha test, the fraction of the second plane, and the tree's tint.
+    @location(7) @interpolate(flat) look: vec3<f32>,
 #ifdef STYLED
     // Layer, and a number of the tree.
-    @location(11) @interpolate(flat) identity: vec2<u32>,
+    @location(8) @interpolate(flat) identity: vec2<u32>,
 #endif
 }
 
-struct Look {
-    // Of the alpha test.
-    threshold: f32,
-    // Above the foot, metres.
-    height: f32,
-    // In the crown: 0 at the foot, 1 at the top.
-    relative_height: f32,
-    tint: f32,
-}
+// Bits of `Varying::layers`: the level plane, and planes that are seen from behind.
+const LEVEL: u32 = 1u;
+const FIRST_BEHIND: u32 = 2u;
+const SECOND_BEHIND: u32 = 4u;
 
-// Packed: four numbers are interpolated at the cost of one.
-fn pack_look(look: Look) -> vec4<f32> {
-    return vec4(look.threshold, look.height, look.relative_height, look.tint);
-}
-
-fn unpack_look(packed: vec4<f32>) -> Look {
-    return Look(packed.x, packed.y, packed.z, packed.w);
+// An upright plane, and how the tree is seen along it.
+struct Upright {
+    index: u32,
+    // On the ground, world axes.
+    normal: vec2<f32>,
+    // 1 from the front, -1 from behind.
+    side: f32,
+    // From where to where the plane reaches along the quad, metres to the viewer's right of the trunk at scale 1. From behind, the first is the
+    // right end.
+    ends: vec2<f32>,
 }
 
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     var corners = array<vec2<f32>, 6>(
-        vec2(-1.0, -1.0), vec2(1.0, -1.0), vec2(1.0, 1.0), vec2(-1.0, -1.0), vec2(1.0, 1.0), vec2(-1.0, 1.0),
+        vec2(0.0, 0.0), vec2(1.0, 0.0), vec2(1.0, 1.0), vec2(0.0, 0.0), vec2(1.0, 1.0), vec2(0.0, 1.0),
     );
     let packed = trees[visible[index / CROSS_VERTICES]];
     let tree = unpack_tree(packed);
-    let slot = (index % CROSS_VERTICES) / 6u;
+    let level = (index % CROSS_VERTICES) >= 6u;
     let corner = corners[index % 6u];
     let uprights = max(cross_variants[tree.variant].uprights, 1u);
-    let level = slot == 2u;
-    let plane_index = select(facing(tree, slot, uprights), uprights, level);
-    let plane = cross_variants[tree.variant].planes[plane_index];
-    let height = max(variants[tree.variant].height * tree.scale, 0.01);
 
-    let center = plant_vertex_position(tree, plane.center.xyz).relative;
-    let normal = rotate(plane.normal.xyz, tree.yaw);
-    let toward = dot(normal, normalize(center));
-    // A plane fades out when it is seen edge-on, where its texture is only a streak. The horizontal plane fades in only
-    // when seen from above; from the side it would look like a shelf in the crown.
-    let edge = WHOLE + FADE_SPAN * (1.0 - smoothstep(select(0.10, 0.42, level), select(0.34, 0.72, level), abs(toward)));
-    let turned = turn(rotate(plane.u.xyz, tree.yaw), normal, center.xz, level, uprights);
-    let single = select(WHOLE, GONE, (slot == 1u) & (uprights == 1u));
-    let threshold = max(max(single, level_threshold(level_distance(packed, tree))), max(edge, turned.threshold));
+    // From the viewer to the tree on the ground. Right above it, any direction will do.
+    let away = tree.position.xz;
+    let far = length(away);
+    let view_direction = select(vec2(0.0, -1.0), away / max(far, 1e-6), far > 1e-3);
+    let right = vec3(-view_direction.y, 0.0, view_direction.x);
+    let facing = facing_planes(tree, view_direction, uprights);
+    let first = upright_plane(tree, facing.first, view_direction);
+    let second = upright_plane(tree, facing.second, view_direction);
+    // One plane of no weight does not widen the quad.
+    let first_ends = select(second.ends, first.ends, facing.weight < 1.0);
+    let second_ends = select(first.ends, second.ends, facing.weight > 0.0);
+    let left = min(min(first_ends.x, first_ends.y), min(second_ends.x, second_ends.y));
+    let to = max(max(first_ends.x, first_ends.y), max(second_ends.x, second_ends.y));
+    let along = mix(left, to, corner.x);
+
+    let plane_index = select(first.index, uprights, level);
+    let plane = cross_variants[tree.variant].planes[plane_index];
+    let level_right = rotate(plane.u.xyz, tree.yaw);
+    let across = 2.0 * corner - 1.0;
+    let on_level = rotate(plane.center.xyz, tree.yaw) + across.x * level_right + across.y * rotate(plane.v.xyz, tree.yaw);
+    let upright = right * along + vec3(0.0, plane.center.y + across.y * plane.v.y, 0.0);
+    let position = rotated_vertex_position(tree, select(upright, on_level, level));
+
+    // A plane fades out when it is seen edge-on, where its texture is only a streak. The level plane fades in only when seen from
+    // above; from the side it would look like a shelf in the crown.
+    let normal = select(vec3(view_direction.x, 0.0, view_direction.y), vec3(0.0, 1.0, 0.0), level);
+    let toward = abs(dot(normal, normalize(plant_vertex_position(tree, plane.center.xyz).relative)));
+    let edge = WHOLE + FADE_SPAN * (1.0 - smoothstep(select(0.10, 0.42, level), select(0.34, 0.72, level), toward));
+    let threshold = max(level_threshold(level_distance(packed, tree)), edge);
 
     var out: Varying;
-    let from_center = corner.x * turned.u + corner.y * rotate(plane.v.xyz, tree.yaw);
-    let position = rotated_vertex_position(tree, rotate(plane.center.xyz, tree.yaw) + from_center);
     out.relative = position.relative;
     out.clip = frame.clip_from_relative * vec4(out.relative, 1.0);
     if threshold >= GONE {
-        // No texel would pass the alpha test, so the plane gets no area and no fragments. Its position is inside the
+        // No texel would pass the alpha test, so the quad gets no area and no fragments. Its position is inside the
         // view, because clipping costs more than rejection.
         out.clip = vec4(0.0, 0.0, 0.5, 1.0);
     }
-    out.uv = vec2(0.5 + 0.5 * corner.x, 0.5 - 0.5 * corner.y);
-    out.layer = vec2(cross_variants[tree.variant].first_layer + plane_index, tree.variant);
-    out.right = rotate(plane.u.xyz, tree.yaw) / max(length(plane.u.xyz), 1e-6);
-    out.up = rotate(plane.v.xyz, tree.yaw) / max(length(plane.v.xyz), 1e-6);
+    let u = vec2(place_between(first.ends, along), place_between(second.ends, along));
+    out.uv = vec3(select(u, corner.xx, level), 1.0 - corner.y);
+    let first_layer = cross_variants[tree.variant].first_layer;
     // From behind, the other half of the crown faces the viewer: it is mirrored across the plane.
-    out.front = normal * select(1.0, -1.0, toward > 0.0);
-    out.look = pack_look(Look(threshold, position.from_foot.y, position.from_foot.y / height, tree.tint));
+    let behind = select(0u, FIRST_BEHIND, first.side < 0.0) | select(0u, SECOND_BEHIND, second.side < 0.0);
+    let level_behind = LEVEL | select(0u, FIRST_BEHIND, position.relative.y > 0.0);
+    out.layers = vec4(first_layer + plane_index, first_layer + second.index, tree.variant, select(behind, level_behind, level));
+    let unit_right = level_right.xz / max(length(plane.u.xyz), 1e-6);
+    out.axes = vec4(select(first.normal, unit_right, level), second.normal);
+    let height = max(variants[tree.variant].height, 0.01);
+    out.place = vec3(position.from_foot.y, vec2(position.from_foot.y / max(tree.scale, 1e-6), along) / height);
     let crown = crown_of(tree);
     out.crown_center = crown.center;
     out.crown_inverse_extents = crown.inverse_extents;
-    let to_light = light.key_direction;
-    let sun = vec3(dot(to_light, out.right), dot(to_light, out.up), dot(to_light, out.front));
-    set_sun_basis(select(sun, sun.xzy, level), &out);
+    out.look = vec3(threshold, select(facing.weight, 0.0, level), tree.tint);
 #ifdef STYLED
-    out.identity = vec2(variants[tree.variant].foliage_layer, individual(trees[visible[index / CROSS_VERTICES]]));
+    out.identity = vec2(variants[tree.variant].foliage_layer, individual(packed));
 #endif
     return out;
 }
 
-// How far an upright plane turns towards the viewer, as a fraction of the way.
-const TURN: f32 = 0.85;
-
-struct Turned {
-    // The plane's axis across, world axes, metres at scale 1.
-    u: vec3<f32>,
-    // Of the alpha test.
-    threshold: f32,
+// The upright planes between whose normals, of front or back, the tree is seen.
+struct Facing {
+    first: u32,
+    second: u32,
+    // Fraction of the second, 0..1.
+    weight: f32,
 }
 
-// The upright plane of `slot` 0 or 1: the two between whose normals, of front or back, the tree is seen.
-fn facing(tree: Instance, slot: u32, uprights: u32) -> u32 {
-    // The tree's foot in its own axes, from the viewer; of a viewer right above, any direction.
-    let foot = rotate(plant_vertex_position(tree, vec3(0.0)).relative, tree.yaw * vec2(1.0, -1.0));
-    let above = max(abs(foot.x), abs(foot.z)) < 1e-6;
+fn facing_planes(tree: Instance, view_direction: vec2<f32>, uprights: u32) -> Facing {
+    let own = rotate(vec3(view_direction.x, 0.0, view_direction.y), tree.yaw * vec2(1.0, -1.0));
     // Normals turn from +Z over +X; half a turn on, a plane is seen from behind.
-    let azimuth = select(atan2(foot.x, foot.z), 0.0, above) / PI;
-    return (u32(fract(azimuth) * f32(uprights)) + slot) % uprights;
+    let place = fract(atan2(own.x, own.z) / PI) * f32(uprights);
+    let first = u32(place) % uprights;
+    let weight = smoothstep(0.5 - CHANGE, 0.5 + CHANGE, fract(place));
+    return Facing(first, (first + 1u) % uprights, select(0.0, weight, uprights > 1u));
 }
 
-// Turns an upright plane about its middle towards the viewer. A plane that is seen at an angle shows its leaves as upright
-// streaks. So the one that the viewer is in front of is drawn, and around the middle between two, both. What they show stays as it was
-// baked: its light does not turn with it. `center`: from the viewer to the plane's middle, on the ground.
-fn turn(u: vec3<f32>, normal: vec3<f32>, center: vec2<f32>, level: bool, uprights: u32) -> Turned {
-    let far = length(center);
-    if level || far < 1e-3 {
-        return Turned(u, WHOLE);
+// Half of the range in which one plane changes into the next, as a fraction of the angle between them.
+const CHANGE: f32 = 0.15;
+
+// The quad is turned all of the way to the viewer: a plane that is seen at an angle shows its leaves as upright streaks. What it shows
+// stays as it was baked: its light does not turn with it.
+fn upright_plane(tree: Instance, index: u32, view_direction: vec2<f32>) -> Upright {
+    let plane = cross_variants[tree.variant].planes[index];
+    let normal = rotate(plane.normal.xyz, tree.yaw).xz;
+    let side = select(1.0, -1.0, dot(normal, view_direction) > 0.0);
+    let width = length(plane.u.xyz);
+    let middle = dot(plane.center.xyz, plane.u.xyz) / max(width, 1e-6);
+    return Upright(index, normal, side, side * vec2(middle - width, middle + width));
+}
+
+// Where `at` is from the first of the ends, 0, to the second, 1.
+fn place_between(ends: vec2<f32>, at: f32) -> f32 {
+    let size = ends.y - ends.x;
+    return (at - ends.x) / select(size, 1e-6, abs(size) < 1e-6);
+}
+
+// What is seen at a fragment.
+struct Seen {
+    color: vec4<f32>,
+    uv: vec2<f32>,
+    layer: u32,
+    mip: f32,
+    // 0: nothing; with several samples, in proportion to what is covered.
+    coverage: f32,
+    // Whether it is the second plane.
+    second: bool,
+}
+
+// The most waves of the pattern by which one plane changes into another, along a tree's height.
+const MOST_WAVES: f32 = 24.0;
+
+// Whether the second plane is seen, clump by clump: a mean of the two textures would show each leaf twice, and both of them more crown than
+// there is. Clumps are not smaller than pixels, so that they do not flicker.
+fn is_second(place: vec2<f32>, weight: f32) -> bool {
+    let pixel = max(fwidth(place.x), fwidth(place.y));
+    let waves = exp2(floor(log2(clamp(0.25 / max(pixel, 1e-6), 1.0, MOST_WAVES))));
+    let at = place * (2.0 * PI * waves);
+    let pattern = sin(at.x + 1.9 * sin(0.61 * at.y)) + sin(1.09 * at.y + 1.7 * sin(0.67 * at.x + 1.0));
+    return 0.5 + 0.25 * pattern < weight;
+}
+
+fn seen_at(in: Varying) -> Seen {
+    let mips = vec2(mip_level(in.uv.xz), mip_level(in.uv.yz));
+    var seen: Seen;
+    seen.second = is_second(in.place.yz, in.look.y);
+    seen.uv = select(in.uv.xz, in.uv.yz, seen.second);
+    seen.layer = select(in.layers.x, in.layers.y, seen.second);
+    seen.mip = select(mips.x, mips.y, seen.second);
+    seen.color = textureSampleLevel(color_textures, texture_sampler, seen.uv, seen.layer, seen.mip);
+#ifdef ALPHA_TO_COVERAGE
+    seen.coverage = clamp((seen.color.a - in.look.x) / max(fwidth(seen.color.a), 1e-4) + 0.5, 0.0, 1.0);
+#else
+    seen.coverage = select(0.0, 1.0, seen.color.a >= in.look.x);
+#endif
+    // Beside its texture a plane is empty.
+    seen.coverage = select(0.0, seen.coverage, abs(seen.uv.x - 0.5) <= 0.5);
+    return seen;
+}
+
+// The texture's right, up and front in world axes, the front towards the viewer.
+struct Axes {
+    right: vec3<f32>,
+    up: vec3<f32>,
+    front: vec3<f32>,
+}
+
+fn axes_of(in: Varying, second: bool) -> Axes {
+    let axis = select(in.axes.xy, in.axes.zw, second);
+    let behind = (in.layers.w & select(FIRST_BEHIND, SECOND_BEHIND, second)) != 0u;
+    let side = select(1.0, -1.0, behind);
+    if (in.layers.w & LEVEL) != 0u {
+        return Axes(vec3(axis.x, 0.0, axis.y), vec3(axis.y, 0.0, -axis.x), vec3(0.0, side, 0.0));
     }
-    let view = center / far;
-    let toward = dot(normal.xz, view);
-    let front = normal.xz * select(-1.0, 1.0, toward > 0.0);
-    // Not all of the way: two planes that face the viewer would lie in each other.
-    let wanted = normalize(mix(front, view, TURN));
-    let rotation = vec2(dot(front, wanted), front.x * wanted.y - front.y * wanted.x);
-    let across = vec2(u.x * rotation.x - u.z * rotation.y, u.x * rotation.y + u.z * rotation.x);
-    // Half of the angle between two planes.
-    let middle = 0.5 * PI / f32(uprights);
-    let seen = smoothstep(cos(1.21 * middle), cos(0.98 * middle), abs(toward));
-    return Turned(vec3(across.x, u.y, across.y), WHOLE + FADE_SPAN * (1.0 - seen));
+    return Axes(vec3(axis.y, 0.0, -axis.x), vec3(0.0, 1.0, 0.0), vec3(side * axis.x, 0.0, side * axis.y));
 }
 
-// The twin of `basis` in src/bake/levels/cross/sun.rs. `sun`: right, zenith, front; there are no suns below the horizon.
-fn set_sun_basis(sun: vec3<f32>, out: ptr<function, Varying>) {
+// The sun's light that the leaves of a texel show: the twin of `basis` in src/bake/levels/cross/sun.rs. `sun`: right, zenith, front; there
+// are no suns below the horizon.
+fn sunlight(texel: vec4<f32>, more: vec4<f32>, sun: vec3<f32>) -> f32 {
     let high = 2.0 * abs(sun.y) - 1.0;
-    (*out).sun_basis = SUN_SCALE * vec4(1.0, high, sun.x, sun.z);
-    (*out).more_sun_basis = SUN_SCALE * vec4(sun.x * high, sun.z * high, sun.x * sun.z, sun.x * sun.x - sun.z * sun.z);
+    let basis = vec4(1.0, high, sun.x, sun.z);
+    let more_basis = vec4(sun.x * high, sun.z * high, sun.x * sun.z, sun.x * sun.x - sun.z * sun.z);
+    return max(SUN_SCALE * (dot(texel, basis) + dot(more, more_basis)), 0.0);
 }
 
 #ifdef DEPTH_FIRST
 // Depth alone, with the alpha test of the light that follows.
 @fragment
 fn depth(in: Varying) -> @location(0) vec4<f32> {
-    let texel = textureSampleLevel(color_textures, texture_sampler, in.uv, in.layer.x, mip_level(in.uv));
-    if texel.a < unpack_look(in.look).threshold {
+    if seen_at(in).coverage <= 0.0 {
         discard;
     }
     return vec4(0.0);
@@ -193,50 +262,41 @@ fn depth(in: Varying) -> @location(0) vec4<f32> {
 // The surface alone: the styles light it themselves.
 @fragment
 fn styled(in: Varying) -> StyledSurface {
-    let look = unpack_look(in.look);
-    let level = mip_level(in.uv);
-    let texel = textureSampleLevel(color_textures, texture_sampler, in.uv, in.layer.x, level);
-    if texel.a < look.threshold {
+    let seen = seen_at(in);
+    if seen.coverage <= 0.0 {
         discard;
     }
-    let properties = textureSampleLevel(property_textures, texture_sampler, in.uv, in.layer.x, level);
+    let axes = axes_of(in, seen.second);
+    let properties = textureSampleLevel(property_textures, texture_sampler, seen.uv, seen.layer, seen.mip);
     let local = decode_octahedral(properties.xy);
-    var normal = vec4(normalize(in.right * local.x + in.up * local.y + in.front * local.z), properties.b);
+    var normal = vec4(normalize(axes.right * local.x + axes.up * local.y + axes.front * local.z), properties.b);
     let foliage = properties.a > 0.5;
 #ifndef OWN_NORMALS
     let crown = crown_surface(in.relative, Crown(in.crown_center, in.crown_inverse_extents));
-    normal = select(normal, crown, foliage & (variants[in.layer.y].realigned < 0.5));
+    normal = select(normal, crown, foliage & (variants[in.layers.z].realigned < 0.5));
 #endif
-    let albedo = mix(texel.rgb, tint_foliage(texel.rgb, look.tint), properties.a);
+    let albedo = mix(seen.color.rgb, tint_foliage(seen.color.rgb, in.look.z), properties.a);
     let identity = vec2(select(WOOD_LAYER, in.identity.x, foliage), in.identity.y);
-    return styled_surface(normal.xyz, select(1.0, normal.w, foliage), look.height, identity, albedo);
+    return styled_surface(normal.xyz, select(1.0, normal.w, foliage), in.place.x, identity, albedo);
 }
 #endif
 
 @fragment
 fn fragment(in: Varying) -> @location(0) vec4<f32> {
-    let look = unpack_look(in.look);
-    let variant = in.layer.y;
-    let level = mip_level(in.uv);
-    let texel = textureSampleLevel(color_textures, texture_sampler, in.uv, in.layer.x, level);
-    var coverage = 1.0;
-#ifdef ALPHA_TO_COVERAGE
-    coverage = clamp((texel.a - look.threshold) / max(fwidth(texel.a), 1e-4) + 0.5, 0.0, 1.0);
-    if coverage <= 0.0 {
+    let variant = in.layers.z;
+    let seen = seen_at(in);
+    if seen.coverage <= 0.0 {
         discard;
     }
-#else
-    if texel.a < look.threshold {
-        discard;
-    }
-#endif
-    let properties = textureSampleLevel(property_textures, texture_sampler, in.uv, in.layer.x, level);
+    let axes = axes_of(in, seen.second);
+    let texel = seen.color;
+    let properties = textureSampleLevel(property_textures, texture_sampler, seen.uv, seen.layer, seen.mip);
     let local = decode_octahedral(properties.xy);
-    let normal = normalize(in.right * local.x + in.up * local.y + in.front * local.z);
+    let normal = normalize(axes.right * local.x + axes.up * local.y + axes.front * local.z);
 
     let foliage = properties.a;
     var surface: Surface;
-    surface.albedo = mix(texel.rgb, tint_foliage(texel.rgb, look.tint), foliage);
+    surface.albedo = mix(texel.rgb, tint_foliage(texel.rgb, in.look.z), foliage);
     surface.normal = normal;
     let reflectance = variants[variant].specular_reflectance;
     let ambient_term = variants[variant].ambient_term;
@@ -244,7 +304,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let transmission = leaf_transmission(texel.rgb, cross_variants[variant].transmission, reflectance) * foliage;
     surface.transmission = transmission * (1.0 - published);
     surface.viewer = -normalize(in.relative);
-    surface.isotropic_fraction = isotropic_fraction(variant, level) * foliage;
+    surface.isotropic_fraction = isotropic_fraction(variant, seen.mip) * foliage;
     surface.specular_reflectance = reflectance * foliage;
     surface.roughness = variants[variant].roughness;
     surface.lobe_gain = variants[variant].lobe_gain;
@@ -252,13 +312,13 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     surface.gloss_isotropy = max(surface.isotropic_fraction, variants[variant].realigned * (1.0 - published));
     let ground = sample_ground(in.relative);
     let by_transfer = variants[variant].radiance_transfer == 1u;
-    let relief = relief_at(in.relative, ground, look.height);
-    let stand = stand_light(ground.surrounding_cover * variants[variant].cover_weight, 1.0 - look.relative_height, relief);
+    let relief = relief_at(in.relative, ground, in.place.x);
+    let stand = stand_light(ground.surrounding_cover * variants[variant].cover_weight, 1.0 - in.place.y, relief);
     var visibility = relief.key;
 #ifdef TRANSFER
-    let light_layer = cross_variants[variant].first_light_layer + in.layer.x - cross_variants[variant].first_layer;
-    let stored = textureSampleLevel(light_textures, texture_sampler, in.uv, light_layer, level) * LIGHT_SCALE;
-    let side = in.right * stored.x + in.up * stored.y + in.front * stored.z;
+    let light_layer = cross_variants[variant].first_light_layer + seen.layer - cross_variants[variant].first_layer;
+    let stored = textureSampleLevel(light_textures, texture_sampler, seen.uv, light_layer, seen.mip) * LIGHT_SCALE;
+    let side = axes.right * stored.x + axes.up * stored.y + axes.front * stored.z;
     // The second band is not relative to the mean here.
     let open = sky_transfer(stored.w, side);
     let band = side / max(stored.w, 1e-3);
@@ -279,15 +339,16 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         let cascades = cascaded_visibility(entry, light.key_direction, 0.25, in.clip.xy);
         visibility *= mix(mix(1.0, stand.key_transmittance, foliage), cascades.visibility, cascades.weight);
     }
-    let sun_layer = 2u * in.layer.x;
-    let sun = textureSampleLevel(sun_textures, texture_sampler, in.uv, sun_layer, level);
-    let more_sun = textureSampleLevel(sun_textures, texture_sampler, in.uv, sun_layer + 1u, level);
-    var lit = max(dot(sun, in.sun_basis) + dot(more_sun, in.more_sun_basis), 0.0);
+    let sun = textureSampleLevel(sun_textures, texture_sampler, seen.uv, 2u * seen.layer, seen.mip);
+    let more_sun = textureSampleLevel(sun_textures, texture_sampler, seen.uv, 2u * seen.layer + 1u, seen.mip);
+    let to_light = light.key_direction;
+    let in_plane = vec3(dot(to_light, axes.right), dot(to_light, axes.up), dot(to_light, axes.front));
+    var lit = sunlight(sun, more_sun, select(in_plane, in_plane.xzy, (in.layers.w & LEVEL) != 0u));
     // The level plane's texture has its lit side. From below one sees what comes through.
-    lit *= select(1.0, dot(surface.transmission, vec3(0.2126, 0.7152, 0.0722)), in.front.y < -0.5);
+    lit *= select(1.0, dot(surface.transmission, vec3(0.2126, 0.7152, 0.0722)), axes.front.y < -0.5);
     var color = shade_leaves(surface, lit, visibility, sky);
     color = tint_level(color);
-    return finish(in.relative, color, coverage);
+    return finish(in.relative, color, seen.coverage);
 }
 
 // Fraction of a texel's leaf area with isotropic normals.

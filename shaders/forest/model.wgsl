@@ -16,10 +16,7 @@
 #import canopy::style_surface::{StyledSurface, styled_surface, crown_surface, individual}
 #endif
 #ifdef TRANSFER
-#import canopy::transfer::{light_sides, light_in_stand, indirect_sun}
-#endif
-#ifdef SUN_HARMONICS
-#import canopy::constants::YAWS
+#import canopy::transfer::{open_light, sides_in_stand, indirect_sun}
 #endif
 
 struct Part {
@@ -147,7 +144,8 @@ fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index
     let relief = relief_at(position.relative, ground, look.height);
     let stand = light_at(ground.surrounding_cover, 1.0 - look.relative_height, relief);
     let to_plant = vec2(tree.yaw.x, -tree.yaw.y);
-    let sky = light_in_stand(vertex, tree.yaw_code, rotate(stand.hidden_direction, to_plant), stand);
+    let open = open_light(vertex, tree.yaw_code);
+    let sky = sides_in_stand(vertex, open.sky, rotate(stand.hidden_direction, to_plant), stand);
     out.front_sky = sky.front;
     out.back_sky = sky.back;
 #ifndef SUN_HARMONICS
@@ -158,9 +156,8 @@ fn vertex(in: Vertex, @builtin(instance_index) index: u32, @builtin(vertex_index
 #endif
 #endif
 #ifdef SUN_HARMONICS
-    let sun = light_sides(vertex, YAWS + tree.yaw_code);
-    out.front_sun = sun.front;
-    out.back_sun = sun.back;
+    out.front_sun = open.sun.front;
+    out.back_sun = open.sun.back;
     out.entry_distance = depth_in_crown(position.relative, crown_of(tree), light.key_direction);
 #endif
 #ifdef STYLED

@@ -3,6 +3,9 @@
 #define_import_path canopy::transfer
 
 #import canopy::constants::{LIGHT_STRIDE, TRANSFER_WORDS}
+#ifdef SUN_HARMONICS
+#import canopy::constants::YAWS
+#endif
 #import canopy::frame::light
 #import canopy::stand::{StandLight, in_stand_by_transfer, evaluate_two_bands}
 
@@ -21,6 +24,8 @@ struct Transfer {
     indirect_sun_color: vec3<f32>,
     // Scale of its codes: the value of code 127.
     indirect_sun_scale: f32,
+    // Factor on the first coefficient of the sun's light, which makes up for what clamping adds: src/bake/lighting/transfer/beam.rs.
+    beam_mean_factor: f32,
 }
 
 // Irradiance over pi on the side of a vertex's normal and on the other.
@@ -42,18 +47,43 @@ fn mean_at(vertex: u32, index: u32) -> f32 {
     return bitcast<f32>(bits << 13u) * 5.192297e33;
 }
 
-// Irradiance over pi by four coefficients of the light on a side whose codes for them are in `word`, and in words
-// `stride` further on for green and blue if the transfer is coloured.
-fn irradiance_by_word(word: u32, stride: u32, scale: vec4<f32>, light: u32) -> vec3<f32> {
-    let red = unpack4x8snorm(coefficients[word]) * scale;
+// Four coefficients of the light of a row, for each channel.
+struct LightWord {
+    red: vec4<f32>,
+    green: vec4<f32>,
+    blue: vec4<f32>,
+}
+
+fn light_word(index: u32) -> LightWord {
+    return LightWord(light_by_yaw[index], light_by_yaw[index + 1u], light_by_yaw[index + 2u]);
+}
+
+// Four coefficients of a side, relative to the first.
+struct SideWord {
+    red: vec4<f32>,
 #ifdef TRANSFER_COLOR
-    let green = unpack4x8snorm(coefficients[word + stride]) * scale;
-    let blue = unpack4x8snorm(coefficients[word + 2u * stride]) * scale;
-#else
-    let green = red;
-    let blue = red;
+    green: vec4<f32>,
+    blue: vec4<f32>,
 #endif
-    return vec3(dot(red, light_by_yaw[light]), dot(green, light_by_yaw[light + 1u]), dot(blue, light_by_yaw[light + 2u]));
+}
+
+// Their codes are in `word`, and in words `stride` further on for green and blue if the transfer is coloured.
+fn side_word(word: u32, stride: u32, scale: vec4<f32>) -> SideWord {
+    var out: SideWord;
+    out.red = unpack4x8snorm(coefficients[word]) * scale;
+#ifdef TRANSFER_COLOR
+    out.green = unpack4x8snorm(coefficients[word + stride]) * scale;
+    out.blue = unpack4x8snorm(coefficients[word + 2u * stride]) * scale;
+#endif
+    return out;
+}
+
+fn product(side: SideWord, light: LightWord) -> vec3<f32> {
+#ifdef TRANSFER_COLOR
+    return vec3(dot(side.red, light.red), dot(side.green, light.green), dot(side.blue, light.blue));
+#else
+    return vec3(dot(side.red, light.red), dot(side.red, light.green), dot(side.red, light.blue));
+#endif
 }
 
 // Means of both sides, and the vectors of their second band, one for each channel, relative to them, in the plant's frame.
@@ -91,9 +121,9 @@ fn band(word: u32) -> vec3<f32> {
     return vec3(-codes.x, codes.y, -codes.z);
 }
 
-// Irradiance of the surroundings on both sides of a vertex of a tree in a stand. `hidden_direction`: that of the stand in the plant's frame.
-fn light_in_stand(vertex: u32, yaw: u32, hidden_direction: vec3<f32>, stand: StandLight) -> Sides {
-    let open = light_sides(vertex, yaw);
+// Irradiance of the surroundings on both sides of a vertex of a tree in a stand, from that in the open. `hidden_direction`: that of the stand
+// in the plant's frame.
+fn sides_in_stand(vertex: u32, open: Sides, hidden_direction: vec3<f32>, stand: StandLight) -> Sides {
     let own = means(vertex);
     var sides: Sides;
     sides.front = in_stand_by_transfer(open.front, own.front, own.front_band, hidden_direction, stand);
@@ -111,42 +141,66 @@ fn indirect_sun(vertex: u32, to_light: vec3<f32>) -> vec3<f32> {
     return light.key_illuminance * transfer.indirect_sun_color * evaluate_two_bands(codes.x, band);
 }
 
-// Irradiance over pi that the light of a row brings to the sides of a vertex. The row is the tree's yaw for the
-// surroundings, YAWS more for the sun.
-fn light_sides(vertex: u32, row: u32) -> Sides {
+// Irradiance over pi on the sides of a vertex by the surroundings and by the sun.
+struct OpenLight {
+    sky: Sides,
+    sun: Sides,
+}
+
+// Without neighbours, in the light for a tree's yaw. The rows of the sun come YAWS after those of the surroundings. Both lights are summed
+// in one loop, so that each word of coefficients is read once.
+fn open_light(vertex: u32, yaw: u32) -> OpenLight {
     let first = vertex * transfer.vertex_words;
     let codes = first + transfer.mean_words;
     let words = transfer.side_words;
-    let light = row * LIGHT_STRIDE;
-    var sides: Sides;
-    sides.front = light_by_yaw[light].rgb;
+    let sky_row = yaw * LIGHT_STRIDE;
+    var open: OpenLight;
+    open.sky.front = light_by_yaw[sky_row].rgb;
+#ifdef SUN_HARMONICS
+    let sun_row = sky_row + YAWS * LIGHT_STRIDE;
+    open.sun.front = light_by_yaw[sun_row].rgb * transfer.beam_mean_factor;
+#endif
+#ifdef FOLIAGE
 #ifdef TRANSFER_COLOR
     let other = 3u * words;
 #else
     let other = words;
 #endif
-#ifdef FOLIAGE
-    sides.back = sides.front;
+    open.sky.back = open.sky.front;
+    open.sun.back = open.sun.front;
 #endif
     for (var k = 0u; k < words; k += 1u) {
-        let at = light + 1u + 3u * k;
-        sides.front += irradiance_by_word(codes + k, words, transfer.scale[k], at);
+        let sky = light_word(sky_row + 1u + 3u * k);
+        let front = side_word(codes + k, words, transfer.scale[k]);
+        open.sky.front += product(front, sky);
 #ifdef FOLIAGE
-        sides.back += irradiance_by_word(codes + other + k, words, transfer.scale[k], at);
+        let back = side_word(codes + other + k, words, transfer.scale[k]);
+        open.sky.back += product(back, sky);
+#endif
+#ifdef SUN_HARMONICS
+        let sun = light_word(sun_row + 1u + 3u * k);
+        open.sun.front += product(front, sun);
+#ifdef FOLIAGE
+        open.sun.back += product(back, sun);
+#endif
 #endif
     }
-    // With few bands the sum can be negative where almost no light arrives.
 #ifdef TRANSFER_COLOR
-    sides.front = max(sides.front * vec3(mean_at(first, 0u), mean_at(first, 1u), mean_at(first, 2u)), vec3(0.0));
+    let front_mean = vec3(mean_at(first, 0u), mean_at(first, 1u), mean_at(first, 2u));
 #else
-    sides.front = max(sides.front * mean_at(first, 0u), vec3(0.0));
+    let front_mean = vec3(mean_at(first, 0u));
 #endif
+    // With few bands the sum can be negative where almost no light arrives.
+    open.sky.front = max(open.sky.front * front_mean, vec3(0.0));
+    open.sun.front = max(open.sun.front * front_mean, vec3(0.0));
 #ifdef FOLIAGE
 #ifdef TRANSFER_COLOR
-    sides.back = max(sides.back * vec3(mean_at(first, 3u), mean_at(first, 4u), mean_at(first, 5u)), vec3(0.0));
+    let back_mean = vec3(mean_at(first, 3u), mean_at(first, 4u), mean_at(first, 5u));
 #else
-    sides.back = max(sides.back * mean_at(first, 1u), vec3(0.0));
+    let back_mean = vec3(mean_at(first, 1u));
 #endif
+    open.sky.back = max(open.sky.back * back_mean, vec3(0.0));
+    open.sun.back = max(open.sun.back * back_mean, vec3(0.0));
 #endif
-    return sides;
+    return open;
 }

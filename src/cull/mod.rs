@@ -2,7 +2,7 @@
 //!
 //! Trees are sorted into cells, and the trees of a cell into [clusters](Cluster) of at most 64. A [`Volume`] is what a view
 //! or a cascade can see. Clusters are tested against it and sorted front to back, so that near crowns hide what lies behind
-//! before it is shaded; only clusters that a fade band crosses are searched tree by tree. The lists depend only on the
+//! before it is shaded, those at the borders of the image last; only clusters that a fade band crosses are searched tree by tree. The lists depend only on the
 //! volume: no atomics, no race for their order.
 //!
 //! The same lists are made by a compute pass ([`render::cull`](crate::render::cull)). Both decide in whole numbers, so that

@@ -9,7 +9,7 @@ use crate::scatter::PackedTree;
 
 /// The trees of `page` that `volume` sees, by level and group, as indices into the page's trees.
 ///
-/// Clusters come in the order of their keys, front to back, clusters of equal keys and the trees within a cluster in the
+/// Clusters come in the order of their keys (front to back, those that no plane of a view cuts before the others), clusters of equal keys and the trees within a cluster in the
 /// order of the stand. `trees` are the page's trees, `sizes` those of the plants, `groupings` has one entry for each
 /// level.
 pub fn select(
@@ -65,6 +65,7 @@ mod tests {
             Drawn, Frustum, SeenShadows,
             cascades::{CascadeBox, LOWEST_SINE, light_frame},
             clusters::{CLUSTER_TREES, pages},
+            volume::KEYS,
         },
         lod::{
             FadeBand, GONE, Levels, Representation,
@@ -189,7 +190,7 @@ mod tests {
         }
 
         #[test]
-        fn lists_are_front_to_back_and_pages_share_no_tree(stand in stands(), (camera, frustum) in cameras()) {
+        fn pages_share_no_tree(stand in stands(), (camera, frustum) in cameras()) {
             let lists = lists_of(&stand, 100, |drawn| Volume::view(drawn, camera, &frustum, &levels(), 1e6));
             listed(&stand, &lists);
             let mut first = 0;
@@ -200,6 +201,34 @@ mod tests {
                 first = page.trees.end;
             }
             prop_assert_eq!(first, stand.trees.len());
+        }
+
+        #[test]
+        fn clusters_that_no_plane_of_the_view_cuts_come_first(stand in stands(), (camera, frustum) in cameras()) {
+            for page in pages(&stand, &SIZES, usize::MAX) {
+                let drawn = Drawn { page: &page, grid: stand.grid, groupings: &GROUPINGS, variants: SIZES.len() };
+                let volume = Volume::view(&drawn, camera, &frustum, &levels(), 1e6);
+                for cluster in &page.clusters {
+                    let (ClusterLook::Whole { key, .. } | ClusterLook::Mixed { key }) = volume.look_at(cluster) else {
+                        continue;
+                    };
+                    let trees = &stand.trees[page.trees.clone()][cluster.first as usize..][..cluster.count as usize];
+                    let is_inside = |wider: f64| {
+                        trees.iter().all(|tree| {
+                            let (min, max) = tree_box(&stand, tree, wider);
+                            let planes = frustum.planes();
+                            planes.iter().all(|plane| {
+                                reach(-plane.xyz().as_dvec3(), min - camera, max - camera) <= f64::from(plane.w)
+                            })
+                        })
+                    };
+                    let first = key < KEYS / 2;
+                    prop_assert!(!first || is_inside(0.0));
+                    // The numbers are whole, and each cluster has one box.
+                    let far = trees.iter().map(|tree| tree.position(&stand.grid).distance(camera)).fold(0.0, f64::max);
+                    prop_assert!(first || trees.len() > 1 || !is_inside(3.0 + 0.02 * far));
+                }
+            }
         }
 
         #[test]

@@ -435,6 +435,19 @@ impl Volume {
         !outside && inside
     }
 
+    /// Whether a plane may cut a box.
+    fn cuts(&self, bounds: &Bounds) -> bool {
+        let limit = COORDINATE_LIMIT;
+        let low = bounds.low.map(|value| value.clamp(-limit, limit));
+        let high = bounds.high.map(|value| value.clamp(-limit, limit));
+        let size: i32 = (0..3).map(|axis| low[axis].abs().max(high[axis].abs())).sum();
+        let slack = (size >> 1) + PLANE_SLACK;
+        self.planes.iter().take(self.plane_count as usize).any(|plane| {
+            let product: i32 = (0..3).map(|axis| -farthest(-plane.normal[axis], low[axis], high[axis])).sum();
+            product + plane.offset - slack < 0
+        })
+    }
+
     /// A difference of heights in steps, if heights count.
     fn height_steps(&self, units: u32) -> u32 {
         let coarse = (units.min(COORDINATE_LIMIT as u32) * self.height_factor) >> 10;
@@ -498,7 +511,8 @@ impl Volume {
         }
     }
 
-    /// A cluster's key: less is drawn earlier.
+    /// A cluster's key: less is drawn earlier. In views, those that no plane cuts come first: where one triangle is clipped, software
+    /// rasterisers draw some hundreds before and after it slowly too.
     fn key(&self, bounds: &Bounds, near: [u32; 2]) -> u32 {
         if self.along_light == 1 {
             let limit = COORDINATE_LIMIT;
@@ -512,9 +526,9 @@ impl Volume {
         }
         let [x, z] = near.map(|value| (value >> self.limit_shift()).min(SQUARE_LIMIT));
         let square = (x * x + z * z) | 1;
-        // A floating-point number of 7 bits: as fine as 0.4 % of the distance.
+        // A floating-point number with 6 bits of a fraction: as fine as 0.8 % of the distance.
         let exponent = square.ilog2();
-        exponent << 7 | (square << (31 - exponent)) >> 24 & 0x7F
+        u32::from(self.cuts(bounds)) << 11 | exponent << 6 | (square << (31 - exponent)) >> 25 & 0x3F
     }
 
     /// The shift at which distances are compared to sort by them.

@@ -59,8 +59,8 @@ pub struct PlaneUniform {
 
 /// The most planes of a cross.
 pub const MOST_PLANES: usize = MOST_UPRIGHTS as usize + 1;
-/// Vertices that the shader pulls for a tree's cross: those two upright planes that face the viewer best, and the level one.
-pub const CROSS_VERTICES: u32 = 18;
+/// Vertices that the shader pulls for a tree's cross: an upright quad that faces the viewer, and the level plane.
+pub const CROSS_VERTICES: u32 = 12;
 /// Vertices that the caster's shader pulls for a tree's cross: an upright plane and the level one.
 pub const CROSS_CASTER_VERTICES: u32 = 12;
 
@@ -179,11 +179,16 @@ pub struct TransferUniform {
     pub indirect_sun_color: [f32; 3],
     /// Scale of its codes: the value of code 127.
     pub indirect_sun_scale: f32,
+    /// Factor on the first coefficient of the sun's light
+    /// ([`PackedTransfer::beam_mean_factor`](crate::bake::lighting::transfer::PackedTransfer::beam_mean_factor)).
+    pub beam_mean_factor: f32,
+    /// Alignment.
+    pub padding: [u32; 3],
 }
 
 impl TransferUniform {
     /// The uniform of one part of a plant.
-    pub fn new(settings: &TransferSettings, part: &PackedPart, tint: Vec3) -> Self {
+    pub fn new(settings: &TransferSettings, part: &PackedPart, tint: Vec3, beam_mean_factor: f32) -> Self {
         let mut scale = [0.0; 4 * WORDS];
         for (i, scale) in scale.iter_mut().enumerate() {
             *scale = part.scale.get((i + 1).isqrt()).copied().unwrap_or(0.0);
@@ -196,6 +201,8 @@ impl TransferUniform {
             indirect_sun_start: (part.bytes.len() / 4) as u32,
             indirect_sun_color: tint.to_array(),
             indirect_sun_scale: part.indirect_sun_scale,
+            beam_mean_factor,
+            padding: [0; 3],
         }
     }
 }

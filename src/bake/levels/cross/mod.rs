@@ -2,7 +2,8 @@
 //!
 //! Upright planes through the trunk's axis, four by default, and a level one through the foliage's centre.
 //! Each plane's texture shows the *whole* plant seen along the plane's normal, so a few quads represent the tree from
-//! every side. More upright planes are more views of it: of any number, those two are drawn that face the viewer best. A texel has a base colour, normal, ambient term and a fraction of foliage; how much of the sun's light it shows,
+//! every side. More upright planes are more views of it: of any number, the one or two are shown that face the viewer best. A texel has
+//! a base colour, normal, ambient term and a fraction of foliage; how much of the sun's light it shows,
 //! for every sun (`sun.rs`); and if the plant is lit by radiance transfer, the transfer of the sky's light (`light.rs`).
 //!
 //! ```text

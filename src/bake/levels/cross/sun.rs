@@ -48,7 +48,7 @@ const DIRECTIONS: usize = 64;
 const START: f32 = 1.0 / 65_536.0;
 
 /// The basis over the hemisphere for a sun in the direction `(right, up, front)`, where `up` is the zenith: the second-order
-/// polynomials on the sphere but for the zonal one. The twin of `sun_basis` in `shaders/forest/cross.wgsl`.
+/// polynomials on the sphere but for the zonal one. The twin of `sunlight` in `shaders/forest/cross.wgsl`.
 pub fn basis(direction: Vec3) -> [f32; SUN_FUNCTIONS] {
     let Vec3 { x, y, z } = direction;
     let high = 2.0 * y - 1.0;

@@ -1,4 +1,4 @@
-//! Crossed billboards [Franzke 2005, 4.3]: three of their planes per tree; one draw call with vertex pulling for the trees of
+//! Crossed billboards [Franzke 2005, 4.3]: an upright quad and the level plane per tree; one draw call with vertex pulling for the trees of
 //! all variants. The shadow caster is one vertical plane that faces the light's azimuth, and the horizontal one.
 
 use std::sync::Arc;
