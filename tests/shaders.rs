@@ -367,7 +367,6 @@ fn gpu_structs_are_what_the_shaders_think() {
             indirect_sun_start,
             indirect_sun_color,
             indirect_sun_scale,
-            beam_mean_factor,
         }
     );
     twin!(

@@ -24,8 +24,6 @@ struct Transfer {
     indirect_sun_color: vec3<f32>,
     // Scale of its codes: the value of code 127.
     indirect_sun_scale: f32,
-    // Factor on the first coefficient of the sun's light, which makes up for what clamping adds: src/bake/lighting/transfer/beam.rs.
-    beam_mean_factor: f32,
 }
 
 // Irradiance over pi on the side of a vertex's normal and on the other.
@@ -158,7 +156,7 @@ fn open_light(vertex: u32, yaw: u32) -> OpenLight {
     open.sky.front = light_by_yaw[sky_row].rgb;
 #ifdef SUN_HARMONICS
     let sun_row = sky_row + YAWS * LIGHT_STRIDE;
-    open.sun.front = light_by_yaw[sun_row].rgb * transfer.beam_mean_factor;
+    open.sun.front = light_by_yaw[sun_row].rgb;
 #endif
 #ifdef FOLIAGE
 #ifdef TRANSFER_COLOR

@@ -217,15 +217,6 @@ impl BakedLighting {
         }
     }
 
-    /// Factor on the first coefficient of the sun's light on part `part` ([`PackedTransfer::beam_mean_factor`]); 1 where another model lights the
-    /// plant.
-    pub fn beam_mean_factor(&self, part: usize) -> f32 {
-        match self {
-            Self::Transfer(TransferLighting { packed, .. }) => packed.beam_mean_factor(part),
-            _ => 1.0,
-        }
-    }
-
     /// Mean indirect sunlight (scattered between leaves) over the foliage's vertices, in SH: the first coefficient, and
     /// the zenith component of the second band ([`transfer::TransferPart::indirect_sun`]). Zeros if it was not baked.
     pub fn indirect_sun(&self) -> (f32, f32) {

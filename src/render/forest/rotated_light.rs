@@ -17,6 +17,10 @@ use crate::{
     render::{extract::ExtractedScene, report::FrameReport, view::PreparedFrame},
 };
 
+/// Factor on the first coefficient of the sun's light. Four bands leave light where a vertex lies in the shade, and what they have below zero
+/// is clamped: with all of the first coefficient, shade was too bright (docs/decisions/0027-leaves-combine-transfer-and-shadow-map.md).
+const SUN_FIRST: f32 = 0.9;
+
 /// Rotates the light if it, the exposure or the needs of the plants have changed.
 pub fn prepare_transfer_light(
     scene: Res<ExtractedScene>,
@@ -48,7 +52,8 @@ pub fn prepare_transfer_light(
     let sky = daylight.0.surroundings().project(bands);
     queue.write_buffer(buffer, 0, bytemuck::cast_slice(&rotated(&sky, view.exposure)));
     if sun {
-        let light = beam(daylight.0.key_direction, daylight.0.key_illuminance, bands);
+        let mut light = beam(daylight.0.key_direction, daylight.0.key_illuminance, bands);
+        light.iter_mut().take(1).for_each(|first| *first *= SUN_FIRST);
         queue.write_buffer(buffer, SET_BYTES, bytemuck::cast_slice(&rotated(&light, view.exposure)));
     }
     transfer.uploaded = Some((daylight.0.clone(), view.exposure, transfer.wanted));

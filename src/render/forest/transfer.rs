@@ -76,12 +76,12 @@ pub struct Wanted {
 }
 
 impl TransferLight {
-    /// Group 3 of a part; `tint`: the colour of light scattered between leaves ([`indirect_light_color`]), `beam_mean_factor`: that of the part,
-    /// `coefficients`: a buffer of the part's bytes.
+    /// Group 3 of a part; `tint`: the colour of light scattered between leaves ([`indirect_light_color`]), `coefficients`:
+    /// a buffer of the part's bytes.
     pub fn bind_group(
         &mut self,
         (settings, part): (&TransferSettings, &PackedPart),
-        (tint, beam_mean_factor): (Vec3, f32),
+        tint: Vec3,
         sun: SunLight,
         coefficients: &Buffer,
         gpu: &Gpu,
@@ -97,7 +97,7 @@ impl TransferLight {
                 mapped_at_creation: false,
             })
         });
-        let uniform = [TransferUniform::new(settings, part, tint, beam_mean_factor)];
+        let uniform = [TransferUniform::new(settings, part, tint)];
         let uniform = buffer_with(&gpu.device, "canopy_transfer_layout", BufferUsages::STORAGE, &uniform);
         gpu.bind_group(
             "canopy_transfer",

@@ -179,16 +179,11 @@ pub struct TransferUniform {
     pub indirect_sun_color: [f32; 3],
     /// Scale of its codes: the value of code 127.
     pub indirect_sun_scale: f32,
-    /// Factor on the first coefficient of the sun's light
-    /// ([`PackedTransfer::beam_mean_factor`](crate::bake::lighting::transfer::PackedTransfer::beam_mean_factor)).
-    pub beam_mean_factor: f32,
-    /// Alignment.
-    pub padding: [u32; 3],
 }
 
 impl TransferUniform {
     /// The uniform of one part of a plant.
-    pub fn new(settings: &TransferSettings, part: &PackedPart, tint: Vec3, beam_mean_factor: f32) -> Self {
+    pub fn new(settings: &TransferSettings, part: &PackedPart, tint: Vec3) -> Self {
         let mut scale = [0.0; 4 * WORDS];
         for (i, scale) in scale.iter_mut().enumerate() {
             *scale = part.scale.get((i + 1).isqrt()).copied().unwrap_or(0.0);
@@ -201,8 +196,6 @@ impl TransferUniform {
             indirect_sun_start: (part.bytes.len() / 4) as u32,
             indirect_sun_color: tint.to_array(),
             indirect_sun_scale: part.indirect_sun_scale,
-            beam_mean_factor,
-            padding: [0; 3],
         }
     }
 }

@@ -191,8 +191,7 @@ impl ForestUpload<'_, '_> {
                 packed.map_or_else(Vec::new, |part| [part.bytes.as_slice(), part.indirect_sun.as_slice()].concat())
             },
         );
-        let factor = lighting.beam_mean_factor(part);
-        Some(self.transfer.bind_group((settings, packed), (tint, factor), sun, &coefficients, self.gpu))
+        Some(self.transfer.bind_group((settings, packed), tint, sun, &coefficients, self.gpu))
     }
 
     fn empty_buffer(&self, label: &str, usage: BufferUsages, size: u64) -> Buffer {

@@ -40,7 +40,6 @@
 //! (`benches/transfer.rs`, table of the hours). Counting it to the sun does not help: a shadow map knows whether the
 //! sun's centre is visible, not how much of its surroundings.
 
-mod beam;
 mod bounce;
 mod evaluate;
 mod fit;

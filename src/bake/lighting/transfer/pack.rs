@@ -132,7 +132,7 @@ impl PackedTransfer {
     }
 
     /// One side's coefficients from the bytes of its vertex.
-    pub(super) fn decode(&self, bytes: &[u8], part: &PackedPart, side: usize, out: &mut [f32]) {
+    fn decode(&self, bytes: &[u8], part: &PackedPart, side: usize, out: &mut [f32]) {
         let finite = |value: f32| if value.is_finite() { value } else { 0.0 };
         let half = |at: usize| {
             let bytes = bytes.get(2 * at..2 * at + 2).map_or([0; 2], |bytes| [bytes[0], bytes[1]]);
