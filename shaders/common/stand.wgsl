@@ -29,6 +29,8 @@ struct Relief {
     direction: vec3<f32>,
     // Visibility of the key light, 0..1.
     key: f32,
+    // What the slope leaves of the optical depth of neighbouring crowns for the light of the sky: src/light/slope.rs.
+    slope_factor: f32,
 }
 
 // What is seen from the open has an open way to the eye. Crowns that would hide the sky around that way would have hidden it from the eye
@@ -49,7 +51,7 @@ fn look_up(cover: f32, row: f32, transmittances: f32, relief: Relief) -> StandLi
     let v = (row + 0.5) / (4.0 * (STAND_DEPTHS + 1.0));
     let first = textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 0.25 * transmittances), 0.0);
     var stand: StandLight;
-    stand.sky_transmittance = pow(max(first.rgb, vec3(1e-6)), vec3(1.0 - SEEN_PART * frame.openness));
+    stand.sky_transmittance = pow(max(first.rgb, vec3(1e-6)), vec3(relief.slope_factor * (1.0 - SEEN_PART * frame.openness)));
     stand.key_transmittance = first.a;
     stand.downwelling = behind_relief(textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 0.25), 0.0), relief);
     let upwelling = behind_relief(textureSampleLevel(stand_texture, sky_sampler, vec2(u, v + 0.5), 0.0), relief);

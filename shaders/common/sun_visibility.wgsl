@@ -37,8 +37,9 @@ fn relief_at(relative: vec3<f32>, ground: GroundSample, height_above_ground: f32
     let edge = 1.0 / f32(textureDimensions(hidden_sky_texture).y);
     let v = 0.5 * clamp(uv.y, edge, 1.0 - edge);
     let hidden = textureSampleLevel(hidden_sky_texture, sky_sampler, vec2(uv.x, v), 0.0);
-    let direction = textureSampleLevel(hidden_sky_texture, sky_sampler, vec2(uv.x, v + 0.5), 0.0).xyz;
-    return Relief(hidden.rgb * light.level_radiance, hidden.a, direction, terrain_visibility(ground, height_above_ground));
+    let direction = textureSampleLevel(hidden_sky_texture, sky_sampler, vec2(uv.x, v + 0.5), 0.0);
+    let key = terrain_visibility(ground, height_above_ground);
+    return Relief(hidden.rgb * light.level_radiance, hidden.a, direction.xyz, key, direction.w);
 }
 
 // Metres.

@@ -248,7 +248,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
 
     let within = relief_at(in.relative, seen.ground, 0.0);
     let key = select(within.key, 1.0, seen.outside);
-    let relief = Relief(within.hidden, within.level_fraction, within.direction, key);
+    let relief = Relief(within.hidden, within.level_fraction, within.direction, key, within.slope_factor);
     let stand = ground_light(shade_cover, relief);
     var visibility = relief.key;
     if visibility > 0.0 {

@@ -99,9 +99,10 @@ impl HiddenSky {
 }
 
 impl HiddenLight {
-    /// Two texels: the radiance with the fraction that is left on level ground, and the direction.
-    pub fn texels(&self) -> [Vec4; 2] {
-        [self.radiance.extend(self.level_fraction), self.direction.extend(0.0)]
+    /// Two texels: the radiance with the fraction that is left on level ground, and the direction with the [`slope_factor`](super::slope_factor) of
+    /// the place.
+    pub fn texels(&self, slope_factor: f32) -> [Vec4; 2] {
+        [self.radiance.extend(self.level_fraction), self.direction.extend(slope_factor)]
     }
 
     /// The irradiance over pi that is hidden from a surface with a unit normal, over [`HiddenSky::level_radiance`]: three bands of the

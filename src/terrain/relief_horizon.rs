@@ -31,7 +31,6 @@ pub fn azimuth(index: usize) -> DVec2 {
 /// The horizons of a grid of `columns` × `rows` cells over `extent` metres around the terrain's middle, row by row from the north. Relief farther than
 /// `farthest` metres does not count. Everything is finite.
 pub fn horizons(terrain: &Terrain, extent: DVec2, columns: usize, rows: usize, farthest: f64) -> Vec<Horizon> {
-    let cell = extent / DVec2::new(columns.max(1) as f64, rows.max(1) as f64);
     let steps = || std::iter::successors(Some(FIRST_STEP), |step| Some(step * STEP_GROWTH));
     let (_, highest) = terrain.min_max_height();
     let tangent = |place: DVec2, height: f64, direction: DVec2| {
@@ -47,11 +46,30 @@ pub fn horizons(terrain: &Terrain, extent: DVec2, columns: usize, rows: usize, f
         (steepest as f32).min(STEEPEST)
     };
     let horizon = |index: usize| {
-        let place = (DVec2::new((index % columns) as f64, (index / columns) as f64) + 0.5) * cell - 0.5 * extent;
+        let place = middle_of(extent, columns, rows, index);
         let height = terrain.height(place.x, place.y);
         std::array::from_fn(|direction| tangent(place, height, azimuth(direction)))
     };
     (0..columns * rows).into_par_iter().map(horizon).collect()
+}
+
+/// The angles in radians by which the ground slopes in the cells of such a grid, over 40 m.
+pub fn slopes(terrain: &Terrain, extent: DVec2, columns: usize, rows: usize) -> Vec<f32> {
+    let slope = |index: usize| {
+        let place = middle_of(extent, columns, rows, index);
+        let rise = |step: DVec2| {
+            let height = |side: f64| terrain.height(place.x + side * step.x, place.y + side * step.y);
+            (height(1.0) - height(-1.0)) / (2.0 * FIRST_STEP)
+        };
+        rise(DVec2::X * FIRST_STEP).hypot(rise(DVec2::Y * FIRST_STEP)).atan() as f32
+    };
+    (0..columns * rows).into_par_iter().map(slope).collect()
+}
+
+/// The middle of a cell, metres from the terrain's.
+fn middle_of(extent: DVec2, columns: usize, rows: usize, index: usize) -> DVec2 {
+    let cell = extent / DVec2::new(columns.max(1) as f64, rows.max(1) as f64);
+    (DVec2::new((index % columns) as f64, (index / columns) as f64) + 0.5) * cell - 0.5 * extent
 }
 
 #[cfg(test)]
@@ -74,6 +92,17 @@ mod tests {
         assert!((0.8..1.1).contains(&(east * 1770.0 / 100.0)), "{east}");
         assert_eq!((west[0], west[AZIMUTHS / 2], west[3 * AZIMUTHS / 4]), (0.0, 0.0, 0.0));
         assert!(horizons.iter().flatten().all(|tangent| (0.0..=STEEPEST).contains(tangent)));
+    }
+
+    #[test]
+    fn a_ramp_slopes_as_it_rises() {
+        let heights = (0..101 * 101).map(|index| 10.0 * (index % 101) as f32).collect();
+        let field = HeightField::new(101, 101, DVec2::splat(20.0), heights).unwrap();
+        let terrain = Terrain::new(field, None, Surroundings::Border);
+        let ramp = slopes(&terrain, DVec2::splat(1000.0), 4, 4);
+        assert!(ramp.iter().all(|slope| (slope - 0.5f32.atan()).abs() < 0.01), "{ramp:?}");
+        let far_from_the_wall = slopes(&wall(), DVec2::splat(2000.0), 20, 20)[10 * 20];
+        assert_eq!(far_from_the_wall, 0.0);
     }
 
     #[test]

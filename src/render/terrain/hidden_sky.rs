@@ -1,5 +1,5 @@
 //! A texture of the terrain seen from above, over the same area as the [ground map](super::ground_map): what relief hides of the
-//! sky's light.
+//! sky's light, and what its slope leaves of the optical depth of crowns.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use super::map_area::MapArea;
 use crate::{
-    light::{HiddenLight, HiddenSky},
+    light::{HiddenLight, HiddenSky, slope_factor},
     render::{
         bindings::SharedTextures,
         components::{Daylight, LightUpdates},
@@ -25,7 +25,7 @@ use crate::{
         light_table::LightTable,
         report::FrameReport,
     },
-    terrain::relief_horizon::{AZIMUTHS, Horizon, horizons},
+    terrain::relief_horizon::{AZIMUTHS, Horizon, horizons, slopes},
 };
 
 /// Texels along the longer side of the terrain's data.
@@ -39,7 +39,13 @@ const FARTHEST: f64 = 12_000.0;
 #[derive(Resource)]
 pub struct HiddenSkyMap {
     table: LightTable<(MapArea, Daylight)>,
-    horizons: Follower<MapArea, Arc<Vec<Horizon>>>,
+    relief: Follower<MapArea, Arc<Relief>>,
+}
+
+/// What the light needs of the terrain, place by place.
+struct Relief {
+    horizons: Vec<Horizon>,
+    slope_factors: Vec<f32>,
 }
 
 fn is_level(area: &MapArea) -> bool {
@@ -52,12 +58,16 @@ fn size(area: &MapArea) -> (u32, u32) {
     if is_level(area) { (1, 1) } else { area.size(LONGEST_SIDE, MOST_SIDE) }
 }
 
-fn relief_of(area: &MapArea) -> Vec<Horizon> {
+fn relief_of(area: &MapArea) -> Relief {
     if is_level(area) {
-        return vec![[0.0; AZIMUTHS]];
+        return Relief { horizons: vec![[0.0; AZIMUTHS]], slope_factors: vec![1.0] };
     }
     let (columns, rows) = size(area);
-    horizons(&area.terrain, area.extent(), columns as usize, rows as usize, FARTHEST)
+    let (terrain, extent, columns, rows) = (&area.terrain, area.extent(), columns as usize, rows as usize);
+    Relief {
+        horizons: horizons(terrain, extent, columns, rows, FARTHEST),
+        slope_factors: slopes(terrain, extent, columns, rows).into_iter().map(slope_factor).collect(),
+    }
 }
 
 impl FromWorld for HiddenSkyMap {
@@ -71,8 +81,8 @@ impl HiddenSkyMap {
     fn open(device: &RenderDevice, queue: &RenderQueue) -> Self {
         let table = LightTable::new(device, "canopy_hidden_sky", (1, 2));
         let open = HiddenLight { level_fraction: 1.0, ..HiddenLight::default() };
-        table.write(queue, &blocks(&[open]));
-        Self { table, horizons: Follower::default() }
+        table.write(queue, &blocks(&[open], &[1.0]));
+        Self { table, relief: Follower::default() }
     }
 }
 
@@ -98,7 +108,7 @@ fn update(
 ) {
     let Some((_, ground, _)) = &scene.ground else {
         // A despawned ground is freed.
-        if map.horizons.key().is_some() {
+        if map.relief.key().is_some() {
             *map = HiddenSkyMap::open(device, queue);
         }
         return;
@@ -106,24 +116,27 @@ fn update(
     let Some(daylight) = &scene.daylight else { return };
     let wanted = MapArea::of(ground);
     let area = wanted.clone();
-    let followed = map.horizons.follow(&wanted, LightUpdates::Blocking, |_| false, move || Arc::new(relief_of(&area)));
-    let Some(horizons) = map.horizons.value().cloned() else { return };
+    let followed = map.relief.follow(&wanted, LightUpdates::Blocking, |_| false, move || Arc::new(relief_of(&area)));
+    let Some(relief) = map.relief.value().cloned() else { return };
     let (columns, rows) = size(&wanted);
     map.table.resize(device, (columns, 2 * rows));
     let uploaded = map.table.update(queue, (wanted, daylight.clone()), || {
         let sky = HiddenSky::new(&daylight.0, AZIMUTHS);
-        let hidden: Vec<_> = horizons.par_iter().map(|horizon| sky.behind(horizon)).collect();
-        blocks(&hidden)
+        let hidden: Vec<_> = relief.horizons.par_iter().map(|horizon| sky.behind(horizon)).collect();
+        blocks(&hidden, &relief.slope_factors)
     });
     match (followed, uploaded) {
         (Followed::Same, false) => report.skipped("sky behind relief", "light and terrain have not changed"),
-        (Followed::Same, true) => report.ran("sky behind relief", format!("{} cells", horizons.len())),
-        _ => report.ran("sky behind relief", format!("{} cells, with their horizons", horizons.len())),
+        (Followed::Same, true) => report.ran("sky behind relief", format!("{} cells", relief.horizons.len())),
+        _ => report.ran("sky behind relief", format!("{} cells, with their horizons", relief.horizons.len())),
     }
 }
 
 /// The first texel of each place, then the second of each.
-fn blocks(hidden: &[HiddenLight]) -> Vec<[f16; 4]> {
-    let block = |index: usize| hidden.iter().map(move |light| light.texels()[index].to_array().map(f16::from_f32));
+fn blocks(hidden: &[HiddenLight], slope_factors: &[f32]) -> Vec<[f16; 4]> {
+    let block = |index: usize| {
+        let places = hidden.iter().zip(slope_factors);
+        places.map(move |(light, factor)| light.texels(*factor)[index].to_array().map(f16::from_f32))
+    };
     block(0).chain(block(1)).collect()
 }
