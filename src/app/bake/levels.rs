@@ -7,6 +7,7 @@ use crate::{
     lod::Representation,
     math::digits::grouped,
     plant::{PartKind, Plant, PlantMesh},
+    render::forest::CROSS_VERTICES,
 };
 
 /// Facts of a level that need no image.
@@ -89,7 +90,7 @@ pub fn facts(plant: &BakedPlant) -> Vec<LevelFacts> {
         all.push(LevelFacts {
             representation: Representation::CROSS,
             title: "Crossed billboards",
-            triangles: 2 * cross.planes.len().min(3),
+            triangles: CROSS_VERTICES as usize / 3,
             bytes: cross.texture_bytes(),
             deviation: Some(deviation_of_cross(&plant.plant, cross)),
             notes: vec![format!("{} planes", cross.planes.len())],

@@ -55,7 +55,7 @@ pub use lists::{ForestStatistics, LevelStatistics, PreparedForests, collect_view
 pub use pipelines::LevelPipelines;
 pub use representation::Representations;
 pub use uniforms::{
-    CrossVariantUniform, ForestViewUniform, PartUniform, PlaneUniform, TransferUniform, VariantUniform,
+    CROSS_VERTICES, CrossVariantUniform, ForestViewUniform, PartUniform, PlaneUniform, TransferUniform, VariantUniform,
 };
 pub use vertex::PlantVertex;
 
