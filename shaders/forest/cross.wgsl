@@ -93,9 +93,9 @@ fn vertex(@builtin(vertex_index) index: u32) -> Varying {
     // One plane of no weight does not widen the quad.
     let first_ends = select(second.ends, first.ends, facing.weight < 1.0);
     let second_ends = select(first.ends, second.ends, facing.weight > 0.0);
-    let left = min(min(first_ends.x, first_ends.y), min(second_ends.x, second_ends.y));
-    let to = max(max(first_ends.x, first_ends.y), max(second_ends.x, second_ends.y));
-    let along = mix(left, to, corner.x);
+    let leftmost = min(min(first_ends.x, first_ends.y), min(second_ends.x, second_ends.y));
+    let rightmost = max(max(first_ends.x, first_ends.y), max(second_ends.x, second_ends.y));
+    let along = mix(leftmost, rightmost, corner.x);
 
     let plane_index = select(first.index, uprights, level);
     let plane = cross_variants[tree.variant].planes[plane_index];

@@ -57,7 +57,7 @@ pub struct Quality {
     /// picture ([`level_distance`](crate::lod::level_distance)).
     pub near_distance: f64,
     /// Instead of `near_distance`, 0 to 1000: how much more error crosses may have than full models, in any size of image
-    /// ([`error_curve`](crate::lod::error_curve)). 0: none; 0.18: about as `near_distance: 80` at 1080 rows. Lower: truer,
+    /// ([`error_curve`](crate::lod::error_curve)). 0: none; 0.19: about as `near_distance: 80` at 1080 rows. Lower: truer,
     /// slower. Default: not used.
     pub tolerance: Option<f64>,
     /// Width in metres of the band behind `near_distance` in which models fade into crosses, 0.1 to 1000.

@@ -53,7 +53,9 @@ pub fn prepare_transfer_light(
     queue.write_buffer(buffer, 0, bytemuck::cast_slice(&rotated(&sky, view.exposure)));
     if sun {
         let mut light = beam(daylight.0.key_direction, daylight.0.key_illuminance, bands);
-        light.iter_mut().take(1).for_each(|first| *first *= SUN_FIRST);
+        if let Some(first) = light.first_mut() {
+            *first *= SUN_FIRST;
+        }
         queue.write_buffer(buffer, SET_BYTES, bytemuck::cast_slice(&rotated(&light, view.exposure)));
     }
     transfer.uploaded = Some((daylight.0.clone(), view.exposure, transfer.wanted));
