@@ -153,9 +153,16 @@ fn farthest(normal: vec3<i32>, bounds: Bounds) -> i32 {
     return product.x + product.y + product.z;
 }
 
+// A box within the coordinates that products of planes hold.
 fn clamped(bounds: Bounds) -> Bounds {
     let limit = vec3(COORDINATE_LIMIT);
     return Bounds(clamp(bounds.low, -limit, limit), clamp(bounds.high, -limit, limit));
+}
+
+// What rounding may add to a plane's product with a corner of a box, or take.
+fn slack_of(bounds: Bounds) -> i32 {
+    let size = max(abs(bounds.low), abs(bounds.high));
+    return ((size.x + size.y + size.z) >> 1u) + PLANE_SLACK;
 }
 
 // Whether anything in a box may be inside.
@@ -165,8 +172,7 @@ fn sees(bounds: Bounds) -> bool {
         return false;
     }
     let inside = clamped(bounds);
-    let size = max(abs(inside.low), abs(inside.high));
-    let slack = ((size.x + size.y + size.z) >> 1u) + PLANE_SLACK;
+    let slack = slack_of(inside);
     let drop = max(inside.high.y - volume.lowest, 0);
     for (var i = 0u; i < volume.plane_count; i++) {
         let plane = volume.planes[i];
@@ -183,8 +189,7 @@ fn sees(bounds: Bounds) -> bool {
 // Whether a plane may cut a box.
 fn cuts(bounds: Bounds) -> bool {
     let inside = clamped(bounds);
-    let size = max(abs(inside.low), abs(inside.high));
-    let slack = ((size.x + size.y + size.z) >> 1u) + PLANE_SLACK;
+    let slack = slack_of(inside);
     for (var i = 0u; i < volume.plane_count; i++) {
         let plane = volume.planes[i];
         let product = -farthest(-vec3(plane.normal[0], plane.normal[1], plane.normal[2]), inside);

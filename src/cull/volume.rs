@@ -192,6 +192,21 @@ pub struct Bounds {
     high: [i32; 3],
 }
 
+impl Bounds {
+    /// Within the coordinates that products of planes hold.
+    fn clamped(self) -> Self {
+        let limit = COORDINATE_LIMIT;
+        let clamp = |corner: [i32; 3]| corner.map(|value| value.clamp(-limit, limit));
+        Self { low: clamp(self.low), high: clamp(self.high) }
+    }
+
+    /// What rounding may add to a plane's product with a corner of it, or take.
+    fn slack(&self) -> i32 {
+        let size: i32 = (0..3).map(|axis| self.low[axis].abs().max(self.high[axis].abs())).sum();
+        (size >> 1) + PLANE_SLACK
+    }
+}
+
 /// What is needed to build volumes: a page of a stand and the groups of its levels.
 #[derive(Clone, Copy, Debug)]
 pub struct Drawn<'a> {
@@ -422,10 +437,8 @@ impl Volume {
     fn sees(&self, bounds: &Bounds) -> bool {
         let limit = COORDINATE_LIMIT;
         let outside = (0..3).any(|axis| bounds.low[axis] > limit || bounds.high[axis] < -limit);
-        let low = bounds.low.map(|value| value.clamp(-limit, limit));
-        let high = bounds.high.map(|value| value.clamp(-limit, limit));
-        let size: i32 = (0..3).map(|axis| low[axis].abs().max(high[axis].abs())).sum();
-        let slack = (size >> 1) + PLANE_SLACK;
+        let inside = bounds.clamped();
+        let (Bounds { low, high }, slack) = (inside, inside.slack());
         let drop = (high[1] - self.lowest).max(0);
         let inside = self.planes.iter().take(self.plane_count as usize).all(|plane| {
             let product: i32 = (0..3).map(|axis| farthest(plane.normal[axis], low[axis], high[axis])).sum();
@@ -437,11 +450,8 @@ impl Volume {
 
     /// Whether a plane may cut a box.
     fn cuts(&self, bounds: &Bounds) -> bool {
-        let limit = COORDINATE_LIMIT;
-        let low = bounds.low.map(|value| value.clamp(-limit, limit));
-        let high = bounds.high.map(|value| value.clamp(-limit, limit));
-        let size: i32 = (0..3).map(|axis| low[axis].abs().max(high[axis].abs())).sum();
-        let slack = (size >> 1) + PLANE_SLACK;
+        let inside = bounds.clamped();
+        let (Bounds { low, high }, slack) = (inside, inside.slack());
         self.planes.iter().take(self.plane_count as usize).any(|plane| {
             let product: i32 = (0..3).map(|axis| -farthest(-plane.normal[axis], low[axis], high[axis])).sum();
             product + plane.offset - slack < 0
