@@ -85,7 +85,7 @@ fn fading() {
         for level in 0..3 {
             for fade in [AlphaFade::PerLeaf, AlphaFade::CenterOut] {
                 let settings = CrossSettings { fade, ..CrossSettings::default() };
-                let chain = &bake_cross(&tree, &BakedLighting::Local, &settings).textures.color[0];
+                let chain = &bake_cross(&tree, &BakedLighting::Local, &settings).textures.color[0].texels;
                 let (side, _) = chain.level_size(level);
                 let picture = RgbaImage::from_raw(side, side, chain.levels[level].clone()).expect("a square image");
                 report(&species.name, "crosses", side as usize, fade, |threshold| of_texture(&picture, threshold));
@@ -113,7 +113,7 @@ fn at_rest() {
         for level in 1..6 {
             for fade in [AlphaFade::PerLeaf, AlphaFade::CenterOut] {
                 let settings = CrossSettings { fade, ..CrossSettings::default() };
-                let chain = &bake_cross(&tree, &BakedLighting::Local, &settings).textures.color[0];
+                let chain = &bake_cross(&tree, &BakedLighting::Local, &settings).textures.color[0].texels;
                 let of = |level: usize| {
                     let (side, _) = chain.level_size(level);
                     let texture = RgbaImage::from_raw(side, side, chain.levels[level].clone());
@@ -176,7 +176,7 @@ fn transition(name: &str, tree: &Plant, fade: AlphaFade, side: usize) {
     let foliage = both.parts.len();
     let own = Arc::new(Plant { name: "crown".into(), parts: foliage_of(tree) });
     let cross = bake_cross(&own, &BakedLighting::Local, &CrossSettings { fade, ..CrossSettings::default() });
-    let (plane, chain) = (&cross.planes[0], &cross.textures.color[0]);
+    let (plane, chain) = (&cross.planes[0], &cross.textures.color[0].texels);
     let level = (0..chain.levels.len()).find(|&level| chain.level_size(level).0 as usize <= side).unwrap_or(0);
     let (width, height) = chain.level_size(level);
     let (center, u, v) = (plane.center, plane.u, plane.v);

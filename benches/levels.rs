@@ -6,16 +6,20 @@
 //! | `reductions` | the publication's reductions [Franzke 2005, figs. 4.9, 4.19 to 4.23] on plants of their size |
 //! | `errors` | each level against the supersampled full model in the same light: four sides and above, three suns, 16 to 512 pixels |
 //! | `planes` | crosses of one to eight upright planes, from sides between them |
+//! | `compression` | textures of levels in blocks: bytes, time, error of texels and images |
 //! | `cost` | a frame of many trees as each level |
 //! | `pop` | what a frame changes while a tree shrinks by one percent a frame |
 //! | `turn` | what a frame changes while a tree turns |
 //! | `shimmer` | what a frame changes while the demo's camera turns by a tenth of a pixel a frame |
 //!
 //! `cargo bench --bench levels -- errors cost` runs those parts; without arguments all run. `CANOPY_DATA` is the folder
-//! with `trees/`; without it grown trees stand in. Results: `docs/measurements/levels-of-detail.md`.
+//! with `trees/`; without it grown trees stand in. Results: `docs/measurements/levels-of-detail.md`
+//! and `texture-compression.md`.
 
 #![allow(clippy::expect_used)]
 
+#[path = "levels/compression.rs"]
+mod compression;
 #[path = "levels/cost.rs"]
 mod cost;
 #[path = "levels/errors.rs"]
@@ -47,6 +51,9 @@ fn main() {
     }
     if runs("planes") {
         planes::planes();
+    }
+    if runs("compression") {
+        compression::compression();
     }
     if runs("cost") {
         cost::cost();

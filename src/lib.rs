@@ -87,8 +87,8 @@ pub mod prelude {
         lod::{FadeBand, Levels, Representation},
         progress::{Progress, Silent},
         render::components::{
-            CanopyCamera, CanopyOrigin, CanopyStyle, CastsCanopyShadow, Daylight, Forest, ForestUpdates, Ground,
-            GroundDrape, LightUpdates, SunShadowSettings, ViewOptions,
+            CanopyCamera, CanopyOrigin, CanopyStyle, CastsCanopyShadow, Compression, Daylight, Forest, ForestUpdates,
+            Ground, GroundDrape, LightUpdates, SunShadowSettings, TextureCompression, ViewOptions,
         },
         render::diagnostics::CanopyDiagnosticsPlugin,
         scene::{Overrides, Scene, SceneSource},

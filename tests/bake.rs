@@ -133,7 +133,7 @@ fn decode_octahedral(code: [u8; 2]) -> Vec3 {
 /// Area that a level of a plane's picture shows with an alpha test at one half, square metres, bilinear as on the GPU.
 fn picture_area(cross: &Cross, index: usize, level: usize) -> f32 {
     const ZOOM: usize = 4;
-    let chain = &cross.textures.color[index];
+    let chain = &cross.textures.color[index].texels;
     let (width, height) = chain.level_size(level);
     let (width, height) = (width as usize, height as usize);
     let texels = &chain.levels[level];
@@ -167,7 +167,7 @@ fn a_cross_covers_what_the_plant_covers_in_every_mip() {
         let view = View { center: plane.center, right: plane.u, up: plane.v, toward: plane.normal };
         let full = projected_area(&plant, &view, 2048);
         assert!(full > 1.0);
-        assert_eq!(cross.textures.color[index].levels.len(), 9);
+        assert_eq!(cross.textures.color[index].texels.levels.len(), 9);
         for (level, tolerance) in [0.03, 0.03, 0.03, 0.05, 0.05].into_iter().enumerate() {
             let shown = picture_area(&cross, index, level) / full;
             assert!((shown - 1.0).abs() < tolerance, "plane {index}, level {level} shows {shown} of the plant");
@@ -199,7 +199,7 @@ fn upright_planes_are_evenly_turned_and_each_shows_the_whole_plant() {
 fn a_cross_has_no_foreign_colour_anywhere() {
     let plant = Arc::new(tree(1500, 5));
     let cross = bake_cross(&plant, &BakedLighting::Local, &CrossSettings { resolution: 128, ..Default::default() });
-    for chain in &cross.textures.color {
+    for chain in cross.textures.color.iter().map(|texture| &texture.texels) {
         // Leaves are green (60, 120, 30), bark is brown: red never exceeds what lies between, blue stays low.
         for texel in chain.levels.iter().flat_map(|level| level.chunks_exact(4)) {
             assert!(texel[2] < 80 && texel[0] < 140 && texel[1] > 60, "{texel:?}");
@@ -225,8 +225,8 @@ fn a_cross_keeps_normal_ambient_and_kind() {
         together: false,
     });
     let cross = bake_cross(&plant, &lighting, &CrossSettings { uprights: 2, resolution: 64, ..Default::default() });
-    for (plane, chain) in cross.planes.iter().zip(&cross.textures.properties) {
-        for level in &chain.levels {
+    for (plane, texture) in cross.planes.iter().zip(&cross.textures.properties) {
+        for level in &texture.texels.levels {
             for texel in level.chunks_exact(4) {
                 let decoded = plane.frame() * decode_octahedral([texel[0], texel[1]]);
                 assert!(decoded.angle_between(normal) < 0.02, "{decoded}");
@@ -242,7 +242,7 @@ fn a_cross_keeps_normal_ambient_and_kind() {
 fn nothing_and_flat_plants_give_crosses_too() {
     let empty = bake_cross(&Arc::new(Plant::default()), &BakedLighting::Local, &CrossSettings::default());
     assert_eq!(empty.planes.len(), 5);
-    assert!(empty.textures.color.iter().flat_map(|chain| &chain.levels).flatten().all(|&byte| byte == 0));
+    assert!(empty.textures.color.iter().flat_map(|texture| &texture.texels.levels).flatten().all(|&byte| byte == 0));
 
     let mut mesh = PlantMesh::default();
     add_card(&mut mesh, Vec3::Y, Quat::IDENTITY, 1.0);
@@ -252,8 +252,8 @@ fn nothing_and_flat_plants_give_crosses_too() {
         bake_cross(&flat, &BakedLighting::Local, &CrossSettings { uprights: 2, resolution: 64, ..Default::default() });
     assert_eq!(cross.planes[1].u, Vec3::ZERO);
     assert!(cross.planes.iter().all(|plane| plane.frame().is_finite()));
-    assert_eq!(cross.textures.color[0].coverage(0, 0.5), 1.0);
-    assert_eq!(cross.textures.color[1].coverage(0, 0.5), 0.0);
+    assert_eq!(cross.textures.color[0].texels.coverage(0, 0.5), 1.0);
+    assert_eq!(cross.textures.color[1].texels.coverage(0, 0.5), 0.0);
     let proxy = simplify_foliage(&flat, 1);
     assert_eq!(proxy.parts[0].mesh, flat.parts[0].mesh);
 }
@@ -622,7 +622,7 @@ proptest! {
         }
         let settings = CrossSettings { resolution: 3, supersampling: 0, normal_smoothing: smoothing, ..CrossSettings::default() };
         let cross = bake_cross(&plant, &lighting, &settings);
-        prop_assert_eq!(cross.textures.color[0].width, 64);
+        prop_assert_eq!(cross.textures.color[0].texels.width, 64);
         prop_assert!(cross.transmission.is_finite());
         for plane in &cross.planes {
             prop_assert!(plane.center.is_finite() && plane.u.is_finite() && plane.v.is_finite());

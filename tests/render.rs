@@ -17,6 +17,7 @@ mod plate;
 mod plugins;
 mod shadows;
 mod style;
+mod texture_compression;
 mod traps;
 mod world;
 

@@ -34,7 +34,7 @@ use naga::{
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 
 /// All that the pipelines switch on or off.
-const DEFINES: [&str; 17] = [
+const DEFINES: [&str; 18] = [
     "FOLIAGE",
     "ALPHA_TO_COVERAGE",
     "NORMAL_MAP",
@@ -43,6 +43,7 @@ const DEFINES: [&str; 17] = [
     "TRANSFER_COLOR",
     "SUN_HARMONICS",
     "SUN_DETAIL",
+    "SUN_PAIRS",
     "PLAIN_TOO",
     "DEPTH_FIRST",
     "STYLED",

@@ -18,11 +18,11 @@ const UPRIGHTS: [u32; 6] = [4, 1, 2, 3, 6, 8];
 /// Directions to the camera, evenly over a quarter of a turn.
 const TURNS: u32 = 8;
 /// Largest size of a cross in pixels.
-const LARGEST: usize = 128;
+pub const LARGEST: usize = 128;
 /// Pixels of the full model for each of the largest cross's, along a side.
-const TRUTH: usize = 8;
+pub const TRUTH: usize = 8;
 /// Sizes from the largest to 16 pixels.
-const HALVINGS: usize = 3;
+pub const HALVINGS: usize = 3;
 
 fn baked(plant: &Plant, uprights: u32) -> BakedPlant {
     let cross = CrossSettings { uprights, ..CrossSettings::default() };
@@ -31,7 +31,7 @@ fn baked(plant: &Plant, uprights: u32) -> BakedPlant {
 }
 
 /// Images of all turns, under all suns, in the largest size.
-fn images(plant: &BakedPlant, level: Representation, pixels: usize) -> Vec<Vec<Cutout>> {
+pub fn images(plant: &BakedPlant, level: Representation, pixels: usize) -> Vec<Vec<Cutout>> {
     let mut studio = Studio::new(plant.clone(), (LARGEST * pixels) as u32, None, 4).expect("a renderer");
     let turn = |turn: u32| (f64::from(turn) + 0.5) / f64::from(TURNS) * std::f64::consts::FRAC_PI_2;
     let of_turn = |index: u32| {
@@ -60,7 +60,7 @@ pub fn planes() {
             .collect();
         for uprights in UPRIGHTS {
             let plant = baked(&plant, uprights);
-            let megabytes = plant.cross().map_or(0.0, |cross| cross.texture_bytes() as f64 / 1e6);
+            let megabytes = plant.cross().map_or(0.0, |cross| cross.texture_bytes(false) as f64 / 1e6);
             let shown = images(&plant, Representation::CROSS, 1);
             for halving in 0..=HALVINGS {
                 let (zoom, size) = (1 << halving, LARGEST >> halving);

@@ -95,7 +95,7 @@ fn coppice(triangles: usize, conifer: bool) -> (String, Plant) {
 
 /// Texels per metre of the first plane.
 fn density(cloud: &Cloud) -> f32 {
-    let atlas = cloud.textures.color.width as f32;
+    let atlas = cloud.textures.color.texels.width as f32;
     let plane = cloud.planes.iter().max_by(|a, b| a.u.length().total_cmp(&b.u.length()));
     plane.map_or(0.0, |plane| (plane.texture_max.x - plane.texture_min.x) * atlas / (2.0 * plane.u.length()))
 }

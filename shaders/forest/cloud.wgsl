@@ -6,6 +6,7 @@
 #import canopy::instance::{trees, visible, variants, unpack_tree, rotate, plant_vertex_position, level_distance, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, leaf_visibility}
 #import canopy::lighting::{Surface, shade, even_sky, leaf_transmission}
 #import canopy::output::finish
+#import canopy::signed_texel::signed_texel
 #import canopy::sky::sky_transfer
 #import canopy::stand::{stand_light, in_stand_by_transfer, evaluate_two_bands}
 #import canopy::sun_visibility::{sample_ground, relief_at, cascaded_visibility}
@@ -179,7 +180,9 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     let relief = relief_at(in.relative, ground, look.height);
     let stand = stand_light(ground.surrounding_cover * variants[variant].cover_weight, 1.0 - look.relative_height, relief);
 #ifdef TRANSFER
-    let stored = textureSampleLevel(light_textures, texture_sampler, in.uv, cloud_variants[variant].light_layer, level) * LIGHT_SCALE;
+    // The lighting textures have half as many texels along a side.
+    let texel_light = textureSampleLevel(light_textures, texture_sampler, in.uv, cloud_variants[variant].light_layer, level - 1.0);
+    let stored = LIGHT_SCALE * signed_texel(texel_light);
     let side = in.right * stored.x + in.up * stored.y + in.front * stored.z;
     // The second band is not relative to the mean here.
     let band = side / max(stored.w, 1e-3);

@@ -7,6 +7,7 @@
 #import canopy::instance::{Instance, view, trees, visible, variants, unpack_tree, rotate, plant_vertex_position, rotated_vertex_position, level_distance, level_threshold, tint_foliage, tint_level, with_indirect_ambient, is_published, Crown, crown_of, depth_in_crown}
 #import canopy::lighting::{Surface, shade_leaves, even_sky, leaf_transmission}
 #import canopy::output::finish
+#import canopy::signed_texel::signed_texel
 #import canopy::sky::sky_transfer
 #import canopy::stand::{stand_light, in_stand_by_transfer}
 #import canopy::sun_visibility::{sample_ground, relief_at, cascaded_visibility}
@@ -18,7 +19,7 @@
 @group(2) @binding(0) var color_textures: texture_2d_array<f32>;
 @group(2) @binding(1) var property_textures: texture_2d_array<f32>;
 @group(2) @binding(2) var texture_sampler: sampler;
-// How much of the sun's light the leaves show, two layers a plane: src/bake/levels/cross/sun.rs.
+// How much of the sun's light the leaves show: src/bake/levels/cross/sun.rs. Two layers a plane; four, of two values each, if it is in blocks.
 @group(2) @binding(4) var sun_textures: texture_2d_array<f32>;
 #ifdef TRANSFER
 // How the light of the sky reaches the leaves: src/bake/levels/cross/light.rs.
@@ -247,6 +248,18 @@ fn sunlight(texel: vec4<f32>, more: vec4<f32>, sun: vec3<f32>) -> f32 {
     return max(SUN_SCALE * (dot(texel, basis) + dot(more, more_basis)), 0.0);
 }
 
+// The first or second four coefficients of the sun's light.
+fn sun_texel(seen: Seen, half: u32) -> vec4<f32> {
+#ifdef SUN_PAIRS
+    let layer = 4u * seen.layer + 2u * half;
+    let first = textureSampleLevel(sun_textures, texture_sampler, seen.uv, layer, seen.mip).rg;
+    let second = textureSampleLevel(sun_textures, texture_sampler, seen.uv, layer + 1u, seen.mip).rg;
+    return signed_texel(vec4(first, second));
+#else
+    return signed_texel(textureSampleLevel(sun_textures, texture_sampler, seen.uv, 2u * seen.layer + half, seen.mip));
+#endif
+}
+
 #ifdef DEPTH_FIRST
 // Depth alone, with the alpha test of the light that follows.
 @fragment
@@ -317,7 +330,7 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
     var visibility = relief.key;
 #ifdef TRANSFER
     let light_layer = cross_variants[variant].first_light_layer + seen.layer - cross_variants[variant].first_layer;
-    let stored = textureSampleLevel(light_textures, texture_sampler, seen.uv, light_layer, seen.mip) * LIGHT_SCALE;
+    let stored = LIGHT_SCALE * signed_texel(textureSampleLevel(light_textures, texture_sampler, seen.uv, light_layer, seen.mip));
     let side = axes.right * stored.x + axes.up * stored.y + axes.front * stored.z;
     // The second band is not relative to the mean here.
     let open = sky_transfer(stored.w, side);
@@ -339,8 +352,8 @@ fn fragment(in: Varying) -> @location(0) vec4<f32> {
         let cascades = cascaded_visibility(entry, light.key_direction, 0.25, in.clip.xy);
         visibility *= mix(mix(1.0, stand.key_transmittance, foliage), cascades.visibility, cascades.weight);
     }
-    let sun = textureSampleLevel(sun_textures, texture_sampler, seen.uv, 2u * seen.layer, seen.mip);
-    let more_sun = textureSampleLevel(sun_textures, texture_sampler, seen.uv, 2u * seen.layer + 1u, seen.mip);
+    let sun = sun_texel(seen, 0u);
+    let more_sun = sun_texel(seen, 1u);
     let to_light = light.key_direction;
     let in_plane = vec3(dot(to_light, axes.right), dot(to_light, axes.up), dot(to_light, axes.front));
     var lit = sunlight(sun, more_sun, select(in_plane, in_plane.xzy, (in.layers.w & LEVEL) != 0u));

@@ -11,6 +11,7 @@ pub struct MipChain {
     pub height: u32,
     /// The levels from full size down to 1x1. Level `n` holds [`MipChain::level_size`]`(n)` texels of 4 bytes,
     /// row by row from the top.
+    #[serde(with = "super::byte_lists")]
     pub levels: Vec<Vec<u8>>,
 }
 

@@ -8,6 +8,7 @@
 //! | [`hash`] | random numbers that depend only on a seed, an index and a stream |
 //! | [`quadrature`] | Gauss-Legendre nodes, directions and solid angles that integrate over the sphere |
 //! | [`octahedral`] | unit vectors in two coordinates |
+//! | [`byte_lists`] | lists of bytes for `serde` |
 //! | [`cholesky`](mod@cholesky) | small systems of linear equations |
 //! | [`color`] | sRGB, luminance, 8-bit codes |
 //! | [`color_matching`](mod@color_matching) | from spectra to linear colours |
@@ -20,6 +21,7 @@
 //! | [`names`] | the name that a misspelt one was meant to be |
 //! | [`range`] | the range, steps and unit of a number that people set |
 
+pub mod byte_lists;
 pub mod cholesky;
 pub mod color;
 pub mod color_matching;

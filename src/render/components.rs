@@ -32,7 +32,7 @@ use crate::{
 
 use super::camera_style::follow_palettes;
 pub use super::camera_style::{CanopyStyle, DrawnStyle};
-pub use crate::bake::lighting::SunLight;
+pub use crate::bake::{levels::texture::Compression, lighting::SunLight};
 
 /// The tone curve for which Canopy's light is made: from the camera's exposed radiance to display values.
 pub const TONEMAPPING: Tonemapping = Tonemapping::BlenderFilmic;
@@ -228,6 +228,12 @@ pub enum ForestUpdates {
     Spread,
 }
 
+/// Which devices get the textures of crossed billboards and billboard clouds block-compressed. A change counts for forests that are
+/// new or have other trees or shapes than before.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Resource, Default)]
+pub struct TextureCompression(pub Compression);
+
 /// Settings of the shadow maps of sun and moon, on the entity of the [`Sun`](crate::components::Sun), which requires
 /// it.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
@@ -353,10 +359,11 @@ impl Plugin for ComponentsPlugin {
         .register_type::<(CanopyCamera, CanopyOrigin, SunShadowSettings, ViewOptions, CastsCanopyShadow)>()
         .register_type::<CameraOpenness>()
         .register_type::<(Forest, Ground, GroundDrape, TreeLists, CanopyStyle)>()
-        .register_type::<(LightUpdates, ForestUpdates)>()
+        .register_type::<(LightUpdates, ForestUpdates, TextureCompression)>()
         .init_resource::<CanopyOrigin>()
         .init_resource::<LightUpdates>()
         .init_resource::<ForestUpdates>()
+        .init_resource::<TextureCompression>()
         .init_resource::<TreeLists>()
         .add_systems(PostUpdate, follow_palettes);
     }

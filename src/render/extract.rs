@@ -25,7 +25,7 @@ use glam::{DVec3, Quat, Vec3};
 
 use super::components::{
     CanopyCamera, CanopyOrigin, CastsCanopyShadow, Daylight, Forest, ForestUpdates, Ground, LightUpdates,
-    SunShadowSettings, TreeLists,
+    SunShadowSettings, TextureCompression, TreeLists,
 };
 
 /// The data of the main world for a frame.
@@ -53,6 +53,8 @@ pub struct ExtractedScene {
     pub shadow: SunShadowSettings,
     /// How the lists of trees are made.
     pub tree_lists: TreeLists,
+    /// Whether textures of forests that are new are block-compressed.
+    pub texture_compression: TextureCompression,
 }
 
 /// The components that decide where an entity is drawn, and whether.
@@ -67,11 +69,12 @@ pub fn extract_scene(
     grounds: Extract<Query<(Entity, &Ground, Placed)>>,
     casters: Extract<Query<(Entity, &Mesh3d, &GlobalTransform), With<CastsCanopyShadow>>>,
     mut changes: Extract<MessageReader<AssetEvent<Mesh>>>,
-    (daylight, light_updates, forest_updates, tree_lists): (
+    (daylight, light_updates, forest_updates, tree_lists, compression): (
         Extract<Option<Res<Daylight>>>,
         Extract<Option<Res<LightUpdates>>>,
         Extract<Option<Res<ForestUpdates>>>,
         Extract<Option<Res<TreeLists>>>,
+        Extract<Option<Res<TextureCompression>>>,
     ),
     shadows: Extract<Query<(Entity, &SunShadowSettings)>>,
     lights: Extract<Query<&DirectionalLight>>,
@@ -101,6 +104,7 @@ pub fn extract_scene(
     scene.ground = ground.map(|(entity, ground, placed)| (entity, ground.clone(), translation(placed.0)));
     scene.daylight = daylight.as_deref().cloned();
     scene.tree_lists = tree_lists.as_deref().copied().unwrap_or_default();
+    scene.texture_compression = compression.as_deref().copied().unwrap_or_default();
     scene.light_updates = light_updates.as_deref().copied().unwrap_or_default();
     scene.forest_updates = forest_updates.as_deref().copied().unwrap_or_default();
     let mut meshes: Vec<_> = casters.iter().collect();

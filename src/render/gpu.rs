@@ -152,7 +152,7 @@ pub fn levels_down_to(mips: &MipView, smallest: u32) -> usize {
     wanted.min(mips.levels.len().max(1))
 }
 
-/// An array of `layers` RGBA8 layers with room for mip chains of the size of `first`, down to `smallest` texels.
+/// An array of `layers` layers with room for mip chains of the size of `first`, down to `smallest` texels.
 pub fn empty_texture_array(
     device: &RenderDevice,
     label: &str,
@@ -180,30 +180,56 @@ pub fn level_size(texture: &Texture, level: u32) -> (u32, u32) {
     ((texture.width() >> level).max(1), (texture.height() >> level).max(1))
 }
 
-/// Writes all levels that an RGBA8 `texture` has of `mips` into one of its layers; levels of another size are skipped.
+/// How the bytes of a texture's level are arranged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LevelRows {
+    /// Rows; of blocks, if the texture is compressed.
+    pub count: u32,
+    /// Bytes of a row.
+    pub bytes: usize,
+    /// Rows of texels in a row.
+    pub texels: u32,
+}
+
+impl LevelRows {
+    /// Those of `level` in `texture`.
+    pub fn new(texture: &Texture, level: u32) -> Self {
+        let ((width, height), format) = (level_size(texture, level), texture.format());
+        let (across, down) = format.block_dimensions();
+        let block = format.block_copy_size(None).unwrap_or(4);
+        let bytes = width.div_ceil(across) as usize * block as usize;
+        Self { count: height.div_ceil(down), bytes, texels: down }
+    }
+
+    /// Bytes of all rows.
+    pub fn total(&self) -> usize {
+        self.count as usize * self.bytes
+    }
+}
+
+/// Writes all levels that `texture` has of `mips` into one of its layers; levels of another size are skipped.
 pub fn write_layer(queue: &RenderQueue, texture: &Texture, layer: u32, mips: &MipView) {
-    for (level, texels) in (0..texture.mip_level_count()).zip(&mips.levels) {
-        let (width, height) = level_size(texture, level);
-        if texels.len() == (width * height * 4) as usize {
-            write_rows(queue, texture, layer, level, 0, texels);
+    for (level, bytes) in (0..texture.mip_level_count()).zip(&mips.levels) {
+        if bytes.len() == LevelRows::new(texture, level).total() {
+            write_rows(queue, texture, layer, level, 0, bytes);
         }
     }
 }
 
-/// Writes whole rows of a level of an RGBA8 `texture`, from the row `top` downwards.
-pub fn write_rows(queue: &RenderQueue, texture: &Texture, layer: u32, level: u32, top: u32, texels: &[u8]) {
-    let (width, _) = level_size(texture, level);
-    let height = (texels.len() / (width as usize * 4)) as u32;
+/// Writes whole [rows](LevelRows) of a level of `texture`, from the row `top` downwards.
+pub fn write_rows(queue: &RenderQueue, texture: &Texture, layer: u32, level: u32, top: u32, bytes: &[u8]) {
+    let rows = LevelRows::new(texture, level);
+    let ((width, _), count) = (level_size(texture, level), (bytes.len() / rows.bytes.max(1)) as u32);
     queue.write_texture(
         TexelCopyTextureInfo {
             texture,
             mip_level: level,
-            origin: Origin3d { x: 0, y: top, z: layer },
+            origin: Origin3d { x: 0, y: top * rows.texels, z: layer },
             aspect: TextureAspect::All,
         },
-        texels,
-        TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(width * 4), rows_per_image: Some(height) },
-        Extent3d { width, height, depth_or_array_layers: 1 },
+        bytes,
+        TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(rows.bytes as u32), rows_per_image: Some(count) },
+        Extent3d { width, height: count * rows.texels, depth_or_array_layers: 1 },
     );
 }
 

@@ -58,6 +58,7 @@ macro_rules! shader_files {
 shader_files! {
     Hash = "common/hash.wgsl",
     Octahedral = "common/octahedral.wgsl",
+    SignedTexel = "common/signed_texel.wgsl",
     Frame = "common/frame.wgsl",
     Sky = "common/sky.wgsl",
     Stand = "common/stand.wgsl",

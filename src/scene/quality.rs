@@ -4,7 +4,7 @@ use bevy::reflect::Reflect;
 use serde::Deserialize;
 
 use super::check::Check;
-use crate::bake::levels::cross::MOST_UPRIGHTS;
+use crate::bake::levels::{cross::MOST_UPRIGHTS, texture::Compression};
 use crate::lod::{FadeBand, Levels, MAX_LEVELS, Representation};
 
 /// The representations that a scene file can name.
@@ -78,6 +78,10 @@ pub struct Quality {
     /// Upright planes of a cross, 1 to 8, each of which shows the tree from another side. More: outlines as the models have them,
     /// more memory, as many triangles. Default 4; fewer where a scene has so many plants that their textures have too many layers.
     pub cross_planes: u32,
+    /// Which devices get the textures of crosses and clouds block-compressed, a third of the memory at a small error: `Never`,
+    /// `WherePossible`, or `Automatic`, all that read such blocks but for software drivers, which are slower with them. Default
+    /// `Automatic`.
+    pub texture_compression: Compression,
     /// Distance in metres beyond which no tree is drawn, 100 to 200000. Default 20000.
     pub view_distance: f64,
     /// Greatest error of the drawn terrain in pixels, 0.25 to 32. Lower: more triangles. Default 1.
@@ -99,6 +103,7 @@ impl Default for Quality {
             msaa: 4,
             cross_resolution: 256,
             cross_planes: 4,
+            texture_compression: Compression::Automatic,
             view_distance: 20_000.0,
             terrain_error: 1.0,
         }

@@ -1,5 +1,8 @@
 //! The levels of detail of one plant, and what each of them is made of.
 
+use std::fmt::{self, Display, Formatter};
+use std::ops::Add;
+
 use glam::Vec3;
 
 use crate::{
@@ -20,12 +23,55 @@ pub struct LevelFacts {
     /// Triangles of a tree.
     pub triangles: usize,
     /// Bytes on the device of the plant in this level, the plant's own textures apart.
-    pub bytes: usize,
+    pub bytes: LevelBytes,
     /// Distance between a point of the plant and its image, metres, root mean square over the surface; `None` where
     /// pieces have vanished.
     pub deviation: Option<f32>,
     /// More lines about it.
     pub notes: Vec<String>,
+}
+
+/// Bytes of a level on the device.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LevelBytes {
+    /// With textures as texels.
+    pub plain: usize,
+    /// With textures in blocks.
+    pub in_blocks: usize,
+}
+
+impl LevelBytes {
+    /// Of meshes alone.
+    pub fn of_meshes(bytes: usize) -> Self {
+        Self { plain: bytes, in_blocks: bytes }
+    }
+
+    /// With textures that have as many bytes as `bytes` says, as texels or in blocks.
+    fn with_textures(self, bytes: impl Fn(bool) -> usize) -> Self {
+        Self { plain: self.plain + bytes(false), in_blocks: self.in_blocks + bytes(true) }
+    }
+}
+
+impl Add for LevelBytes {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { plain: self.plain + other.plain, in_blocks: self.in_blocks + other.in_blocks }
+    }
+}
+
+/// For people: both numbers where they differ.
+impl Display for LevelBytes {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { plain, in_blocks } = *self;
+        write!(f, "{}", bytes(plain))?;
+        if in_blocks == plain { Ok(()) } else { write!(f, " ({} in blocks)", bytes(in_blocks)) }
+    }
+}
+
+/// Bytes for people.
+fn bytes(count: usize) -> String {
+    if count < 1_000_000 { format!("{} kB", count.div_ceil(1000)) } else { format!("{:.1} MB", count as f64 / 1e6) }
 }
 
 /// The facts of the levels that `plant` has, from near to far.
@@ -44,7 +90,7 @@ pub fn facts(plant: &BakedPlant) -> Vec<LevelFacts> {
         representation: Representation::MODEL,
         title: "Full model",
         triangles: meshes().map(|mesh| mesh.triangles.len()).sum(),
-        bytes: meshes().map(mesh_bytes).sum::<usize>() + transfer(vertices, vertices) as usize,
+        bytes: LevelBytes::of_meshes(meshes().map(mesh_bytes).sum::<usize>() + transfer(vertices, vertices) as usize),
         deviation: Some(0.0),
         notes: Vec::new(),
     });
@@ -57,7 +103,7 @@ pub fn facts(plant: &BakedPlant) -> Vec<LevelFacts> {
             representation: Representation::THINNED,
             title: "Simplified model",
             triangles: thinned.triangles(),
-            bytes: reduced_bytes(thinned),
+            bytes: LevelBytes::of_meshes(reduced_bytes(thinned)),
             deviation: None,
             notes: vec!["fewer and larger leaves".to_owned()],
         });
@@ -68,7 +114,7 @@ pub fn facts(plant: &BakedPlant) -> Vec<LevelFacts> {
             representation: Representation::SURFACE,
             title: "Crown surface",
             triangles: wood + surface.mesh.triangles.len(),
-            bytes: mesh_bytes(&surface.mesh),
+            bytes: LevelBytes::of_meshes(mesh_bytes(&surface.mesh)),
             deviation: None,
             notes: vec![format!("{} triangles of foliage, for styles", grouped(surface.mesh.triangles.len()))],
         });
@@ -78,7 +124,8 @@ pub fn facts(plant: &BakedPlant) -> Vec<LevelFacts> {
             representation: Representation::CLOUD,
             title: "Billboard cloud",
             triangles: cloud.triangles(),
-            bytes: cloud.texture_bytes() + 64 * cloud.planes.len() + reduced_bytes(&cloud.wood),
+            bytes: LevelBytes::of_meshes(64 * cloud.planes.len() + reduced_bytes(&cloud.wood))
+                .with_textures(|in_blocks| cloud.texture_bytes(in_blocks)),
             deviation: Some(cloud.deviation),
             notes: vec![
                 format!("{} planes, {} triangles of wood", cloud.planes.len(), grouped(cloud.wood.triangles())),
@@ -91,7 +138,7 @@ pub fn facts(plant: &BakedPlant) -> Vec<LevelFacts> {
             representation: Representation::CROSS,
             title: "Crossed billboards",
             triangles: CROSS_VERTICES as usize / 3,
-            bytes: cross.texture_bytes(),
+            bytes: LevelBytes::default().with_textures(|in_blocks| cross.texture_bytes(in_blocks)),
             deviation: Some(deviation_of_cross(&plant.plant, cross)),
             notes: vec![format!("{} planes", cross.planes.len())],
         });
@@ -100,7 +147,7 @@ pub fn facts(plant: &BakedPlant) -> Vec<LevelFacts> {
 }
 
 /// Vertices of 20 bytes and indices of 4.
-fn mesh_bytes(mesh: &PlantMesh) -> usize {
+pub fn mesh_bytes(mesh: &PlantMesh) -> usize {
     20 * mesh.positions.len() + 12 * mesh.triangles.len()
 }
 

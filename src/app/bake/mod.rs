@@ -5,9 +5,9 @@ mod of_scene;
 mod sheet;
 mod studio;
 
-use std::{path::Path, sync::Arc, time::Instant};
+use std::{ops::Add, path::Path, sync::Arc, time::Instant};
 
-pub use levels::{LevelFacts, facts};
+pub use levels::{LevelBytes, LevelFacts, facts, mesh_bytes};
 pub use of_scene::bake_scene;
 pub use studio::{Side, Studio};
 
@@ -138,8 +138,8 @@ fn write(options: &BakeOptions, plant: &BakedPlant, rows: &[Row]) -> Result<(), 
         size.height,
         plant.plant.bounds().map_or(0.0, |bounds| bounds.size().x.max(bounds.size().z))
     );
-    let total: usize = rows.iter().skip(1).map(|row| row.facts.bytes).sum();
-    let chosen = format!("{}.   All levels behind the model: {:.1} MB", chosen(rows), total as f64 / 1e6);
+    let total = rows.iter().skip(1).map(|row| row.facts.bytes).fold(LevelBytes::default(), Add::add);
+    let chosen = format!("{}.   All levels behind the model: {total}", chosen(rows));
     let legend = "error: root mean square of linear light, relative to the full model's mean; cover, light, contrast: \
                   area, mean luminance and deviation in 8 × 8 pixels as fractions of the full model's with 64 samples a \
                   pixel; mean of the five sides";

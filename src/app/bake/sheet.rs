@@ -96,7 +96,7 @@ fn write_facts(writer: &Writer, sheet: &mut RgbImage, top: u32, row: &Row) {
         writer.write(sheet, (left, y), 19.0, color, text);
         y += 24.0;
     };
-    line(&format!("{} triangles, {}", grouped(facts.triangles), bytes(facts.bytes)), INK);
+    line(&format!("{} triangles, {}", grouped(facts.triangles), facts.bytes), INK);
     if let Some(deviation) = facts.deviation.filter(|deviation| *deviation > 0.0) {
         line(&format!("deviation {deviation:.2} m"), INK);
     }
@@ -119,11 +119,6 @@ fn write_facts(writer: &Writer, sheet: &mut RgbImage, top: u32, row: &Row) {
         }
         y += 21.0;
     }
-}
-
-/// Bytes for people.
-fn bytes(count: usize) -> String {
-    if count < 1_000_000 { format!("{} kB", count.div_ceil(1000)) } else { format!("{:.1} MB", count as f64 / 1e6) }
 }
 
 fn paper(sheet: &mut RgbImage, (left, top): (u32, u32), (width, height): (u32, u32)) {

@@ -4,7 +4,11 @@ use std::path::Path;
 
 use super::page::{Page, length};
 use crate::{
-    app::AppError,
+    app::{
+        AppError,
+        bake::{LevelBytes, mesh_bytes},
+    },
+    bake::{BakeSettings, lighting::LightingSettings},
     math::digits::grouped,
     plant::{
         PartKind, Plant,
@@ -68,7 +72,25 @@ pub(super) fn describe(page: &mut Page, plant: &Plant, warnings: &[Warning]) {
             ),
         );
     }
+    page.row("memory", memory(plant));
     for warning in &report.warnings {
         page.row("note", warning);
     }
+}
+
+/// Bytes of each level on the device with the default settings.
+fn memory(plant: &Plant) -> String {
+    let BakeSettings { lighting, cross, cloud, .. } = BakeSettings::default();
+    let model = plant.parts.iter().map(|part| {
+        let transfer = lighting.vertex_bytes(part.kind) * part.mesh.positions.len();
+        mesh_bytes(&part.mesh) + transfer
+    });
+    let of_transfer = matches!(lighting, LightingSettings::Transfer(_));
+    let textures = |bytes: &dyn Fn(bool) -> usize| LevelBytes { plain: bytes(false), in_blocks: bytes(true) };
+    format!(
+        "{} as a full model, its own textures apart\n{} as crossed billboards\n{} as a billboard cloud, its trunk apart",
+        LevelBytes::of_meshes(model.sum()),
+        textures(&|in_blocks| cross.texture_bytes(of_transfer, in_blocks)),
+        textures(&|in_blocks| cloud.texture_bytes(of_transfer, in_blocks)),
+    )
 }

@@ -86,7 +86,7 @@ fn levels(
     if let (Some(fade), Some(cross)) = (fade, plant.cross()) {
         let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(cross_mesh(cross));
         let images: Vec<&MipChain> =
-            shown(cross).into_iter().filter_map(|plane| cross.textures.color.get(plane)).collect();
+            shown(cross).into_iter().filter_map(|plane| Some(&cross.textures.color.get(plane)?.texels)).collect();
         let texture = add_texture(app, &atlas(&images), ImageAddressMode::ClampToEdge);
         let material = add_material(app, foliage(StandardMaterial { base_color_texture: Some(texture), ..matt() }));
         let range = VisibilityRange { start_margin: fade, end_margin: f32::MAX..f32::MAX, use_aabb: false };

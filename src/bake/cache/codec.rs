@@ -26,7 +26,7 @@ use crate::bake::lighting::BakedLighting;
 use crate::plant::Plant;
 
 /// Version of the format *and* of the bakes: to be raised whenever either gives other bytes for the same input.
-pub(super) const VERSION: u32 = 21;
+pub(super) const VERSION: u32 = 22;
 
 const MAGIC: [u8; 8] = *b"CANOPYBK";
 const HEAD: usize = 52;
@@ -102,6 +102,7 @@ mod tests {
     use super::*;
     use crate::bake::levels::LevelSet;
     use crate::bake::levels::cross::{Cross, CrossPlane, CrossTextures};
+    use crate::bake::levels::texture::{BlockEncoding, LevelTexture};
     use crate::bake::lighting::ExpressiveLighting;
     use crate::bake::lighting::TransferLighting;
     use crate::bake::lighting::implicit::{AmbientField, NoSurface};
@@ -118,7 +119,9 @@ mod tests {
             triangles: vec![[0, 1, 2]],
         };
         let part = PlantPart { kind: PartKind::Foliage, mesh: mesh.clone(), material: PlantMaterial::default() };
-        let chain = MipChain { width: 2, height: 2, levels: vec![(0..16).collect(), vec![1, 2, 3, 4]] };
+        let chain = MipChain { width: 4, height: 4, levels: vec![(0..64).collect(), vec![7; 16], vec![1, 2, 3, 4]] };
+        let whole = LevelTexture::compressed(chain.clone(), BlockEncoding::Whole);
+        let pairs = LevelTexture::compressed(chain, BlockEncoding::Pairs);
         let plane = CrossPlane { center: Vec3::ONE, u: Vec3::X, v: Vec3::Y, normal: Vec3::Z };
         BakedPlant {
             plant: Arc::new(Plant { name: "small".into(), parts: vec![part] }),
@@ -134,9 +137,9 @@ mod tests {
                 BakedLevel::Cross(Arc::new(Cross {
                     planes: vec![plane; 2],
                     textures: CrossTextures {
-                        color: vec![chain.clone(); 2],
-                        properties: vec![chain.clone(); 2],
-                        sun: vec![chain; 4],
+                        color: vec![whole.clone(); 2],
+                        properties: vec![whole; 2],
+                        sun: vec![pairs; 4],
                         light: Vec::new(),
                     },
                     transmission: Vec3::new(0.1, 0.2, 0.3),

@@ -8,6 +8,7 @@
 //! | [`crown_surface`] | wood, and the implicit surface of the foliage | [Luft 2006, 4.1] |
 //! | [`shadow_proxy`] | a lighter model with the same projected area, for shadows | [Cook et al. 2007] |
 //! | [`reduced`] | meshes in the light of the plant that they stand for | |
+//! | [`texture`] | the textures of crosses and clouds: texels, and blocks for devices that read them | |
 //! | [`rasterize`] | which triangle each sample of an image shows | |
 //!
 //! A bake for another representation is a module here, a variant of [`BakedLevel`] (at the end: the cache counts them),
@@ -20,6 +21,7 @@ mod level_set;
 pub mod rasterize;
 pub mod reduced;
 pub mod shadow_proxy;
+pub mod texture;
 pub mod thinned;
 mod tubes;
 

@@ -16,7 +16,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::plant::Plant;
+use crate::plant::{PartKind, Plant};
 use implicit::{AmbientField, ImplicitSettings, NoSurface, bake_implicit};
 use transfer::{
     INDIRECT_SUN_COEFFICIENTS, PackedPart, PackedTransfer, TransferFormat, TransferSettings, bake_transfer,
@@ -64,6 +64,22 @@ impl LightingSettings {
             Self::Local => Self::Local,
             Self::Expressive(settings) => Self::Expressive(settings.sanitized()),
             Self::Transfer(settings) => Self::Transfer(settings.sanitized()),
+        }
+    }
+}
+
+/// How coefficients are stored.
+const TRANSFER_FORMAT: TransferFormat = TransferFormat::Snorm8;
+
+impl LightingSettings {
+    /// Bytes of baked radiance transfer of a vertex in a part of `kind`; 0 in another light.
+    pub fn vertex_bytes(&self, kind: PartKind) -> usize {
+        match self {
+            Self::Transfer(settings) => {
+                let sides = if kind == PartKind::Foliage { 2 } else { 1 };
+                TRANSFER_FORMAT.vertex_bytes(&settings.sanitized(), sides) + INDIRECT_SUN_COEFFICIENTS
+            }
+            Self::Local | Self::Expressive(_) => 0,
         }
     }
 }
@@ -184,7 +200,7 @@ impl BakedLighting {
                 Self::Expressive(ExpressiveLighting::new(baked.normals, baked.ambient, no_surface, settings))
             }
             LightingSettings::Transfer(settings) => {
-                let packed = bake_transfer(plant, settings).pack(TransferFormat::Snorm8);
+                let packed = bake_transfer(plant, settings).pack(TRANSFER_FORMAT);
                 Self::Transfer(TransferLighting::new(packed))
             }
         }

@@ -15,11 +15,13 @@ use bevy::{
     platform::collections::HashMap,
     render::{
         render_resource::{Buffer, BufferUsages},
+        renderer::RenderAdapterInfo,
         settings::WgpuLimits,
     },
 };
 
 use super::{
+    block_textures::why_texels,
     drawn_forests::{DrawnForest, DrawnForests},
     leaves::Leaves,
     pipelines::{LevelPipelines, targets},
@@ -371,6 +373,7 @@ pub fn prepare_forests(
     representations: Res<Representations>,
     pipelines: Res<LevelPipelines>,
     gpu: Gpu,
+    adapter: Res<RenderAdapterInfo>,
     report: Res<FrameReport>,
     told: Res<DrawnForests>,
     mut forests: ResMut<GpuForests>,
@@ -386,6 +389,8 @@ pub fn prepare_forests(
         }
         count <= limit
     };
+    let why_texels = why_texels(scene.texture_compression.0, &gpu.device, adapter.device_type);
+    let in_blocks = why_texels.is_none();
     let blocking = scene.forest_updates == ForestUpdates::Blocking;
     let mut budget = if blocking { u64::MAX } else { BYTES_PER_FRAME };
     let has_pipelines = |forest: &GpuForest| {
@@ -402,7 +407,8 @@ pub fn prepare_forests(
             forests.arriving.remove(entity);
             if !Arc::ptr_eq(&known.plants, &forest.plants) {
                 let mut writes = DeviceWrites::default();
-                known.relight(forest, &mut ForestUpload { gpu: &gpu, transfer: &mut transfer, writes: &mut writes });
+                let (transfer, writes) = (&mut *transfer, &mut writes);
+                known.relight(forest, &mut ForestUpload { gpu: &gpu, transfer, writes, in_blocks });
             }
             if known.forest.origin != forest.origin {
                 forests.generations += 1;
@@ -423,9 +429,8 @@ pub fn prepare_forests(
             None => {
                 forests.generations += 1;
                 let mut writes = DeviceWrites::default();
-                let mut upload = ForestUpload { gpu: &gpu, transfer: &mut transfer, writes: &mut writes };
-                let forest =
-                    GpuForest::new(forest, forests.generations, trees_per_buffer, &representations, &mut upload);
+                let upload = &mut ForestUpload { gpu: &gpu, transfer: &mut transfer, writes: &mut writes, in_blocks };
+                let forest = GpuForest::new(forest, forests.generations, trees_per_buffer, &representations, upload);
                 Arriving { forest, writes }
             }
         };
@@ -446,6 +451,11 @@ pub fn prepare_forests(
         plants: known.plants.clone(),
     };
     told.set(forests.iter().map(to_tell).collect());
+    match why_texels {
+        _ if forests.order.is_empty() => report.skipped("texture compression", "the world has no forest"),
+        Some(why) => report.skipped("texture compression", why),
+        None => report.ran("texture compression", "crosses and clouds in blocks"),
+    }
     if uploads.is_empty() {
         report.skipped("forest upload", "no forest is new");
     } else {

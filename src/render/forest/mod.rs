@@ -8,6 +8,7 @@
 //! Limits: at most 1,024 variants per forest; crosses for as many variants as a texture array has room for, three
 //! layers each, and clouds, one layer each; no motion vectors; one camera.
 
+mod block_textures;
 mod cloud_uniforms;
 mod draw;
 mod drawn_forests;

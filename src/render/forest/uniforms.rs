@@ -363,7 +363,9 @@ mod tests {
         // Crosses too: their texels' normals are those of leaves, whose visible side counts.
         let normals = |plant: &BakedPlant| -> Vec<[u8; 2]> {
             let textures = plant.cross().into_iter().flat_map(|cross| &cross.textures.properties);
-            textures.flat_map(|chain| chain.levels[0].chunks_exact(4).map(|texel| [texel[0], texel[1]])).collect()
+            textures
+                .flat_map(|texture| texture.texels.levels[0].chunks_exact(4).map(|texel| [texel[0], texel[1]]))
+                .collect()
         };
         assert!(normals(&own) == normals(&local) && normals(&half) != normals(&local));
         Ok(())

@@ -85,6 +85,8 @@ pub struct ForestUpload<'a, 'w> {
     pub transfer: &'a mut TransferLight,
     /// What is still to be written.
     pub writes: &'a mut DeviceWrites,
+    /// Whether textures that have blocks are uploaded in blocks.
+    pub in_blocks: bool,
 }
 
 impl ForestUpload<'_, '_> {
@@ -131,7 +133,7 @@ impl ForestUpload<'_, '_> {
         buffer
     }
 
-    /// A texture array of `layers` RGBA8 layers that `layer` finds in `owner`, with their mip chains down to `smallest`
+    /// A texture array of `layers` layers that `layer` finds in `owner`, with their mip chains in `format` down to `smallest`
     /// texels. All chains have the size of the first; levels of another size are skipped.
     pub fn texture_array<O: Clone + Send + Sync + 'static>(
         &mut self,
@@ -147,14 +149,13 @@ impl ForestUpload<'_, '_> {
         for index in 0..layers {
             let Some(mips) = layer(owner, index) else { continue };
             for (level, texels) in (0..texture.mip_level_count()).zip(mips.levels) {
-                let (width, height) = gpu::level_size(&texture, level);
-                let row = width as usize * 4;
-                if texels.len() != row * height as usize {
+                let rows = gpu::LevelRows::new(&texture, level);
+                if texels.len() != rows.total() {
                     continue;
                 }
-                let rows = (LARGEST_WRITE / row).max(1);
-                for top in (0..height).step_by(rows) {
-                    let bytes = top as usize * row..texels.len().min((top as usize + rows) * row);
+                let share = (LARGEST_WRITE / rows.bytes).max(1);
+                for top in (0..rows.count).step_by(share) {
+                    let bytes = top as usize * rows.bytes..texels.len().min((top as usize + share) * rows.bytes);
                     let (target, owner) = (texture.clone(), owner.clone());
                     self.writes.add(bytes.len() as u64, move |queue| {
                         let mips = layer(&owner, index);

@@ -37,6 +37,8 @@ use super::cross::{self, ISOTROPIC_LEVELS, Shader, Texel, color, light, properti
 use super::rasterize::{Raster, View, surfaces};
 use super::reduced::{ReducedPart, ReducedPlant};
 use super::shadow_proxy::calibrate;
+use super::texture::BlockEncoding::Whole;
+use super::texture::{LevelTexture, square_block_bytes, square_texel_bytes};
 use super::tubes::{self, TubeSettings};
 use crate::bake::lighting::BakedLighting;
 use crate::math::MipChain;
@@ -79,16 +81,24 @@ pub struct CloudPlane {
     pub texture_max: Vec2,
 }
 
-/// The atlases of a cloud, square and of one size. Contents and encoding are those of
+/// The atlases of a cloud, square. Contents and encoding are those of
 /// [`CrossTextures`](cross::CrossTextures); directions are in the frame of the plane.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CloudTextures {
     /// Base colour and alpha.
-    pub color: MipChain,
+    pub color: LevelTexture,
     /// Normal, ambient occlusion, share of foliage.
-    pub properties: MipChain,
-    /// Transfer of the sky's light, for plants that are lit by it.
-    pub light: Option<MipChain>,
+    pub properties: LevelTexture,
+    /// Transfer of the sky's light, for plants that are lit by it, with half as many texels along a side: it changes little within
+    /// a leaf.
+    pub light: Option<LevelTexture>,
+}
+
+impl CloudTextures {
+    fn all(&self) -> impl Iterator<Item = &LevelTexture> {
+        let Self { color, properties, light } = self;
+        [color, properties].into_iter().chain(light)
+    }
 }
 
 /// Mips of an atlas. In coarser ones neighbours would mix.
@@ -105,7 +115,7 @@ pub struct CloudSettings {
     /// How pieces are clustered into planes.
     pub clustering: Clustering,
     /// Edge of the atlas in texels, 128..=4096, rounded up to a power of two. Memory grows with the square (1024: 11 MB
-    /// per plant, 17 MB with transfer).
+    /// per plant, 13 MB with transfer; a quarter of it in blocks).
     pub resolution: u32,
     /// Samples per texel along each axis, 1..=8.
     pub supersampling: u32,
@@ -169,13 +179,16 @@ impl Cloud {
                 && plane.texture_min.is_finite()
                 && plane.texture_max.is_finite()
         };
-        let size = (color.width, color.height, color.levels.len());
+        let size = |texture: &LevelTexture| {
+            let MipChain { width, height, ref levels } = texture.texels;
+            (width, height, levels.len())
+        };
+        let (width, height, levels) = size(color);
         self.planes.iter().all(finite)
             && light.is_some() == of_transfer
-            && [Some(color), Some(properties), light.as_ref()]
-                .into_iter()
-                .flatten()
-                .all(|chain| chain.is_whole() && (chain.width, chain.height, chain.levels.len()) == size)
+            && size(properties) == (width, height, levels)
+            && light.as_ref().is_none_or(|light| size(light) == (width / 2, height / 2, levels.saturating_sub(1)))
+            && self.textures.all().all(LevelTexture::is_whole)
             && self.wood.fits(plant)
             && self.transmission.is_finite()
             && self.isotropic_fraction.iter().all(|share| (0.0..=1.0).contains(share))
@@ -188,17 +201,15 @@ impl Cloud {
         2 * self.planes.len() + self.wood.triangles()
     }
 
-    /// Bytes of the textures.
-    pub fn texture_bytes(&self) -> usize {
-        let CloudTextures { color, properties, light } = &self.textures;
-        let chains = [Some(color), Some(properties), light.as_ref()].into_iter().flatten();
-        chains.flat_map(|chain| &chain.levels).map(Vec::len).sum()
+    /// Bytes of the textures, in blocks or as texels.
+    pub fn texture_bytes(&self, in_blocks: bool) -> usize {
+        self.textures.all().map(|texture| texture.bytes(in_blocks)).sum()
     }
 
     /// The cloud of `plant` as a plant: its wood, and a part of foliage with the planes. For tracers and measurements.
     pub fn plant(&self, plant: &Plant) -> Plant {
         let mut drawn = self.wood.plant(plant);
-        let color = &self.textures.color;
+        let color = &self.textures.color.texels;
         let atlas = color
             .levels
             .first()
@@ -213,6 +224,18 @@ impl Cloud {
             },
         });
         drawn
+    }
+}
+
+impl CloudSettings {
+    /// Bytes of the textures that [`bake_cloud`] makes, in blocks or as texels, of a plant that is lit by radiance transfer or not.
+    pub fn texture_bytes(self, of_transfer: bool, in_blocks: bool) -> usize {
+        let (edge, levels) = (self.sanitized().resolution, LEVELS as u32);
+        let bytes = |edge, levels| match in_blocks {
+            true => square_block_bytes(edge, levels, Whole),
+            false => square_texel_bytes(edge, levels),
+        };
+        2 * bytes(edge, levels) + if of_transfer { bytes(edge / 2, levels - 1) } else { 0 }
     }
 }
 
@@ -256,6 +279,7 @@ pub fn bake_cloud(plant: &Plant, lighting: &BakedLighting, settings: &CloudSetti
         let color = color_atlas(&texels, &cells, &probe);
         let planes =
             cells.iter().zip(&sheets).map(|(cell, sheet)| atlas::plane(sheet, cell, probe.resolution)).collect();
+        let color = LevelTexture::plain(color);
         let textures = CloudTextures { properties: color.clone(), color, light: None };
         let cloud = Cloud {
             planes,
@@ -277,9 +301,9 @@ pub fn bake_cloud(plant: &Plant, lighting: &BakedLighting, settings: &CloudSetti
     let of_transfer = matches!(lighting, BakedLighting::Transfer(_));
     let light = of_transfer.then(|| light::mips(&whole, edge as usize));
     let textures = CloudTextures {
-        color: color_atlas(&texels, &cells, &settings),
-        properties: first_levels(properties),
-        light: light.map(first_levels),
+        color: LevelTexture::compressed(color_atlas(&texels, &cells, &settings), Whole),
+        properties: LevelTexture::compressed(first_levels(properties), Whole),
+        light: light.map(|light| LevelTexture::compressed(without_finest(first_levels(light)), Whole)),
     };
     Cloud {
         planes: cells.iter().zip(&sheets).map(|(cell, sheet)| atlas::plane(sheet, cell, edge)).collect(),
@@ -403,6 +427,12 @@ fn first_levels(mut chain: MipChain) -> MipChain {
     chain
 }
 
+/// The texture of half the size.
+fn without_finest(chain: MipChain) -> MipChain {
+    let (width, height) = chain.level_size(1);
+    MipChain { width, height, levels: chain.levels.into_iter().skip(1).collect() }
+}
+
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
@@ -424,7 +454,9 @@ mod tests {
             let cloud = bake_cloud(&plant, &BakedLighting::Local, &small());
             assert!(cloud.fits(&plant, false) && !cloud.fits(&plant, true));
             assert!((20..=40).contains(&cloud.planes.len()) && cloud.triangles() <= 130, "{}", cloud.triangles());
-            assert!(cloud.texture_bytes() < 256 * 256 * 11);
+            for in_blocks in [false, true] {
+                assert_eq!(cloud.texture_bytes(in_blocks), small().texture_bytes(false, in_blocks));
+            }
             assert!((0.8..3.0).contains(&cloud.leaf_scale), "{}", cloud.leaf_scale);
             let bounds = plant.bounds().ok_or("no bounds")?;
             assert!(cloud.deviation > 0.0 && cloud.deviation < 0.1 * bounds.size().length());

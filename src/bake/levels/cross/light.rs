@@ -29,7 +29,7 @@ use super::{Texel, signed_mips::signed_mips};
 use crate::bake::lighting::{BakedLighting, transfer::INDIRECT_SUN_COEFFICIENTS};
 use crate::math::MipChain;
 
-/// The value of a code of 127. An unoccluded side has a first coefficient of 0.282 and a vector of length 0.326.
+/// The value of a byte of 255. An unoccluded side has a first coefficient of 0.282 and a vector of length 0.326.
 pub const LIGHT_SCALE: f32 = 0.4;
 
 /// The first two bands of the transfer of a vertex in the plant's frame: the vector, and in w the first coefficient.
@@ -129,7 +129,7 @@ mod tests {
             let vector = frame.transpose() * Vec3::new(-luminance(sky[1]), luminance(sky[2]), -luminance(sky[3]));
             let (mut error, mut error_by_ambient, mut square) = (0.0, 0.0, 0.0);
             for (at, (texel, truth)) in texels.iter().zip(&truth).enumerate().filter(|(_, (t, _))| t.foliage > 0.0) {
-                let code = |i: usize| f32::from(codes.levels[0][4 * at + i] as i8) / 127.0 * LIGHT_SCALE;
+                let code = |i: usize| (f32::from(codes.levels[0][4 * at + i]) - 128.0) / 127.0 * LIGHT_SCALE;
                 let got = (luminance(sky[0]) * code(3) + vector.dot(Vec3::new(code(0), code(1), code(2)))).max(0.0);
                 let wanted = truth.light.w / truth.coverage;
                 let normal = frame * texel.normal.try_normalize().unwrap_or(Vec3::Z);
@@ -158,10 +158,13 @@ mod tests {
         let code = |value| code(value, LIGHT_SCALE);
         let expected = [0.2, -0.4, 0.0, 0.1].map(code);
         assert!(chain.levels.iter().flat_map(|level| level.chunks_exact(4)).all(|texel| texel == expected));
-        assert_eq!([0.4, -0.4, 9.0, f32::NAN].map(|v| code(v) as i8), [127, -127, 127, 0]);
+        assert_eq!([0.4, -0.4, 9.0, f32::NAN].map(code), [255, 1, 255, 128]);
         let open = mips(&[Texel::default(); 4], 2);
         assert!(
-            open.levels.iter().flat_map(|level| level.chunks_exact(4)).all(|texel| texel == [0, 0, 0, code(0.282)])
+            open.levels
+                .iter()
+                .flat_map(|level| level.chunks_exact(4))
+                .all(|texel| texel == [128, 128, 128, code(0.282)])
         );
     }
 

@@ -22,7 +22,7 @@ mod signed_mips;
 mod sun;
 
 pub use light::LIGHT_SCALE;
-pub use sun::SUN_SCALE;
+pub use sun::{SUN_SCALE, basis as sun_basis};
 
 use std::sync::Arc;
 
@@ -32,8 +32,10 @@ use serde::{Deserialize, Serialize};
 
 use self::{light::VertexLight, properties::IsotropicSum};
 use super::rasterize::{Hit, Raster, View};
+use super::texture::BlockEncoding::{Pairs, Whole};
+use super::texture::{LevelTexture, square_block_bytes, square_texel_bytes};
 use crate::bake::lighting::{AmbientTerm, BakedLighting};
-use crate::math::{MipChain, hash::mix32, luminance};
+use crate::math::{hash::mix32, luminance};
 use crate::plant::{Bounds, PartKind, Plant, PlantMaterial, geometry, texture::AlphaFade};
 
 /// Crossed billboards of one plant.
@@ -61,14 +63,12 @@ impl Cross {
     /// Area that the plant hides from above, m²: that of the level plane's outline.
     pub fn area_from_above(&self) -> f32 {
         let (Some(plane), Some(color)) = (self.planes.last(), self.textures.color.last()) else { return 0.0 };
-        4.0 * plane.u.length() * plane.v.length() * color.coverage(0, 0.5)
+        4.0 * plane.u.length() * plane.v.length() * color.texels.coverage(0, 0.5)
     }
 
-    /// Bytes of all textures.
-    pub fn texture_bytes(&self) -> usize {
-        let CrossTextures { color, properties, sun, light } = &self.textures;
-        let chains = color.iter().chain(properties).chain(sun).chain(light);
-        chains.flat_map(|chain| &chain.levels).map(Vec::len).sum()
+    /// Bytes of all textures, in blocks or as texels.
+    pub fn texture_bytes(&self, in_blocks: bool) -> usize {
+        self.textures.all().map(|texture| texture.bytes(in_blocks)).sum()
     }
 
     /// Whether the lists go together, of a plant that is lit by radiance transfer or not, and all values are in their
@@ -81,7 +81,7 @@ impl Cross {
             && (2..=MOST_UPRIGHTS as usize + 1).contains(&planes)
             && [color.len(), properties.len(), sun.len()] == [planes, planes, 2 * planes]
             && light.len() == if of_transfer { planes } else { 0 }
-            && color.iter().chain(properties).chain(sun).chain(light).all(MipChain::is_whole)
+            && self.textures.all().all(LevelTexture::is_whole)
             && self.transmission.is_finite()
             && self.isotropic_fraction.iter().all(|share| (0.0..=1.0).contains(share))
     }
@@ -127,25 +127,32 @@ pub struct CrossTextures {
     /// Base colour: sRGB-encoded RGB, to be drawn with an alpha test at 0.5 or above. At 0.5 the outline covers what
     /// the full model covers (in every mip); towards 1 the crown vanishes in the order of [`CrossSettings::fade`]
     /// ([`crate::plant::texture::fade_alpha`]), without popping. Colours are dilated.
-    pub color: Vec<MipChain>,
+    pub color: Vec<LevelTexture>,
     /// RG: the normal, octahedral [Cigolle et al. 2014, "A Survey of Efficient Representations for Independent Unit
     /// Vectors"; Bevy's `octahedral_decode`], **in the plane's frame** (x right, y up, z to the front): decode, flip
     /// z where the plane is seen from behind, then multiply with [`CrossPlane::frame`]. In that frame the seam of
     /// the encoding lies behind the plane, where no normal points, so the texture can be filtered.
     /// B: ambient term (ambient occlusion). A: fraction of foliage (1 leaf, 0 wood), the weight of transmission.
     /// Linear 8 bit; texels outside the outline continue those inside.
-    pub properties: Vec<MipChain>,
-    /// The sun's light, two textures per plane: signed bytes, of which 127 stands for [`SUN_SCALE`], the coefficients of eight
+    pub properties: Vec<LevelTexture>,
+    /// The sun's light, two textures per plane: bytes, of which 128 stands for 0 and 255 for [`SUN_SCALE`], the coefficients of eight
     /// functions of the direction to the sun (the page of `sun.rs`) in the plane's frame, whose third axis is flipped
     /// like the normal's where the plane is seen from behind. The radiance of a texel under the sun is its base colour times
     /// what of it is reflected diffusely or comes through, times illuminance over pi, times their sum; and the gloss.
-    pub sun: Vec<MipChain>,
-    /// Radiance transfer of the sky's light, for plants that are lit by it; empty for others. Signed bytes, of which
-    /// 127 stands for [`LIGHT_SCALE`]. RGB: a vector in the plane's frame, whose third component is flipped like the
+    pub sun: Vec<LevelTexture>,
+    /// Radiance transfer of the sky's light, for plants that are lit by it; empty for others. Bytes, of which
+    /// 128 stands for 0 and 255 for [`LIGHT_SCALE`]. RGB: a vector in the plane's frame, whose third component is flipped like the
     /// normal's where the plane is seen from behind. A: the mean over all directions. The radiance of a texel under the
     /// sky is its base colour times `1 + transmission` times (mean times the sky's first coefficient, plus the vector's
     /// dot product with the sky's second band).
-    pub light: Vec<MipChain>,
+    pub light: Vec<LevelTexture>,
+}
+
+impl CrossTextures {
+    fn all(&self) -> impl Iterator<Item = &LevelTexture> {
+        let Self { color, properties, sun, light } = self;
+        color.iter().chain(properties).chain(sun).chain(light)
+    }
 }
 
 /// Settings of the crossed billboards. Values out of range are clamped.
@@ -155,7 +162,8 @@ pub struct CrossSettings {
     /// over their number. All trees draw as many triangles; memory and the time of the bake grow in proportion.
     pub uprights: u32,
     /// Edge of the square textures in texels, 64..=1024, rounded up to a power of two. Larger textures allow crosses
-    /// nearer to the viewer; memory grows with the square (256: 7.0 MB per plant, 8.7 MB if it is lit by transfer).
+    /// nearer to the viewer; memory grows with the square (256: 7.0 MB per plant, 8.7 MB if it is lit by transfer; in blocks 2.6
+    /// and 3.1).
     pub resolution: u32,
     /// Samples per texel along each axis, 1..=8. More give smoother colours and normals; time grows with the square.
     pub supersampling: u32,
@@ -189,6 +197,19 @@ impl CrossSettings {
     }
 }
 
+impl CrossSettings {
+    /// Bytes of the textures that [`bake_cross`] makes, in blocks or as texels, of a plant that is lit by radiance transfer or not.
+    pub fn texture_bytes(self, of_transfer: bool, in_blocks: bool) -> usize {
+        let Self { uprights, resolution, .. } = self.sanitized();
+        let (planes, levels) = (uprights as usize + 1, resolution.ilog2() + 1);
+        let bytes = |encoding| match in_blocks {
+            true => square_block_bytes(resolution, levels, encoding),
+            false => square_texel_bytes(resolution, levels),
+        };
+        planes * ((2 + usize::from(of_transfer)) * bytes(Whole) + 2 * bytes(Pairs))
+    }
+}
+
 /// Makes the crossed billboards of `plant` with the normals and the ambient term of its `lighting`; missing values are
 /// the plant's own, or 1. The planes cover the plant exactly; an empty plant gets planes without extent and wholly transparent textures.
 pub fn bake_cross(plant: &Arc<Plant>, lighting: &BakedLighting, settings: &CrossSettings) -> Cross {
@@ -205,10 +226,11 @@ pub fn bake_cross(plant: &Arc<Plant>, lighting: &BakedLighting, settings: &Cross
         .zip(&coefficients)
         .map(|(image, coefficients)| {
             let texels = &image.texels;
-            let properties = properties::mips(texels, resolution, settings.normal_smoothing);
-            let light = light.is_some().then(|| light::mips(texels, resolution));
-            let sun = sun::mips(image, coefficients, resolution);
-            (color::mips(texels, resolution, settings.fade), (properties, (sun, light)))
+            let (properties, isotropy) = properties::mips(texels, resolution, settings.normal_smoothing);
+            let light = light.is_some().then(|| LevelTexture::compressed(light::mips(texels, resolution), Whole));
+            let sun = sun::mips(image, coefficients, resolution).map(|sun| LevelTexture::compressed(sun, Pairs));
+            let color = LevelTexture::compressed(color::mips(texels, resolution, settings.fade), Whole);
+            (color, ((LevelTexture::compressed(properties, Whole), isotropy), (sun, light)))
         })
         .collect();
     let (color, rest): (Vec<_>, Vec<_>) = textures.into_iter().unzip();

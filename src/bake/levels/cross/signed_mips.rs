@@ -1,10 +1,10 @@
-//! Mips of four signed values a texel.
+//! Mips of four signed values a texel. The shaders read them by `signed_texel` in `shaders/common/signed_texel.wgsl`.
 
 use glam::Vec4;
 
 use crate::math::MipChain;
 
-/// Mips as signed bytes, of which 127 stands for `scale`; a texture of `resolution`² texels (a power of two) on top. Each
+/// Mips as bytes, of which 128 stands for 0 and 255 for `scale`; a texture of `resolution`² texels (a power of two) on top. Each
 /// value is a sum with its weight, the coverage. Means are weighted with it, from level to level in floating point; a texel
 /// of air has the value of the coarser level, and `empty` where there is no plant at all.
 pub(super) fn signed_mips(values: Vec<(Vec4, f32)>, resolution: usize, scale: f32, empty: Vec4) -> MipChain {
@@ -39,7 +39,7 @@ pub(super) fn signed_mips(values: Vec<(Vec4, f32)>, resolution: usize, scale: f3
     MipChain { width: resolution as u32, height: resolution as u32, levels: coded }
 }
 
-/// A value as a signed byte; 0 where it is not a number.
+/// A value as a byte, at least 1; 128, which is 0, where it is not a number.
 pub(super) fn code(value: f32, scale: f32) -> u8 {
-    ((value / scale).clamp(-1.0, 1.0) * 127.0).round() as i8 as u8
+    128u8.wrapping_add_signed(((value / scale).clamp(-1.0, 1.0) * 127.0).round() as i8)
 }

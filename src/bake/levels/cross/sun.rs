@@ -35,7 +35,7 @@ use crate::math::{MipChain, cholesky, hammersley};
 use crate::plant::Plant;
 use crate::trace::PlantTracer;
 
-/// The value of a code of 127. A leaf that faces the sun without any other has a first coefficient of 0.5 at most.
+/// The value of a byte of 255. A leaf that faces the sun without any other has a first coefficient of 0.5 at most.
 pub const SUN_SCALE: f32 = 0.5;
 
 /// Functions of the basis.

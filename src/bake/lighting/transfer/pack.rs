@@ -57,10 +57,12 @@ pub struct PackedPart {
     /// [`TransferFormat::Snorm8`]: what 127 stands for in each band, relative to c_0. Zero in the first band.
     pub scale: [f32; MAX_BANDS],
     /// Vertex by vertex.
+    #[serde(with = "serde_bytes")]
     pub bytes: Vec<u8>,
     /// What 127 stands for in `indirect_sun`.
     pub indirect_sun_scale: f32,
     /// [`TransferPart::indirect_sun`], a signed byte each, in any format.
+    #[serde(with = "serde_bytes")]
     pub indirect_sun: Vec<u8>,
 }
 

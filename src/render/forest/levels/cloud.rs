@@ -11,7 +11,7 @@ use bevy::{
         render_resource::{
             AddressMode, BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer,
             BufferUsages, FilterMode, FragmentState, MipmapFilterMode, RenderPipelineDescriptor, SamplerBindingType,
-            SamplerDescriptor, ShaderStages, Texture, TextureFormat, TextureSampleType, VertexState,
+            SamplerDescriptor, ShaderStages, Texture, TextureSampleType, VertexState,
             binding_types::{sampler, storage_buffer_read_only_sized, texture_2d_array},
         },
     },
@@ -25,13 +25,16 @@ use super::{
     reduced::{GpuReduced, Reduced},
 };
 use crate::{
-    bake::{BakedPlant, levels::cloud::Cloud},
+    bake::{
+        BakedPlant,
+        levels::{cloud::Cloud, texture::LevelTexture},
+    },
     cull::Grouping,
     lod::Representation,
-    math::{MipChain, MipView},
     render::{
         components::Forest,
         forest::{
+            block_textures::{TexelKind, rewrite, upload_textures},
             cloud_uniforms::{cloud_planes, cloud_variants},
             representation::{
                 DrawnTrees, ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight, TreeDraw, TreeVertices,
@@ -240,13 +243,11 @@ struct DrawnPlanes {
 impl DrawnPlanes {
     fn new(plants: &Arc<Vec<BakedPlant>>, upload: &mut ForestUpload) -> Self {
         let layers = if plants.iter().any(|plant| plant.cloud().is_some()) { plants.len() } else { 0 };
-        let mut texture = |label, format, of: fn(&Arc<Vec<BakedPlant>>, usize) -> Option<MipView<'_>>| {
-            upload.texture_array(label, format, layers, gpu::SMALLEST_TESTED_MIP, plants, of)
-        };
-        let (_, colors) = texture("canopy_cloud_color", TextureFormat::Rgba8UnormSrgb, |plants, index| {
+        let mut array = |label, kind, find| upload_textures(upload, label, kind, layers, plants, find);
+        let (_, colors) = array("canopy_cloud_color", TexelKind::Color, |plants, index| {
             layer(plants, index, |cloud| &cloud.textures.color)
         });
-        let (texture, properties) = texture("canopy_cloud_properties", TextureFormat::Rgba8Unorm, |plants, index| {
+        let (texture, properties) = array("canopy_cloud_properties", TexelKind::Linear, |plants, index| {
             layer(plants, index, |cloud| &cloud.textures.properties)
         });
         let gpu = upload.gpu;
@@ -335,8 +336,7 @@ impl GpuLevel for GpuClouds {
         let Some(drawn) = &mut self.drawn else { return };
         for (index, plant) in relight.new.iter().enumerate() {
             if let Some(cloud) = plant.cloud() {
-                let view = cloud.textures.properties.view();
-                gpu::write_layer(&upload.gpu.queue, &drawn.properties, index as u32, &view);
+                rewrite(upload, &drawn.properties, index as u32, &cloud.textures.properties);
             }
         }
         upload.gpu.queue.write_buffer(&drawn.variants, 0, bytemuck::cast_slice(&cloud_variants(relight.new)));
@@ -347,16 +347,16 @@ impl GpuLevel for GpuClouds {
 
 /// A layer, of one per plant, of the texture that `of` takes from a cloud. A plant without a cloud gets that of another one,
 /// which none of its planes shows.
-fn layer(plants: &[BakedPlant], index: usize, of: fn(&Cloud) -> &MipChain) -> Option<MipView<'_>> {
+fn layer(plants: &[BakedPlant], index: usize, of: fn(&Cloud) -> &LevelTexture) -> Option<&LevelTexture> {
     let own = plants.get(index)?.cloud();
     let cloud = own.or_else(|| plants.iter().find_map(BakedPlant::cloud));
-    cloud.map(|cloud| of(cloud).view())
+    cloud.map(|cloud| of(cloud))
 }
 
 /// A layer of the lighting textures, of those plants that have them.
-fn light_layer(plants: &[BakedPlant], index: usize) -> Option<MipView<'_>> {
+fn light_layer(plants: &[BakedPlant], index: usize) -> Option<&LevelTexture> {
     let clouds = plants.iter().filter_map(BakedPlant::cloud);
-    clouds.filter_map(|cloud| cloud.textures.light.as_ref()).nth(index).map(MipChain::view)
+    clouds.filter_map(|cloud| cloud.textures.light.as_ref()).nth(index)
 }
 
 /// The lighting textures, of those plants that have them.
@@ -366,15 +366,16 @@ fn upload_light(plants: &Arc<Vec<BakedPlant>>, upload: &mut ForestUpload) -> Opt
     if layers == 0 {
         return None;
     }
-    let (label, format) = ("canopy_cloud_light", TextureFormat::Rgba8Snorm);
-    let (_, view) = upload.texture_array(label, format, layers, gpu::SMALLEST_TESTED_MIP, plants, |plants, index| {
-        light_layer(plants, index)
-    });
+    let label = "canopy_cloud_light";
+    let (_, view) = upload_textures(upload, label, TexelKind::Linear, layers, plants, light_layer);
     Some(upload.gpu.bind_group(label, &light_layout(), &BindGroupEntries::single(&view)))
 }
 
 /// Whether clouds have the same planes, wood, colours and outlines. A bake with another lighting creates equal ones in
 /// other memory.
 fn same_outline(old: &Cloud, new: &Cloud) -> bool {
-    old.planes == new.planes && old.wood == new.wood && old.textures.color == new.textures.color
+    old.planes == new.planes
+        && old.wood == new.wood
+        && old.textures.color == new.textures.color
+        && old.textures.properties.shape() == new.textures.properties.shape()
 }

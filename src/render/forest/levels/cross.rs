@@ -11,8 +11,7 @@ use bevy::{
         render_resource::{
             AddressMode, BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer,
             BufferUsages, ColorWrites, FilterMode, FragmentState, MipmapFilterMode, RenderPipelineDescriptor,
-            SamplerBindingType, SamplerDescriptor, ShaderStages, Texture, TextureFormat, TextureSampleType,
-            VertexState,
+            SamplerBindingType, SamplerDescriptor, ShaderStages, Texture, TextureSampleType, VertexState,
             binding_types::{sampler, storage_buffer_read_only_sized, texture_2d_array},
         },
     },
@@ -22,13 +21,16 @@ use glam::Vec3;
 
 use super::not_baked::tell_not_baked;
 use crate::{
-    bake::{BakedPlant, levels::cross::Cross},
+    bake::{
+        BakedPlant,
+        levels::{cross::Cross, texture::LevelTexture},
+    },
     cull::Grouping,
     lod::Representation,
-    math::{MipChain, MipView},
     render::{
         components::Forest,
         forest::{
+            block_textures::{TexelKind, rewrite, upload_textures},
             representation::{
                 DEPTH_FIRST, DrawnTrees, ForestUpload, GpuLevel, LevelRenderer, LevelTarget, Relight, TreeDraw,
                 TreeVertices,
@@ -79,6 +81,9 @@ impl CrossLight {
         }
     }
 }
+
+/// The bit of the features that tells that the light of the sun is in blocks, two values a layer.
+const SUN_PAIRS: u32 = 1 << 8;
 
 /// Whether a plant's crosses have lighting textures.
 fn has_light(plant: &BakedPlant) -> bool {
@@ -151,7 +156,7 @@ impl LevelRenderer for CrossRenderer {
             );
             return Box::new(GpuCrosses { drawn: None });
         }
-        let (properties, sun, variants, bind_group) = upload_textures(plants, upload);
+        let (properties, sun, variants, bind_group) = upload_group(plants, upload);
         let (light, light_textures) = (CrossLight::of(plants), upload_light(plants, upload));
         let drawn = DrawnCrosses { properties, sun, variants, bind_group, light, light_textures };
         Box::new(GpuCrosses { drawn: Some(drawn) })
@@ -187,7 +192,10 @@ impl LevelRenderer for CrossRenderer {
                 ..Default::default()
             };
         };
-        let light = CrossLight::ALL[features as usize % CrossLight::ALL.len()];
+        let light = CrossLight::ALL[(features & !SUN_PAIRS) as usize % CrossLight::ALL.len()];
+        if features & SUN_PAIRS != 0 {
+            defs.push("SUN_PAIRS".into());
+        }
         if light != CrossLight::Plain {
             defs.push("TRANSFER".into());
             groups.push(light_layout());
@@ -232,7 +240,7 @@ struct GpuCrosses {
 struct DrawnCrosses {
     /// Normals, ambient occlusion (k_a) and foliage, a layer per plane.
     properties: Texture,
-    /// The light of the sun, two layers per plane.
+    /// The light of the sun: four values a layer and two layers a plane, or in blocks two values and four layers.
     sun: Texture,
     /// [`CrossVariantUniform`](crate::render::forest::CrossVariantUniform)s.
     variants: Buffer,
@@ -242,6 +250,13 @@ struct DrawnCrosses {
     light: CrossLight,
     /// Group 3, if some have lighting textures.
     light_textures: Option<BindGroup>,
+}
+
+impl DrawnCrosses {
+    fn features(&self) -> u32 {
+        let light = CrossLight::ALL.iter().position(|known| *known == self.light).unwrap_or(0) as u32;
+        if self.sun.format().is_compressed() { light | SUN_PAIRS } else { light }
+    }
 }
 
 /// The one draw call.
@@ -257,9 +272,7 @@ impl GpuLevel for GpuCrosses {
     fn features(&self, target: LevelTarget) -> Vec<u32> {
         match (&self.drawn, target) {
             (None, _) => Vec::new(),
-            (Some(drawn), LevelTarget::View(_)) => {
-                vec![CrossLight::ALL.iter().position(|known| *known == drawn.light).unwrap_or(0) as u32]
-            }
+            (Some(drawn), LevelTarget::View(_)) => vec![drawn.features()],
             (Some(_), LevelTarget::ShadowMap) => vec![0],
         }
     }
@@ -292,11 +305,11 @@ impl GpuLevel for GpuCrosses {
         for (index, (_, new)) in pairs().enumerate().filter(|(_, pair)| changed(pair)) {
             let Some(cross) = new.cross() else { continue };
             let first = variants.get(index).map_or(0, |variant| variant.first_layer);
-            for (layer, chain) in (first..).zip(&cross.textures.properties) {
-                gpu::write_layer(&upload.gpu.queue, &drawn.properties, layer, &chain.view());
+            for (layer, texture) in (first..).zip(&cross.textures.properties) {
+                rewrite(upload, &drawn.properties, layer, texture);
             }
-            for (layer, chain) in (first * SUN_LAYERS as u32..).zip(&cross.textures.sun) {
-                gpu::write_layer(&upload.gpu.queue, &drawn.sun, layer, &chain.view());
+            for (layer, texture) in (first * SUN_LAYERS as u32..).zip(&cross.textures.sun) {
+                rewrite(upload, &drawn.sun, layer, texture);
             }
         }
         upload.gpu.queue.write_buffer(&drawn.variants, 0, bytemuck::cast_slice(&variants));
@@ -308,7 +321,7 @@ impl GpuLevel for GpuCrosses {
     }
 }
 
-/// Layers of the sun's light per plane.
+/// Textures of the sun's light per plane.
 const SUN_LAYERS: usize = 2;
 
 /// Planes of all crosses.
@@ -317,38 +330,25 @@ fn plane_count(plants: &[BakedPlant]) -> usize {
 }
 
 /// A layer of the textures that `of` takes from the crosses, one cross after the other.
-fn layer(plants: &[BakedPlant], index: usize, of: fn(&Cross) -> &[MipChain]) -> Option<MipView<'_>> {
+fn layer(plants: &[BakedPlant], index: usize, of: fn(&Cross) -> &[LevelTexture]) -> Option<&LevelTexture> {
     let crosses = plants.iter().filter_map(BakedPlant::cross);
-    crosses.flat_map(|cross| of(cross)).nth(index).map(MipChain::view)
+    crosses.flat_map(|cross| of(cross)).nth(index)
 }
 
 /// The textures of all crosses' properties and of the sun's light, the data of each plant's crosses, and their bind group.
-fn upload_textures(plants: &Arc<Vec<BakedPlant>>, upload: &mut ForestUpload) -> (Texture, Texture, Buffer, BindGroup) {
-    let (layers, smallest) = (plane_count(plants), gpu::SMALLEST_TESTED_MIP);
-    let (_, colors) = upload.texture_array(
-        "canopy_cross_color",
-        TextureFormat::Rgba8UnormSrgb,
-        layers,
-        smallest,
-        plants,
-        |plants, index| layer(plants, index, |cross| &cross.textures.color),
-    );
-    let (property_texture, properties) = upload.texture_array(
-        "canopy_cross_properties",
-        TextureFormat::Rgba8Unorm,
-        layers,
-        smallest,
-        plants,
-        |plants, index| layer(plants, index, |cross| &cross.textures.properties),
-    );
-    let (sun_texture, sun) = upload.texture_array(
-        "canopy_cross_sun",
-        TextureFormat::Rgba8Snorm,
-        layers * SUN_LAYERS,
-        smallest,
-        plants,
-        |plants, index| layer(plants, index, |cross| &cross.textures.sun),
-    );
+fn upload_group(plants: &Arc<Vec<BakedPlant>>, upload: &mut ForestUpload) -> (Texture, Texture, Buffer, BindGroup) {
+    let layers = plane_count(plants);
+    let mut array = |label, kind, layers, find| upload_textures(upload, label, kind, layers, plants, find);
+    let (_, colors) = array("canopy_cross_color", TexelKind::Color, layers, |plants, index| {
+        layer(plants, index, |cross| &cross.textures.color)
+    });
+    let (property_texture, properties) =
+        array("canopy_cross_properties", TexelKind::Linear, layers, |plants, index| {
+            layer(plants, index, |cross| &cross.textures.properties)
+        });
+    let (sun_texture, sun) = array("canopy_cross_sun", TexelKind::Pairs, layers * SUN_LAYERS, |plants, index| {
+        layer(plants, index, |cross| &cross.textures.sun)
+    });
     let gpu = upload.gpu;
     let sampler = gpu.device.create_sampler(&SamplerDescriptor {
         label: Some("canopy_cross"),
@@ -375,8 +375,8 @@ fn upload_light(plants: &Arc<Vec<BakedPlant>>, upload: &mut ForestUpload) -> Opt
     if layers == 0 {
         return None;
     }
-    let (label, format) = ("canopy_cross_light", TextureFormat::Rgba8Snorm);
-    let (_, view) = upload.texture_array(label, format, layers, gpu::SMALLEST_TESTED_MIP, plants, |plants, index| {
+    let label = "canopy_cross_light";
+    let (_, view) = upload_textures(upload, label, TexelKind::Linear, layers, plants, |plants, index| {
         layer(plants, index, |cross| &cross.textures.light)
     });
     Some(upload.gpu.bind_group(label, &light_layout(), &BindGroupEntries::single(&view)))
@@ -385,9 +385,6 @@ fn upload_light(plants: &Arc<Vec<BakedPlant>>, upload: &mut ForestUpload) -> Opt
 /// Whether crosses have the same planes, colours and outlines. A bake with another lighting creates equal ones in other
 /// memory.
 fn same_outline(old: &Cross, new: &Cross) -> bool {
-    let sizes = |cross: &Cross| -> Vec<(u32, u32, usize)> {
-        let chains = cross.textures.properties.iter();
-        chains.map(|chain| (chain.width, chain.height, chain.levels.len())).collect()
-    };
+    let sizes = |cross: &Cross| -> Vec<_> { cross.textures.properties.iter().map(LevelTexture::shape).collect() };
     old.planes == new.planes && sizes(old) == sizes(new) && old.textures.color == new.textures.color
 }

@@ -50,7 +50,7 @@ mod tests {
         // A fresh proxy casts another shadow, other colours have another outline.
         assert!(!same_shape(&local, &fresh));
         let mut cross = (**fresh_cross).clone();
-        cross.textures.color[0].levels[0][3] ^= 0x80;
+        cross.textures.color[0].texels.levels[0][3] ^= 0x80;
         assert!(!same_shape(&local, &lit.clone().with_level(BakedLevel::Cross(Arc::new(cross)))));
         // Nor have a plant with a level and one without.
         assert!(!same_shape(&local, &BakedPlant { levels: Vec::new(), ..local.clone() }));
