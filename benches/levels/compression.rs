@@ -16,7 +16,6 @@ use canopy::lod::Representation;
 use canopy::math::MipChain;
 use canopy::measure::{Cutout, LevelError};
 use canopy::plant::Plant;
-use dds::{ColorFormat, DecodeOptions, Format, ImageViewMut, Size, decode};
 
 use super::planes::{HALVINGS, LARGEST, TRUTH, images};
 use super::trees;
@@ -31,30 +30,9 @@ fn baked(plant: Plant) -> BakedPlant {
     bake_plant(Arc::new(plant), &settings, Cache::of_user().as_ref()).0
 }
 
-/// What a device reads from the blocks of a texture: its finest mips.
+/// What a device reads from the blocks of a texture.
 fn decoded(texture: &LevelTexture, encoding: BlockEncoding) -> MipChain {
-    let format = if encoding == Whole { Format::BC7_UNORM } else { Format::BC5_UNORM };
-    let of_level = |level: usize| {
-        let (width, height) = texture.texels.level_size(level);
-        let set = |set: usize| {
-            let mut texels = vec![0; (width * height * 4) as usize];
-            let view = ImageViewMut::new(&mut texels, Size::new(width, height), ColorFormat::RGBA_U8);
-            let blocks = &mut &texture.blocks[set].0[level][..];
-            decode(blocks, view.expect("a texture of some size"), format, &DecodeOptions::default()).expect("blocks");
-            texels
-        };
-        if encoding == Whole {
-            return set(0);
-        }
-        let (first, second) = (set(0), set(1));
-        let both = first.as_chunks::<4>().0.iter().zip(second.as_chunks::<4>().0);
-        both.flat_map(|(a, b)| [a[0], a[1], b[0], b[1]]).collect()
-    };
-    let MipChain { width, height, ref levels } = texture.texels;
-    let known = (0..texture.blocks[0].0.len()).map(of_level);
-    // The mips below four texels are not drawn.
-    let rest = levels.iter().skip(texture.blocks[0].0.len()).cloned();
-    MipChain { width, height, levels: known.chain(rest).collect() }
+    texture.decoded(encoding).expect("blocks of this encoding")
 }
 
 /// Sums over texels.

@@ -1,4 +1,4 @@
-// Textures of signed values in bytes, of which 128 stands for 0 and 255 for 1: a device that reads blocks has them unsigned alone.
+// Signed values as unsigned bytes: 128 is 0, and 255 is 1. BC7 has no signed form, so all such textures are stored this way.
 // The Rust twin is src/bake/levels/cross/signed_mips.rs.
 #define_import_path canopy::signed_texel
 

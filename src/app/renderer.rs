@@ -35,7 +35,7 @@ use crate::{
     components::{Shown, Sun, SunRefresh},
     plugin::CanopyPlugins,
     render::{
-        components::{CanopyCamera, CanopyStyle, ForestUpdates, LightUpdates, SunShadowSettings, TextureCompression},
+        components::{CanopyCamera, CanopyStyle, ForestUpdates, LightUpdates, SunShadowSettings},
         forest::collect_view_counts,
         report::{FrameReport, PassOutcome},
         shaders::CanopyShaders,
@@ -158,7 +158,6 @@ impl Renderer {
     /// Shows `stage`: its ground, its forest, its quality.
     pub fn show(&mut self, stage: &Stage) {
         let world = self.app.world_mut();
-        world.insert_resource(TextureCompression(stage.scene.quality.texture_compression));
         self.shown = Some(stage.show(&mut world.commands()));
         world.flush();
         self.set_shadow(stage.shadow());

@@ -1,10 +1,10 @@
 //! Lists of bytes for `serde`, each written and read as a whole. As a list of numbers, `serde` reads byte by byte, which takes
-//! most of the time of a plant from the cache.
+//! most of the time of loading a plant from the cache.
 
 use serde::{Deserialize, Deserializer, Serializer};
 use serde_bytes::{ByteBuf, Bytes};
 
-/// Writes the lists; the same bytes as without this module, where a format does not tell bytes from numbers.
+/// Writes the lists; the same bytes as without this module, in formats that do not distinguish bytes from numbers.
 ///
 /// # Errors
 /// Those of the serializer.

@@ -53,13 +53,13 @@ impl MipChain {
     }
 }
 
-/// A texture with its mip levels, RGBA8, borrowed.
+/// A texture with its mip levels, borrowed: RGBA8, or in blocks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MipView<'a> {
     /// Width of level 0 in texels.
     pub width: u32,
     /// Height of level 0 in texels.
     pub height: u32,
-    /// The levels as in a [`MipChain`].
+    /// The levels as in a [`MipChain`], or their blocks row by row.
     pub levels: Vec<&'a [u8]>,
 }

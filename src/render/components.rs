@@ -228,8 +228,8 @@ pub enum ForestUpdates {
     Spread,
 }
 
-/// Which devices get the textures of crossed billboards and billboard clouds block-compressed. A change counts for forests that are
-/// new or have other trees or shapes than before.
+/// Which devices get the textures of crossed billboards and billboard clouds block-compressed. A scene that is shown
+/// sets it. A change counts for forests that are new or have other trees or shapes than before.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Resource, Default)]
 pub struct TextureCompression(pub Compression);

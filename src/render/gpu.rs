@@ -187,7 +187,7 @@ pub struct LevelRows {
     pub count: u32,
     /// Bytes of a row.
     pub bytes: usize,
-    /// Rows of texels in a row.
+    /// Height of a row in texels: 1, or that of a block.
     pub texels: u32,
 }
 

@@ -78,9 +78,9 @@ pub struct Quality {
     /// Upright planes of a cross, 1 to 8, each of which shows the tree from another side. More: outlines as the models have them,
     /// more memory, as many triangles. Default 4; fewer where a scene has so many plants that their textures have too many layers.
     pub cross_planes: u32,
-    /// Which devices get the textures of crosses and clouds block-compressed, a third of the memory at a small error: `Never`,
-    /// `WherePossible`, or `Automatic`, all that read such blocks but for software drivers, which are slower with them. Default
-    /// `Automatic`.
+    /// Which devices get block-compressed textures of crosses and clouds, which take a quarter to a third of the memory at a small
+    /// error: `Never`, `WherePossible`, or `Automatic`, all that read such blocks but software drivers, which are slower with them.
+    /// Default `Automatic`.
     pub texture_compression: Compression,
     /// Distance in metres beyond which no tree is drawn, 100 to 200000. Default 20000.
     pub view_distance: f64,

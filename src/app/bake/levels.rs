@@ -47,7 +47,7 @@ impl LevelBytes {
     }
 
     /// With textures that have as many bytes as `bytes` says, as texels or in blocks.
-    fn with_textures(self, bytes: impl Fn(bool) -> usize) -> Self {
+    pub fn with_textures(self, bytes: impl Fn(bool) -> usize) -> Self {
         Self { plain: self.plain + bytes(false), in_blocks: self.in_blocks + bytes(true) }
     }
 }

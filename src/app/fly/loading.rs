@@ -27,7 +27,7 @@ use crate::{
     assets::StageError,
     components::{CanopyScene, SceneFailed, SceneProgress, SceneReady, SceneState},
     progress::Progress,
-    render::components::{CanopyCamera, TextureCompression},
+    render::components::CanopyCamera,
     scene::Scene,
 };
 
@@ -99,7 +99,6 @@ pub fn start(
     let stage = ready.stage.clone();
     let (entity, mut msaa, mut projection) = camera.into_inner();
     commands.entity(entity).insert(stage.style.clone());
-    commands.insert_resource(TextureCompression(stage.scene.quality.texture_compression));
     *msaa = Msaa::from_samples(stage.scene.quality.msaa);
     *projection = camera::projection(stage.scene.camera.field_of_view.to_radians());
     if let Some(window) = &mut window {

@@ -78,7 +78,7 @@ pub(super) fn describe(page: &mut Page, plant: &Plant, warnings: &[Warning]) {
     }
 }
 
-/// Bytes of each level on the device with the default settings.
+/// Bytes on the device of the levels whose size does not depend on a bake.
 fn memory(plant: &Plant) -> String {
     let BakeSettings { lighting, cross, cloud, .. } = BakeSettings::default();
     let model = plant.parts.iter().map(|part| {
@@ -86,11 +86,11 @@ fn memory(plant: &Plant) -> String {
         mesh_bytes(&part.mesh) + transfer
     });
     let of_transfer = matches!(lighting, LightingSettings::Transfer(_));
-    let textures = |bytes: &dyn Fn(bool) -> usize| LevelBytes { plain: bytes(false), in_blocks: bytes(true) };
     format!(
-        "{} as a full model, its own textures apart\n{} as crossed billboards\n{} as a billboard cloud, its trunk apart",
+        "with the default settings, without its own textures:\n{} as a full model\n{} as crossed billboards\n{} as a billboard cloud, \
+         without its wood",
         LevelBytes::of_meshes(model.sum()),
-        textures(&|in_blocks| cross.texture_bytes(of_transfer, in_blocks)),
-        textures(&|in_blocks| cloud.texture_bytes(of_transfer, in_blocks)),
+        LevelBytes::default().with_textures(|in_blocks| cross.texture_bytes(of_transfer, in_blocks)),
+        LevelBytes::default().with_textures(|in_blocks| cloud.texture_bytes(of_transfer, in_blocks)),
     )
 }

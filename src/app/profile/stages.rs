@@ -94,6 +94,7 @@ impl Stages {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bake::levels::texture::Compression;
 
     #[test]
     fn settings_that_are_only_drawn_share_a_build_and_others_do_not() {
@@ -109,10 +110,11 @@ mod tests {
         let stages = Stages::new([&scene, &cloud].into_iter(), None);
         let built = stages.built_as(&scene);
         assert!(built.validate().is_ok() && built.quality.levels.len() == 1);
-        let drawn: [fn(&mut Scene); 4] = [
+        let drawn: [fn(&mut Scene); 5] = [
             |scene| scene.quality.near_distance = 5.0,
             |scene| scene.quality.shadow_map_size = 256,
             |scene| scene.quality.msaa = 1,
+            |scene| scene.quality.texture_compression = Compression::Never,
             |scene| scene.quality.terrain_error = 4.0,
         ];
         assert!(drawn.into_iter().all(|change| stages.built_as(&with(change)) == built));

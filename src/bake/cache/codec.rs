@@ -25,7 +25,8 @@ use crate::bake::levels::{BAKED, BakedLevel};
 use crate::bake::lighting::BakedLighting;
 use crate::plant::Plant;
 
-/// Version of the format *and* of the bakes: to be raised whenever either gives other bytes for the same input.
+/// Version of the format *and* of the bakes: to be raised whenever either gives other bytes for the same input, as a new version of
+/// the crate `dds` may.
 pub(super) const VERSION: u32 = 22;
 
 const MAGIC: [u8; 8] = *b"CANOPYBK";

@@ -1,13 +1,15 @@
 //! Textures of baked levels: their texels, and the same block-compressed.
 //!
-//! A device that reads blocks holds a quarter or a half of the bytes, and reads as little of them for a texel that it samples. The
-//! blocks are those of the [Khronos Data Format Specification 1.3], encoded once by the bake and kept in the cache.
+//! A device that reads blocks holds a quarter or a half of the bytes, and reads correspondingly less per sample. The blocks are those of the [Khronos Data Format Specification 1.3], encoded once by the bake and kept in the cache.
 //! Cost and error: `docs/measurements/texture-compression.md`.
 //!
 //! [Khronos Data Format Specification 1.3]: https://registry.khronos.org/DataFormat/specs/1.3/dataformat.1.3.html
 
 use bevy::reflect::Reflect;
-use dds::{ColorFormat, CompressionQuality, EncodeOptions, Format, ImageView, Size, encode};
+use dds::{
+    ColorFormat, CompressionQuality, DecodeOptions, EncodeOptions, Format, ImageView, ImageViewMut, Size, decode,
+    encode,
+};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -19,11 +21,11 @@ const BLOCK: u32 = 4;
 const BLOCK_BYTES: usize = 16;
 /// Rows of texels that one task encodes.
 const ROWS_PER_TASK: usize = 32;
-/// The next better one takes four times as long for a tenth less error, which a picture does not show.
+/// The next higher quality takes four times as long for a tenth less error, which no picture shows.
 const QUALITY: CompressionQuality = CompressionQuality::Fast;
 
-/// Which devices get textures in blocks: BC7 and BC5, a third of the memory of crosses and a quarter of that of clouds, and of what is
-/// read of it for a texel.
+/// Which devices get textures in blocks: BC7 and BC5, a third of the memory of crosses and a quarter of that of clouds. From 103 plants of
+/// five planes on, the light of the sun on crosses stays texels on most devices: its blocks take twice as many layers of a texture array.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Reflect)]
 pub enum Compression {
     /// Those that read such blocks, except for software drivers: these unpack a block for each texel.
@@ -99,6 +101,21 @@ impl LevelTexture {
         (width, height, levels.len(), self.blocks.iter().map(|mips| mips.0.len()).collect())
     }
 
+    /// What a device reads from its blocks in place of the texels; `None` if they are not in this encoding. Mips without blocks are
+    /// the texels themselves.
+    pub fn decoded(&self, encoding: BlockEncoding) -> Option<MipChain> {
+        if self.blocks.len() != encoding.sets() {
+            return None;
+        }
+        let MipChain { width, height, ref levels } = self.texels;
+        let decode = |(level, texels): (usize, &Vec<u8>)| {
+            let sets: Option<Vec<&Vec<u8>>> = self.blocks.iter().map(|mips| mips.0.get(level)).collect();
+            sets.map_or_else(|| Some(texels.clone()), |sets| decoded(&sets, self.texels.level_size(level), encoding))
+        };
+        let levels: Option<Vec<_>> = levels.iter().enumerate().map(decode).collect();
+        Some(MipChain { width, height, levels: levels? })
+    }
+
     /// Whether every mip has as many bytes as its size requires.
     pub fn is_whole(&self) -> bool {
         let fits = |(level, blocks): (usize, &Vec<u8>)| blocks.len() == block_bytes(self.texels.level_size(level));
@@ -115,10 +132,14 @@ impl LevelTexture {
         Some(MipView { width, height, levels })
     }
 
-    /// Bytes of all mips, in blocks or as texels.
+    /// Bytes of all mips, in blocks if it has any, or as texels.
     pub fn bytes(&self, in_blocks: bool) -> usize {
         let sum = |levels: &Vec<Vec<u8>>| -> usize { levels.iter().map(Vec::len).sum() };
-        if in_blocks { self.blocks.iter().map(|mips| sum(&mips.0)).sum() } else { sum(&self.texels.levels) }
+        if in_blocks && !self.blocks.is_empty() {
+            self.blocks.iter().map(|mips| sum(&mips.0)).sum()
+        } else {
+            sum(&self.texels.levels)
+        }
     }
 }
 
@@ -171,10 +192,24 @@ fn blocks(texels: &[u8], (width, height): (u32, u32), encoding: BlockEncoding, s
     bands.map(|bands| bands.concat())
 }
 
+/// The texels of a mip from its sets of blocks.
+fn decoded(sets: &[&Vec<u8>], (width, height): (u32, u32), encoding: BlockEncoding) -> Option<Vec<u8>> {
+    let of_set = |blocks: &&Vec<u8>| -> Option<Vec<u8>> {
+        let mut texels = vec![0; width as usize * height as usize * 4];
+        let view = ImageViewMut::new(&mut texels, Size::new(width, height), ColorFormat::RGBA_U8)?;
+        decode(&mut blocks.as_slice(), view, encoding.format(), &DecodeOptions::default()).ok()?;
+        Some(texels)
+    };
+    let texels: Option<Vec<_>> = sets.iter().map(of_set).collect();
+    let mut texels = texels?.into_iter();
+    let first = texels.next()?;
+    let Some(second) = texels.next() else { return Some(first) };
+    let both = first.as_chunks::<4>().0.iter().zip(second.as_chunks::<4>().0);
+    Some(both.flat_map(|(a, b)| [a[0], a[1], b[0], b[1]]).collect())
+}
+
 #[cfg(test)]
 mod tests {
-    use dds::{DecodeOptions, ImageViewMut, decode};
-
     use super::*;
 
     fn texture(width: u32, height: u32, texel: impl Fn(u32, u32) -> [u8; 4]) -> MipChain {
@@ -190,33 +225,14 @@ mod tests {
         }
     }
 
-    /// What a device reads from the blocks of a mip.
-    fn decoded(texture: &LevelTexture, level: usize, encoding: BlockEncoding) -> Vec<u8> {
-        let (width, height) = texture.texels.level_size(level);
-        let set = |set: usize| {
-            let mut texels = vec![0; (width * height * 4) as usize];
-            let view = ImageViewMut::new(&mut texels, Size::new(width, height), ColorFormat::RGBA_U8).unwrap();
-            decode(&mut &texture.blocks[set].0[level][..], view, encoding.format(), &DecodeOptions::default()).unwrap();
-            texels
-        };
-        match encoding {
-            BlockEncoding::Whole => set(0),
-            BlockEncoding::Pairs => {
-                let (first, second) = (set(0), set(1));
-                let both = first.as_chunks::<4>().0.iter().zip(second.as_chunks::<4>().0);
-                both.flat_map(|(a, b)| [a[0], a[1], b[0], b[1]]).collect()
-            }
-        }
-    }
-
     /// Root mean square over all channels, of 255.
     fn error(texels: MipChain, encoding: BlockEncoding) -> f64 {
         let texture = LevelTexture::compressed(texels, encoding);
         assert!(texture.is_whole());
         let (mut square, mut count) = (0.0, 0usize);
-        for (level, wanted) in texture.texels.levels.iter().enumerate().take(texture.blocks[0].0.len()) {
-            let got = decoded(&texture, level, encoding);
-            square += wanted.iter().zip(&got).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2)).sum::<f64>();
+        let read = texture.decoded(encoding).unwrap();
+        for (wanted, got) in texture.texels.levels.iter().zip(&read.levels).take(texture.blocks[0].0.len()) {
+            square += wanted.iter().zip(got).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2)).sum::<f64>();
             count += got.len();
         }
         (square / count as f64).sqrt()
@@ -252,8 +268,8 @@ mod tests {
         for encoding in ENCODINGS {
             for color in [[0, 0, 0, 0], [255; 4], [128; 4], [1, 254, 90, 128]] {
                 let texture = LevelTexture::compressed(texture(8, 8, |_, _| color), encoding);
-                let texels = decoded(&texture, 0, encoding);
-                let off = texels.iter().zip(color.iter().cycle()).map(|(a, b)| a.abs_diff(*b)).max();
+                let read = texture.decoded(encoding).unwrap();
+                let off = read.levels[0].iter().zip(color.iter().cycle()).map(|(a, b)| a.abs_diff(*b)).max();
                 assert!(off <= Some(1), "{encoding:?}, {color:?}: {off:?}");
             }
         }
@@ -284,6 +300,8 @@ mod tests {
         assert!(!with(vec![vec![vec![0; 65], vec![0; 16]]]));
         assert!(!with(vec![vec![vec![0; 64], vec![0; 16], vec![0; 16]]]), "2 x 2 texels are no block");
         assert!(!with(vec![Vec::new(); 3]), "no encoding has three sets");
+        assert!(compressed.decoded(BlockEncoding::Pairs).is_none(), "they are BC7");
+        assert_eq!(LevelTexture::plain(compressed.texels.clone()).bytes(true), compressed.bytes(false));
     }
 
     #[test]

@@ -57,6 +57,9 @@ impl Default for LightingSettings {
     }
 }
 
+/// How coefficients are stored.
+const TRANSFER_FORMAT: TransferFormat = TransferFormat::Snorm8;
+
 impl LightingSettings {
     /// The settings with every value clamped to its range.
     pub fn sanitized(self) -> Self {
@@ -66,12 +69,7 @@ impl LightingSettings {
             Self::Transfer(settings) => Self::Transfer(settings.sanitized()),
         }
     }
-}
 
-/// How coefficients are stored.
-const TRANSFER_FORMAT: TransferFormat = TransferFormat::Snorm8;
-
-impl LightingSettings {
     /// Bytes of baked radiance transfer of a vertex in a part of `kind`; 0 in another light.
     pub fn vertex_bytes(&self, kind: PartKind) -> usize {
         match self {

@@ -37,7 +37,6 @@ use tracing::{error, info, warn};
 use super::{Sun, SunPlugin, report_missing, sets::CanopySystems};
 use crate::{
     assets::{Stage, StageError, most_trees},
-    bake::levels::texture::Compression,
     render::components::TextureCompression,
     scene::{Overrides, SceneSource},
 };
@@ -129,13 +128,10 @@ impl Shown {
 }
 
 impl Stage {
-    /// Spawns the ground and the forest. A world has only one sun, so that is separate: see [`sun`](Self::sun). A scene whose
-    /// textures are not compressed automatically says so for the world.
+    /// Spawns the ground and the forest. A world has only one sun, so that is separate: see [`sun`](Self::sun). Sets the world's
+    /// [`TextureCompression`] to that of the scene.
     pub fn show(&self, commands: &mut Commands) -> Shown {
-        let compression = self.scene.quality.texture_compression;
-        if compression != Compression::Automatic {
-            commands.insert_resource(TextureCompression(compression));
-        }
+        commands.insert_resource(TextureCompression(self.scene.quality.texture_compression));
         Shown {
             ground: commands.spawn(self.ground()).id(),
             forest: self.forest().map(|forest| commands.spawn(forest).id()),

@@ -20,7 +20,7 @@ use crate::{
 /// Why a device gets texels; `None` if it gets blocks.
 pub fn why_texels(compression: Compression, device: &RenderDevice, device_type: DeviceType) -> Option<&'static str> {
     match compression {
-        Compression::Never => Some("the program asks for it"),
+        Compression::Never => Some("`texture_compression` is `Never`"),
         Compression::Automatic if device_type == DeviceType::Cpu => {
             Some("this device is a software driver, which unpacks a block for each texel that it reads")
         }
@@ -79,33 +79,49 @@ pub fn upload_textures(
         let levels = gpu::levels_down_to(&texture.texels.view(), smallest);
         texture.blocks.len() == sets && texture.blocks.iter().all(|mips| mips.0.len() >= levels)
     };
-    let in_blocks = upload.in_blocks
+    let in_blocks = upload.textures.wanted
         && sets * count <= upload.gpu.device.limits().max_texture_array_layers as usize
+        // An empty array is a single texel, which is no block.
+        && find(plants, 0).is_some()
         && (0..count).filter_map(|index| find(plants, index)).all(has_blocks);
+    upload.textures.add(in_blocks);
+    let sets = if in_blocks { sets } else { 1 };
+    let owner = (Arc::clone(plants), find, sets, in_blocks);
     let format = kind.format(in_blocks);
-    if in_blocks {
-        let owner = (Arc::clone(plants), find, sets);
-        upload.texture_array(label, format, sets * count, smallest, &owner, |(plants, find, sets), layer| {
-            find(plants, layer / sets)?.block_view(layer % sets)
-        })
-    } else {
-        let owner = (Arc::clone(plants), find);
-        upload.texture_array(label, format, count, smallest, &owner, |(plants, find), index| {
-            find(plants, index).map(|texture| texture.texels.view())
-        })
-    }
+    upload.texture_array(label, format, sets * count, smallest, &owner, |(plants, find, sets, in_blocks), layer| {
+        let texture = find(plants, layer / sets)?;
+        if *in_blocks { texture.block_view(layer % sets) } else { Some(texture.texels.view()) }
+    })
 }
 
-/// Writes `texture` over that of an `index` in an array of the same kind and size.
-pub fn rewrite(upload: &ForestUpload, array: &Texture, index: u32, texture: &LevelTexture) {
+/// Writes `texture` over that of an `index` in an array of the same kind and shape.
+pub fn rewrite(upload: &ForestUpload, array: &Texture, kind: TexelKind, index: u32, texture: &LevelTexture) {
     if !array.format().is_compressed() {
         gpu::write_layer(&upload.gpu.queue, array, index, &texture.texels.view());
         return;
     }
-    let sets = texture.blocks.len() as u32;
+    let sets = kind.encoding().sets() as u32;
     for (set, layer) in (0..).zip(index * sets..(index + 1) * sets) {
         if let Some(mips) = texture.block_view(set) {
             gpu::write_layer(&upload.gpu.queue, array, layer, &mips);
         }
+    }
+}
+
+/// The texture arrays of a forest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TextureArrays {
+    /// Whether textures that have blocks are uploaded in blocks.
+    pub wanted: bool,
+    /// Arrays that are in blocks.
+    pub in_blocks: usize,
+    /// All arrays.
+    pub all: usize,
+}
+
+impl TextureArrays {
+    fn add(&mut self, in_blocks: bool) {
+        self.in_blocks += usize::from(in_blocks);
+        self.all += 1;
     }
 }

@@ -5,8 +5,8 @@
 //! [`cull`](crate::cull) decides which trees are drawn before the frame; the [`representation`] of each level decides
 //! how.
 //!
-//! Limits: at most 1,024 variants per forest; crosses for as many variants as a texture array has room for, three
-//! layers each, and clouds, one layer each; no motion vectors; one camera.
+//! Limits: at most 1,024 variants per forest; crosses for as many variants as a texture array has room for, two
+//! layers a plane, and clouds, one layer each; no motion vectors; one camera.
 
 mod block_textures;
 mod cloud_uniforms;

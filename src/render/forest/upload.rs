@@ -15,7 +15,7 @@ use bevy::render::{
 use bytemuck::Pod;
 use glam::Vec3;
 
-use super::transfer::TransferLight;
+use super::{block_textures::TextureArrays, transfer::TransferLight};
 use crate::{
     bake::lighting::BakedLighting,
     math::MipView,
@@ -85,8 +85,8 @@ pub struct ForestUpload<'a, 'w> {
     pub transfer: &'a mut TransferLight,
     /// What is still to be written.
     pub writes: &'a mut DeviceWrites,
-    /// Whether textures that have blocks are uploaded in blocks.
-    pub in_blocks: bool,
+    /// What becomes of the textures of levels.
+    pub textures: TextureArrays,
 }
 
 impl ForestUpload<'_, '_> {

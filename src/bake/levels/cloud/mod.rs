@@ -17,7 +17,7 @@
 //! enlarged until the whole cloud covers as much as the plant does, in the mean over five directions
 //! ([Cook et al. 2007, 3.2], as [shadow proxies](super::shadow_proxy) do it).
 //!
-//! Cost: [`CloudSettings::resolution`]² texels of 8 bytes, 12 for plants with transfer, and a third for mips. Limits: a
+//! Cost: [`CloudSettings::resolution`]² texels of 8 bytes, 9 for plants with transfer, and a third for mips. Limits: a
 //! plane seen from behind shows the mirrored image of its front, as crosses do.
 
 mod atlas;

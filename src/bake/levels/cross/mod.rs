@@ -195,9 +195,7 @@ impl CrossSettings {
             fade: self.fade,
         }
     }
-}
 
-impl CrossSettings {
     /// Bytes of the textures that [`bake_cross`] makes, in blocks or as texels, of a plant that is lit by radiance transfer or not.
     pub fn texture_bytes(self, of_transfer: bool, in_blocks: bool) -> usize {
         let Self { uprights, resolution, .. } = self.sanitized();

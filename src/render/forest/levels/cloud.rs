@@ -336,7 +336,7 @@ impl GpuLevel for GpuClouds {
         let Some(drawn) = &mut self.drawn else { return };
         for (index, plant) in relight.new.iter().enumerate() {
             if let Some(cloud) = plant.cloud() {
-                rewrite(upload, &drawn.properties, index as u32, &cloud.textures.properties);
+                rewrite(upload, &drawn.properties, TexelKind::Linear, index as u32, &cloud.textures.properties);
             }
         }
         upload.gpu.queue.write_buffer(&drawn.variants, 0, bytemuck::cast_slice(&cloud_variants(relight.new)));

@@ -306,10 +306,10 @@ impl GpuLevel for GpuCrosses {
             let Some(cross) = new.cross() else { continue };
             let first = variants.get(index).map_or(0, |variant| variant.first_layer);
             for (layer, texture) in (first..).zip(&cross.textures.properties) {
-                rewrite(upload, &drawn.properties, layer, texture);
+                rewrite(upload, &drawn.properties, TexelKind::Linear, layer, texture);
             }
             for (layer, texture) in (first * SUN_LAYERS as u32..).zip(&cross.textures.sun) {
-                rewrite(upload, &drawn.sun, layer, texture);
+                rewrite(upload, &drawn.sun, TexelKind::Pairs, layer, texture);
             }
         }
         upload.gpu.queue.write_buffer(&drawn.variants, 0, bytemuck::cast_slice(&variants));
@@ -385,6 +385,8 @@ fn upload_light(plants: &Arc<Vec<BakedPlant>>, upload: &mut ForestUpload) -> Opt
 /// Whether crosses have the same planes, colours and outlines. A bake with another lighting creates equal ones in other
 /// memory.
 fn same_outline(old: &Cross, new: &Cross) -> bool {
-    let sizes = |cross: &Cross| -> Vec<_> { cross.textures.properties.iter().map(LevelTexture::shape).collect() };
+    let sizes = |cross: &Cross| -> Vec<_> {
+        cross.textures.properties.iter().chain(&cross.textures.sun).map(LevelTexture::shape).collect()
+    };
     old.planes == new.planes && sizes(old) == sizes(new) && old.textures.color == new.textures.color
 }
