@@ -107,21 +107,3 @@ pub fn rewrite(upload: &ForestUpload, array: &Texture, kind: TexelKind, index: u
         }
     }
 }
-
-/// The texture arrays of a forest.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct TextureArrays {
-    /// Whether textures that have blocks are uploaded in blocks.
-    pub wanted: bool,
-    /// Arrays that are in blocks.
-    pub in_blocks: usize,
-    /// All arrays.
-    pub all: usize,
-}
-
-impl TextureArrays {
-    fn add(&mut self, in_blocks: bool) {
-        self.in_blocks += usize::from(in_blocks);
-        self.all += 1;
-    }
-}

@@ -21,14 +21,14 @@ use bevy::{
 };
 
 use super::{
-    block_textures::{TextureArrays, why_texels},
+    block_textures::why_texels,
     drawn_forests::{DrawnForest, DrawnForests},
     leaves::Leaves,
     pipelines::{LevelPipelines, targets},
     representation::{ForestLevel, LevelTarget, Relight, Representations},
     transfer::TransferLight,
     uniforms::{foliage_groups, variants},
-    upload::{BYTES_PER_FRAME, DeviceWrites, ForestUpload},
+    upload::{BYTES_PER_FRAME, DeviceWrites, ForestUpload, TextureArrays},
 };
 use crate::{
     bake::BakedPlant,

@@ -15,7 +15,7 @@ use bevy::render::{
 use bytemuck::Pod;
 use glam::Vec3;
 
-use super::{block_textures::TextureArrays, transfer::TransferLight};
+use super::transfer::TransferLight;
 use crate::{
     bake::lighting::BakedLighting,
     math::MipView,
@@ -72,6 +72,25 @@ impl DeviceWrites {
     /// Bytes that are written, and bytes of all writes.
     pub fn progress(&self) -> (u64, u64) {
         (self.done, self.total)
+    }
+}
+
+/// The texture arrays of a forest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TextureArrays {
+    /// Whether textures that have blocks are uploaded in blocks.
+    pub wanted: bool,
+    /// Arrays that are in blocks.
+    pub in_blocks: usize,
+    /// All arrays.
+    pub all: usize,
+}
+
+impl TextureArrays {
+    /// Counts an array.
+    pub fn add(&mut self, in_blocks: bool) {
+        self.in_blocks += usize::from(in_blocks);
+        self.all += 1;
     }
 }
 
