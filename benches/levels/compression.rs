@@ -12,12 +12,11 @@ use canopy::bake::levels::cross::{Cross, CrossTextures, SUN_SCALE};
 use canopy::bake::levels::texture::BlockEncoding::{Pairs, Whole};
 use canopy::bake::levels::texture::{BlockEncoding, LevelTexture};
 use canopy::bake::{BakeSettings, BakedLevel, BakedPlant, bake_plant};
-use canopy::lod::Representation;
 use canopy::math::MipChain;
-use canopy::measure::{Cutout, LevelError};
+use canopy::measure::LevelError;
 use canopy::plant::Plant;
 
-use super::planes::{HALVINGS, LARGEST, TRUTH, images};
+use super::planes::{errors, truths};
 use super::trees;
 
 /// Mips that are counted, from the finest.
@@ -157,19 +156,10 @@ fn as_read(cross: &Cross) -> Cross {
 /// Crosses of texels and of blocks against the full model.
 fn pictures(name: &str, plant: &BakedPlant) {
     let Some(cross) = plant.cross() else { return };
-    let truths: Vec<Cutout> = images(plant, Representation::MODEL, TRUTH)
-        .into_iter()
-        .filter_map(|sizes| sizes.first().map(|truth| truth.averaged(TRUTH)))
-        .collect();
+    let truths = truths(plant);
     let in_blocks = plant.clone().with_level(BakedLevel::Cross(Arc::new(as_read(cross))));
     for (kind, plant) in [("texels", plant), ("blocks", &in_blocks)] {
-        let shown = images(plant, Representation::CROSS, 1);
-        for halving in 0..=HALVINGS {
-            let (zoom, size) = (1 << halving, LARGEST >> halving);
-            let error = |(sizes, truth): (&Vec<Cutout>, &Cutout)| {
-                sizes[halving].middle(size, size).error(&truth.averaged(zoom))
-            };
-            let error = LevelError::mean(&shown.iter().zip(&truths).map(error).collect::<Vec<_>>());
+        for (size, error) in errors(plant, &truths) {
             let LevelError { rmse, coverage, luminance, contrast } = error;
             println!("| {name} | {kind} | {size} | {rmse:.3} | {coverage:.3} | {luminance:.3} | {contrast:.3} |");
         }

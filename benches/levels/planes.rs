@@ -18,11 +18,11 @@ const UPRIGHTS: [u32; 6] = [4, 1, 2, 3, 6, 8];
 /// Directions to the camera, evenly over a quarter of a turn.
 const TURNS: u32 = 8;
 /// Largest size of a cross in pixels.
-pub const LARGEST: usize = 128;
+const LARGEST: usize = 128;
 /// Pixels of the full model for each of the largest cross's, along a side.
-pub const TRUTH: usize = 8;
+const TRUTH: usize = 8;
 /// Sizes from the largest to 16 pixels.
-pub const HALVINGS: usize = 3;
+const HALVINGS: usize = 3;
 
 fn baked(plant: &Plant, uprights: u32) -> BakedPlant {
     let cross = CrossSettings { uprights, ..CrossSettings::default() };
@@ -31,7 +31,7 @@ fn baked(plant: &Plant, uprights: u32) -> BakedPlant {
 }
 
 /// Images of all turns, under all suns, in the largest size.
-pub fn images(plant: &BakedPlant, level: Representation, pixels: usize) -> Vec<Vec<Cutout>> {
+fn images(plant: &BakedPlant, level: Representation, pixels: usize) -> Vec<Vec<Cutout>> {
     let mut studio = Studio::new(plant.clone(), (LARGEST * pixels) as u32, None, 4).expect("a renderer");
     let turn = |turn: u32| (f64::from(turn) + 0.5) / f64::from(TURNS) * std::f64::consts::FRAC_PI_2;
     let of_turn = |index: u32| {
@@ -48,26 +48,34 @@ pub fn images(plant: &BakedPlant, level: Representation, pixels: usize) -> Vec<V
     (0..TURNS).flat_map(of_turn).collect()
 }
 
+/// The full model, supersampled, in the largest size.
+pub fn truths(plant: &BakedPlant) -> Vec<Cutout> {
+    let images = images(plant, Representation::MODEL, TRUTH).into_iter();
+    images.filter_map(|sizes| sizes.first().map(|truth| truth.averaged(TRUTH))).collect()
+}
+
+/// The mean error of crosses in each size, in pixels.
+pub fn errors(plant: &BakedPlant, truths: &[Cutout]) -> Vec<(usize, LevelError)> {
+    let shown = images(plant, Representation::CROSS, 1);
+    let of_size = |halving: usize| {
+        let (zoom, size) = (1 << halving, LARGEST >> halving);
+        let error =
+            |(sizes, truth): (&Vec<Cutout>, &Cutout)| sizes[halving].middle(size, size).error(&truth.averaged(zoom));
+        (size, LevelError::mean(&shown.iter().zip(truths).map(error).collect::<Vec<_>>()))
+    };
+    (0..=HALVINGS).map(of_size).collect()
+}
+
 pub fn planes() {
     println!();
     println!("| tree | upright planes | MB | size, px | RMSE | cover | light | contrast |");
     println!("|---|--:|--:|--:|--:|--:|--:|--:|");
     for (name, plant) in trees() {
-        let first = baked(&plant, UPRIGHTS[0]);
-        let truths: Vec<Cutout> = images(&first, Representation::MODEL, TRUTH)
-            .into_iter()
-            .filter_map(|sizes| sizes.first().map(|truth| truth.averaged(TRUTH)))
-            .collect();
+        let truths = truths(&baked(&plant, UPRIGHTS[0]));
         for uprights in UPRIGHTS {
             let plant = baked(&plant, uprights);
             let megabytes = plant.cross().map_or(0.0, |cross| cross.texture_bytes(false) as f64 / 1e6);
-            let shown = images(&plant, Representation::CROSS, 1);
-            for halving in 0..=HALVINGS {
-                let (zoom, size) = (1 << halving, LARGEST >> halving);
-                let error = |(sizes, truth): (&Vec<Cutout>, &Cutout)| {
-                    sizes[halving].middle(size, size).error(&truth.averaged(zoom))
-                };
-                let error = LevelError::mean(&shown.iter().zip(&truths).map(error).collect::<Vec<_>>());
+            for (size, error) in errors(&plant, &truths) {
                 println!(
                     "| {name} | {uprights} | {megabytes:.1} | {size} | {:.3} | {:.3} | {:.3} | {:.3} |",
                     error.rmse, error.coverage, error.luminance, error.contrast

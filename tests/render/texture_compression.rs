@@ -16,7 +16,7 @@ use canopy::{
 };
 use glam::DVec2;
 
-use super::{DUSK, NOON, despawn, draw, renderer};
+use super::{DUSK, NOON, despawn, draw, showing};
 use crate::support::{
     gpu::gpu,
     image::{difference, keep, luminance, mean_color},
@@ -69,8 +69,7 @@ fn crosses_and_clouds_in_blocks_look_as_those_of_texels() {
     for (name, lighting) in [("transfer", transfer()), ("local", LightingSettings::Local)] {
         let (stage, plant) = row(lighting);
         let from = view(&stage, (0.0, 6.0, 55.0), 0.0, -2.0);
-        let mut renderer = renderer(1);
-        renderer.show(&stage);
+        let mut renderer = showing(&stage);
         for level in [Representation::CROSS, Representation::CLOUD] {
             for at in [NOON, DUSK] {
                 let mut drawn = |how| {
@@ -112,8 +111,7 @@ fn blocks_take_another_light() {
     // The planes and their colours are the same, so that the forest stays and only its light is written.
     let lit = BakedPlant { lighting: other.lighting.clone(), levels: other.levels.clone(), ..plant.clone() };
     let from = view(&stage, (0.0, 6.0, 55.0), 0.0, -2.0);
-    let mut renderer = renderer(1);
-    renderer.show(&stage);
+    let mut renderer = showing(&stage);
     let how = Compression::WherePossible;
     for level in [Representation::CROSS, Representation::CLOUD] {
         show(&mut renderer, &stage, &lit, level, how);
@@ -136,8 +134,7 @@ fn levels_without_a_bake_are_no_blocks() {
     let gpu = gpu();
     let (stage, plant) = row(LightingSettings::Local);
     let from = view(&stage, (0.0, 6.0, 55.0), 0.0, -2.0);
-    let mut renderer = renderer(1);
-    renderer.show(&stage);
+    let mut renderer = showing(&stage);
     let bare = BakedPlant { levels: Vec::new(), ..plant };
     for level in [Representation::CROSS, Representation::CLOUD] {
         show(&mut renderer, &stage, &bare, level, Compression::WherePossible);
@@ -153,8 +150,7 @@ fn more_plants_than_blocks_of_the_sun_have_layers_for_are_drawn() {
     let gpu = gpu();
     let (stage, plant) = row(LightingSettings::Local);
     let from = view(&stage, (0.0, 6.0, 55.0), 0.0, -2.0);
-    let mut renderer = renderer(1);
-    renderer.show(&stage);
+    let mut renderer = showing(&stage);
     let limit = renderer.app().world().resource::<RenderDevice>().limits().max_texture_array_layers as usize;
     let mut drawn = |count: usize, how| {
         show(&mut renderer, &stage, &plant, Representation::CROSS, how);

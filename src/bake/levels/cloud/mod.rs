@@ -38,7 +38,7 @@ use super::rasterize::{Raster, View, surfaces};
 use super::reduced::{ReducedPart, ReducedPlant};
 use super::shadow_proxy::calibrate;
 use super::texture::BlockEncoding::Whole;
-use super::texture::{LevelTexture, square_block_bytes, square_texel_bytes};
+use super::texture::{LevelTexture, square_bytes};
 use super::tubes::{self, TubeSettings};
 use crate::bake::lighting::BakedLighting;
 use crate::math::MipChain;
@@ -231,10 +231,7 @@ impl CloudSettings {
     /// Bytes of the textures that [`bake_cloud`] makes, in blocks or as texels, of a plant that is lit by radiance transfer or not.
     pub fn texture_bytes(self, of_transfer: bool, in_blocks: bool) -> usize {
         let (edge, levels) = (self.sanitized().resolution, LEVELS as u32);
-        let bytes = |edge, levels| match in_blocks {
-            true => square_block_bytes(edge, levels, Whole),
-            false => square_texel_bytes(edge, levels),
-        };
+        let bytes = |edge, levels| square_bytes(edge, levels, in_blocks.then_some(Whole));
         2 * bytes(edge, levels) + if of_transfer { bytes(edge / 2, levels - 1) } else { 0 }
     }
 }

@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 use self::{light::VertexLight, properties::IsotropicSum};
 use super::rasterize::{Hit, Raster, View};
 use super::texture::BlockEncoding::{Pairs, Whole};
-use super::texture::{LevelTexture, square_block_bytes, square_texel_bytes};
+use super::texture::{LevelTexture, square_bytes};
 use crate::bake::lighting::{AmbientTerm, BakedLighting};
 use crate::math::{hash::mix32, luminance};
 use crate::plant::{Bounds, PartKind, Plant, PlantMaterial, geometry, texture::AlphaFade};
@@ -200,10 +200,7 @@ impl CrossSettings {
     pub fn texture_bytes(self, of_transfer: bool, in_blocks: bool) -> usize {
         let Self { uprights, resolution, .. } = self.sanitized();
         let (planes, levels) = (uprights as usize + 1, resolution.ilog2() + 1);
-        let bytes = |encoding| match in_blocks {
-            true => square_block_bytes(resolution, levels, encoding),
-            false => square_texel_bytes(resolution, levels),
-        };
+        let bytes = |encoding| square_bytes(resolution, levels, in_blocks.then_some(encoding));
         planes * ((2 + usize::from(of_transfer)) * bytes(Whole) + 2 * bytes(Pairs))
     }
 }
